@@ -1,0 +1,85 @@
+"""What can go wrong, by name, each with its remedy."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = [
+    "EquilibriumError",
+    "FlexctrlError",
+    "LinearizationError",
+    "MechanismError",
+    "MissingExtraError",
+    "ReductionError",
+    "SceneError",
+    "StructureError",
+    "did_you_mean",
+]
+
+
+class FlexctrlError(Exception):
+    """Base of every error flexctrl raises on purpose."""
+
+
+class StructureError(FlexctrlError, ValueError):
+    """A part, joint, drive or signal that cannot be: names the part, the value and the remedy."""
+
+
+class SceneError(FlexctrlError, ValueError):
+    """A scene file that cannot be read: names the table and key, and what was expected there."""
+
+
+class MechanismError(FlexctrlError):
+    """A freedom with neither mass nor stiffness, by node and freedom name."""
+
+
+class EquilibriumError(FlexctrlError, RuntimeError):
+    """No equilibrium was found: residual, worst freedom by name, what to try.
+
+    Attributes
+    ----------
+    state : object
+        The best state reached, so that nothing computed is lost (``None`` if the search never started).
+    residual : float
+        Relative residual of that state.
+    """
+
+    def __init__(self, message: str, state: object = None, residual: float = float("inf")) -> None:
+        super().__init__(message)
+        self.state = state
+        self.residual = residual
+
+
+class LinearizationError(FlexctrlError, RuntimeError):
+    """A linear model that fails its own certificate is refused with the reason."""
+
+
+class ReductionError(FlexctrlError, ValueError):
+    """A reduction that was asked for more than it can give."""
+
+
+class MissingExtraError(FlexctrlError, ImportError):
+    """A feature whose optional dependency is not installed; says which extra brings it."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` for the closest known name, or the list of known ones.
+
+    Parameters
+    ----------
+    name : str
+        The name that was not found.
+    known : iterable of str
+        The names that exist.
+
+    Returns
+    -------
+    str
+        A phrase to append to an error message; empty if nothing is known.
+    """
+    names = [str(k) for k in known]
+    close = difflib.get_close_matches(name, names, n=1)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; known: {', '.join(names)}" if names else ""
