@@ -1,0 +1,1 @@
+"""The equations: coordinates, assembly, equilibrium, linear models and their reduction."""
