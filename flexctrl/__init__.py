@@ -1,0 +1,51 @@
+"""flexctrl: structural models coupled to controllers.
+
+One description of a machine gives its join table, its linear models and its closed-loop
+simulation; see ``docs/`` and ``README.md``. Names are loaded when they are first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from typing import Any
+
+_HOMES = {
+    "flexctrl.structure.sections": ("STEEL", "Material", "Section"),
+    "flexctrl.structure.elements": ("Beam", "Node", "PointMass", "RigidBody", "Rope", "Spring"),
+    "flexctrl.structure.joints": ("Hinge", "Pin", "Slide", "Support", "Weld"),
+    "flexctrl.structure.drives": ("LinearDrive", "RotaryDrive"),
+    "flexctrl.structure.signals": (
+        "AngularVelocity",
+        "DriveAngle",
+        "DriveSpeed",
+        "Force",
+        "MotorTorque",
+        "Position",
+        "Rotation",
+        "SwayAngle",
+        "Tension",
+        "Torque",
+        "Velocity",
+    ),
+    "flexctrl.structure.join_table": ("JoinTable",),
+    "flexctrl.structure.structure": ("Structure", "planar"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+__version__ = "0.1.0"
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        value = getattr(importlib.import_module(_HOME[name]), name)
+        globals()[name] = value
+        return value
+    if importlib.util.find_spec(f"flexctrl.{name}"):
+        return importlib.import_module(f"flexctrl.{name}")
+    raise AttributeError(f"module 'flexctrl' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

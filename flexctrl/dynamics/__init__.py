@@ -1,0 +1,1 @@
+"""Through time: integrators, simulation, trajectories."""

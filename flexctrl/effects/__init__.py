@@ -1,0 +1,1 @@
+"""Which physics a scene asks for: one effect a file."""

@@ -1,0 +1,1 @@
+"""How a piece moves: pure functions."""

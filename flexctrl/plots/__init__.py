@@ -1,0 +1,1 @@
+"""Axes in, axes out; the only importer of matplotlib."""

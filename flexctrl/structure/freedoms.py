@@ -1,0 +1,96 @@
+"""The six freedoms of a node and the directions of space, as users write them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
+
+from flexctrl.errors import StructureError, did_you_mean
+
+Vector: TypeAlias = tuple[float, float, float]
+
+FREEDOMS = ("u", "v", "w", "θx", "θy", "θz")
+"""Nodal freedoms in the paper's order: displacements along x, y, z [m], rotations about them [rad]."""
+
+IDENTIFIERS = ("u", "v", "w", "rx", "ry", "rz")
+"""The same freedoms in names that python-control accepts."""
+
+_INDEX = {name: i for i, name in enumerate(FREEDOMS)} | {name: i for i, name in enumerate(IDENTIFIERS)}
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+
+ALL = frozenset(range(6))
+TRANSLATIONS = frozenset(range(3))
+ROTATIONS = frozenset(range(3, 6))
+
+
+def parse_freedoms(text: str | Iterable[str], owner: str) -> frozenset[int]:
+    """Read freedoms such as ``"v w"``, ``"all"`` or ``["u", "rz"]`` into their indices 0…5."""
+    words = text.replace(",", " ").split() if isinstance(text, str) else list(text)
+    if words == ["all"]:
+        return ALL
+    unknown = [w for w in words if w not in _INDEX]
+    if unknown:
+        known = (*FREEDOMS, *IDENTIFIERS[3:], "all")
+        raise StructureError(f"{owner}: no freedom {unknown[0]!r}{did_you_mean(unknown[0], known)}")
+    if not words:
+        raise StructureError(f"{owner}: names no freedom; give some of {' '.join(FREEDOMS)} or 'all'")
+    return frozenset(_INDEX[w] for w in words)
+
+
+def parse_direction(direction: str | Sequence[float], owner: str) -> Vector:
+    """Read a direction, ``"x"``, ``"-z"`` or three numbers, into a unit vector."""
+    if isinstance(direction, str):
+        sign = -1.0 if direction.startswith("-") else 1.0
+        axis = _AXES.get(direction.lstrip("+-"))
+        if axis is None:
+            raise StructureError(f"{owner}: no direction {direction!r}; give x, y, z, -x, -y, -z or three numbers")
+        return (sign * axis[0] + 0.0, sign * axis[1] + 0.0, sign * axis[2] + 0.0)
+    vector = parse_point(direction, owner)
+    length = math.hypot(*vector)
+    if length == 0.0:
+        raise StructureError(f"{owner}: the direction {vector} has no length; give a vector that points somewhere")
+    return (vector[0] / length, vector[1] / length, vector[2] / length)
+
+
+def parse_point(point: Sequence[float], owner: str) -> Vector:
+    """Read three finite numbers."""
+    try:
+        values = tuple(float(p) for p in point)
+    except (TypeError, ValueError):
+        values = ()
+    if len(values) != 3 or not all(math.isfinite(p) for p in values):
+        raise StructureError(f"{owner}: expected three finite numbers (x, y, z) in m, got {point!r}")
+    return (values[0], values[1], values[2])
+
+
+def check_name(name: str, kind: str) -> str:
+    """Return ``name`` if it is an identifier: signal names must be legal for python-control."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise StructureError(
+            f"{kind} {name!r}: a name is letters, digits and underscores and starts with a letter "
+            "(python-control allows no dots or blanks)"
+        )
+    return name
+
+
+def check_number(value: float, what: str, owner: str, *, least: float = -math.inf, above: float = -math.inf) -> float:
+    """Return ``value`` as a float if it is a number ≥ ``least`` and > ``above``."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if math.isnan(number) or number < least or number <= above:
+        bound = f" > {above:g}" if above > -math.inf else f" ≥ {least:g}" if least > -math.inf else ""
+        raise StructureError(f"{owner}: {what} = {value!r}; expected a number{bound}")
+    return number
+
+
+def check_finite(value: float, what: str, owner: str, *, least: float = -math.inf, above: float = -math.inf) -> float:
+    """Return ``value`` as a finite float within the bounds."""
+    number = check_number(value, what, owner, least=least, above=above)
+    if math.isinf(number):
+        raise StructureError(f"{owner}: {what} = {value!r}; expected a finite number")
+    return number

@@ -1,0 +1,314 @@
+"""Inputs and outputs by name: what acts on the machine and what is measured of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from flexctrl.errors import StructureError
+from flexctrl.structure.drives import Drive
+from flexctrl.structure.elements import Node, Rope, Spring
+from flexctrl.structure.freedoms import ROTATIONS, Vector, check_name, parse_direction
+
+
+def _nodes(at: Node | Sequence[Node], owner: str, rotations: bool) -> tuple[Node, ...]:
+    nodes = (at,) if isinstance(at, Node) else tuple(at)
+    for node in nodes:
+        if not isinstance(node, Node):
+            raise StructureError(f"{owner}: {node!r} is no node; give e.g. beam.end")
+        if rotations and not node.freedoms >= ROTATIONS:
+            raise StructureError(f"{owner}: {node} has no rotations; take a node of a beam or rigid body")
+    if not nodes:
+        raise StructureError(f"{owner}: names no node")
+    return nodes
+
+
+def _name_of(part: object, owner: str) -> str:
+    name = getattr(part, "name", part)
+    return check_name(name, owner) if isinstance(name, str) else check_name(str(name), owner)
+
+
+@dataclass(frozen=True)
+class Force:
+    """Input: a force in a fixed direction, in N, on one node or on each of several.
+
+    Parameters
+    ----------
+    name : str
+    at : Node or sequence of Node
+    direction : str or sequence of 3 floats
+        Global direction; it does not turn with the node (a dead load).
+    """
+
+    name: str
+    at: tuple[Node, ...]
+    direction: Vector
+
+    def __init__(self, name: str, at: Node | Sequence[Node], direction: str | Sequence[float]) -> None:
+        owner = f"Force {check_name(name, 'Force')!r}"
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "at", _nodes(at, owner, rotations=False))
+        object.__setattr__(self, "direction", parse_direction(direction, owner))
+
+
+@dataclass(frozen=True)
+class Torque:
+    """Input: a torque about a fixed global axis, in N m, on one node or on each of several.
+
+    Parameters
+    ----------
+    name : str
+    at : Node or sequence of Node
+    axis : str or sequence of 3 floats
+    """
+
+    name: str
+    at: tuple[Node, ...]
+    direction: Vector
+
+    def __init__(self, name: str, at: Node | Sequence[Node], axis: str | Sequence[float]) -> None:
+        owner = f"Torque {check_name(name, 'Torque')!r}"
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "at", _nodes(at, owner, rotations=True))
+        object.__setattr__(self, "direction", parse_direction(axis, owner))
+
+
+@dataclass(frozen=True)
+class MotorTorque:
+    """Input: the torque M_d of a drive's motor on its source angle θ_d, in N m.
+
+    Parameters
+    ----------
+    name : str
+    drive : RotaryDrive, LinearDrive or str
+        The drive or its name.
+    """
+
+    name: str
+    drive: str
+
+    def __init__(self, name: str, drive: Drive | str) -> None:
+        object.__setattr__(self, "name", check_name(name, "MotorTorque"))
+        object.__setattr__(self, "drive", _name_of(drive, f"MotorTorque {name!r}, drive"))
+
+
+def _set_measure(
+    signal: Position | Velocity | Rotation | AngularVelocity,
+    name: str,
+    at: Node,
+    direction: str | Sequence[float],
+    minus: Node | None,
+    rotations: bool,
+) -> None:
+    owner = f"{type(signal).__name__} {check_name(name, type(signal).__name__)!r}"
+    _nodes(at, owner, rotations)
+    if minus is not None:
+        _nodes(minus, owner, rotations)
+    object.__setattr__(signal, "name", name)
+    object.__setattr__(signal, "at", at)
+    object.__setattr__(signal, "direction", parse_direction(direction, owner))
+    object.__setattr__(signal, "minus", minus)
+
+
+@dataclass(frozen=True)
+class Position:
+    """Output: a node's position along a global direction [m], less that of ``minus`` if given.
+
+    Parameters
+    ----------
+    name : str
+    at : Node
+    direction : str or sequence of 3 floats
+    minus : Node, optional
+    """
+
+    name: str
+    at: Node
+    direction: Vector
+    minus: Node | None
+
+    def __init__(self, name: str, at: Node, direction: str | Sequence[float], minus: Node | None = None) -> None:
+        _set_measure(self, name, at, direction, minus, rotations=False)
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Output: a node's velocity along a global direction [m/s], less that of ``minus`` if given.
+
+    Parameters
+    ----------
+    name : str
+    at : Node
+    direction : str or sequence of 3 floats
+    minus : Node, optional
+    """
+
+    name: str
+    at: Node
+    direction: Vector
+    minus: Node | None
+
+    def __init__(self, name: str, at: Node, direction: str | Sequence[float], minus: Node | None = None) -> None:
+        _set_measure(self, name, at, direction, minus, rotations=False)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """Output: a node's angle about an axis [rad], less that of ``minus`` if given.
+
+    The angle is the integral of the angular velocity along the axis: it does not wrap after a
+    turn. Where the axis keeps its direction it is the plain angle of rotation. Across a `Hinge`
+    or drive it is measured about the axis as the ``minus`` side carries it.
+
+    Parameters
+    ----------
+    name : str
+    at : Node
+    axis : str or sequence of 3 floats
+    minus : Node, optional
+    """
+
+    name: str
+    at: Node
+    direction: Vector
+    minus: Node | None
+
+    def __init__(self, name: str, at: Node, axis: str | Sequence[float], minus: Node | None = None) -> None:
+        _set_measure(self, name, at, axis, minus, rotations=True)
+
+
+@dataclass(frozen=True)
+class AngularVelocity:
+    """Output: a node's angular velocity about a global axis [rad/s], less that of ``minus`` if given.
+
+    Parameters
+    ----------
+    name : str
+    at : Node
+    axis : str or sequence of 3 floats
+    minus : Node, optional
+    """
+
+    name: str
+    at: Node
+    direction: Vector
+    minus: Node | None
+
+    def __init__(self, name: str, at: Node, axis: str | Sequence[float], minus: Node | None = None) -> None:
+        _set_measure(self, name, at, axis, minus, rotations=True)
+
+
+@dataclass(frozen=True)
+class DriveAngle:
+    """Output: a drive's source angle θ_d [rad], as a motor encoder shows it; it does not wrap.
+
+    Parameters
+    ----------
+    name : str
+    drive : RotaryDrive, LinearDrive or str
+    """
+
+    name: str
+    drive: str
+
+    def __init__(self, name: str, drive: Drive | str) -> None:
+        object.__setattr__(self, "name", check_name(name, "DriveAngle"))
+        object.__setattr__(self, "drive", _name_of(drive, f"DriveAngle {name!r}, drive"))
+
+
+@dataclass(frozen=True)
+class DriveSpeed:
+    """Output: a motor's speed θ̇_d [rad/s].
+
+    Parameters
+    ----------
+    name : str
+    drive : RotaryDrive, LinearDrive or str
+    """
+
+    name: str
+    drive: str
+
+    def __init__(self, name: str, drive: Drive | str) -> None:
+        object.__setattr__(self, "name", check_name(name, "DriveSpeed"))
+        object.__setattr__(self, "drive", _name_of(drive, f"DriveSpeed {name!r}, drive"))
+
+
+@dataclass(frozen=True)
+class SwayAngle:
+    """Output: the angle of the line from ``top`` to ``load`` against straight down [rad].
+
+    atan2(horizontal offset along ``direction``, drop): positive when the load is ahead of ``top``.
+
+    Parameters
+    ----------
+    name : str
+    top, load : Node
+        Suspension point and load.
+    direction : str or sequence of 3 floats
+        Horizontal direction of travel.
+    down : str or sequence of 3 floats
+        Default ``"-z"``.
+    """
+
+    name: str
+    top: Node
+    load: Node
+    direction: Vector
+    down: Vector
+
+    def __init__(
+        self,
+        name: str,
+        top: Node,
+        load: Node,
+        direction: str | Sequence[float],
+        down: str | Sequence[float] = "-z",
+    ) -> None:
+        owner = f"SwayAngle {check_name(name, 'SwayAngle')!r}"
+        _nodes((top, load), owner, rotations=False)
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "top", top)
+        object.__setattr__(self, "load", load)
+        object.__setattr__(self, "direction", parse_direction(direction, owner))
+        object.__setattr__(self, "down", parse_direction(down, owner))
+
+
+@dataclass(frozen=True)
+class Tension:
+    """Output: the tensile force in a rope or spring [N].
+
+    Parameters
+    ----------
+    name : str
+    line : Rope, Spring or str
+        The rope or spring, or its name.
+    """
+
+    name: str
+    line: str
+
+    def __init__(self, name: str, line: Rope | Spring | str) -> None:
+        object.__setattr__(self, "name", check_name(name, "Tension"))
+        object.__setattr__(self, "line", _name_of(line, f"Tension {name!r}, line"))
+
+
+Input: TypeAlias = Force | Torque | MotorTorque
+Output: TypeAlias = Position | Velocity | Rotation | AngularVelocity | DriveAngle | DriveSpeed | SwayAngle | Tension
+
+__all__ = [
+    "AngularVelocity",
+    "DriveAngle",
+    "DriveSpeed",
+    "Force",
+    "Input",
+    "MotorTorque",
+    "Output",
+    "Position",
+    "Rotation",
+    "SwayAngle",
+    "Tension",
+    "Torque",
+    "Velocity",
+]

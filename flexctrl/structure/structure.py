@@ -1,0 +1,369 @@
+"""The whole machine: parts, joints, drives and signals, checked once."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.structure.drives import Drive, RotaryDrive
+from flexctrl.structure.elements import Node, Part, RigidBody, Rope, Spring
+from flexctrl.structure.freedoms import FREEDOMS, check_name, parse_direction
+from flexctrl.structure.join_table import JoinTable, join
+from flexctrl.structure.joints import Joint, Slide, Support, Weld, main_axis
+from flexctrl.structure.signals import (
+    AngularVelocity,
+    DriveAngle,
+    DriveSpeed,
+    Force,
+    Input,
+    MotorTorque,
+    Output,
+    Position,
+    Rotation,
+    SwayAngle,
+    Tension,
+    Torque,
+    Velocity,
+)
+from flexctrl.structure.ties import Group
+
+_COINCIDE = 1e-6
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A machine: its parts, how they are tied, driven, pushed and measured.
+
+    Parameters
+    ----------
+    elements : sequence of Beam, Rope, Spring, PointMass or RigidBody
+        The parts; their nodes are numbered in this order.
+    joints : sequence of Support, Weld, Pin, Hinge or Slide, or a JoinTable
+        How nodal freedoms are tied. A `JoinTable` made from rows may stand in place of joints.
+    drives : sequence of RotaryDrive or LinearDrive
+    inputs : sequence of Force, Torque or MotorTorque
+    outputs : sequence of Position, Velocity, Rotation, …
+    name : str
+
+    Raises
+    ------
+    StructureError
+        For names used twice or unknown, nodes that are not of this structure, joints between nodes
+        that do not coincide, a drive about an axis its joint holds, or a structure in separate pieces.
+    """
+
+    elements: tuple[Part, ...]
+    joints: tuple[Joint, ...] | JoinTable = ()
+    drives: tuple[Drive, ...] = ()
+    inputs: tuple[Input, ...] = ()
+    outputs: tuple[Output, ...] = ()
+    name: str = "structure"
+
+    def __init__(
+        self,
+        elements: Sequence[Part],
+        joints: Sequence[Joint] | JoinTable = (),
+        drives: Sequence[Drive] = (),
+        inputs: Sequence[Input] = (),
+        outputs: Sequence[Output] = (),
+        name: str = "structure",
+    ) -> None:
+        object.__setattr__(self, "name", check_name(name, "Structure"))
+        object.__setattr__(self, "elements", _typed(elements, Part, "elements"))
+        tied = joints if isinstance(joints, JoinTable) else _typed(joints, Joint, "joints")
+        object.__setattr__(self, "joints", tied)
+        object.__setattr__(self, "drives", _typed(drives, Drive, "drives"))
+        object.__setattr__(self, "inputs", _typed(inputs, Input, "inputs"))
+        object.__setattr__(self, "outputs", _typed(outputs, Output, "outputs"))
+        if not self.elements:
+            raise StructureError("Structure: has no elements; give at least one Beam, PointMass or RigidBody")
+        _check_names(self)
+        _check_nodes(self)
+        _check_coincidence(self)
+        _check_drives(self)
+        _check_pieces(self)
+
+    @cached_property
+    def nodes(self) -> tuple[Node, ...]:
+        """All nodes of all parts, in order; node 1 of the join table is the first."""
+        return tuple(node for part in self.elements for node in part.nodes)
+
+    @cached_property
+    def join_table(self) -> JoinTable:
+        """The join table of nodes, as in the paper."""
+        if isinstance(self.joints, JoinTable):
+            return dataclasses.replace(
+                self.joints,
+                labels=tuple(f"{n.part} {n.index}" for n in self.nodes),
+                drive_labels=tuple(d.name for d in self.drives),
+            )
+        return join(self.nodes, self.joints, self.drives, self.bodies)
+
+    @cached_property
+    def bodies(self) -> tuple[Group, ...]:
+        """The rigid bodies with more than one node, as groups of node numbers (from 0)."""
+        parts = [p for p in self.elements if isinstance(p, RigidBody) and p.points]
+        return tuple(Group(p.name, tuple(self._places[n.part, n.index] for n in p.nodes)) for p in parts)
+
+    def number(self, node: Node) -> int:
+        """Return a node's place in `nodes`, from 0 (the join table counts from 1).
+
+        Parameters
+        ----------
+        node : Node
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        StructureError
+            If no part of the structure has the node.
+        """
+        place = self._places.get((node.part, node.index))
+        if place is None or math.dist(self.nodes[place].position, node.position) > _COINCIDE * self.size:
+            known = {n.part for n in self.nodes}
+            hint = did_you_mean(node.part, known) if node.part not in known else "; the part was changed meanwhile"
+            raise StructureError(f"{node} at {node.position} is not in structure {self.name!r}{hint}")
+        return place
+
+    def part(self, name: str) -> Part | Drive:
+        """Return the element or drive of a name.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        Part or Drive
+
+        Raises
+        ------
+        StructureError
+            If there is none.
+        """
+        parts = {p.name: p for p in (*self.elements, *self.drives)}
+        if name not in parts:
+            raise StructureError(f"structure {self.name!r} has no part {name!r}{did_you_mean(name, parts)}")
+        return parts[name]
+
+    def with_(
+        self,
+        *,
+        elements: Sequence[Part] | None = None,
+        joints: Sequence[Joint] | JoinTable | None = None,
+        drives: Sequence[Drive] | None = None,
+        inputs: Sequence[Input] | None = None,
+        outputs: Sequence[Output] | None = None,
+        name: str | None = None,
+    ) -> Structure:
+        """Return a copy with some fields replaced; what is left out stays.
+
+        Parameters
+        ----------
+        elements, joints, drives, inputs, outputs, name
+            As for the constructor.
+
+        Returns
+        -------
+        Structure
+        """
+        return Structure(
+            self.elements if elements is None else elements,
+            self.joints if joints is None else joints,
+            self.drives if drives is None else drives,
+            self.inputs if inputs is None else inputs,
+            self.outputs if outputs is None else outputs,
+            self.name if name is None else name,
+        )
+
+    @cached_property
+    def size(self) -> float:
+        """Largest extent of the structure [m], the yardstick for coincidence."""
+        lows, highs = zip(*((min(c), max(c)) for c in zip(*(n.position for n in self.nodes), strict=True)), strict=True)
+        return max(*(b - a for a, b in zip(lows, highs, strict=True)), 1e-12)
+
+    @cached_property
+    def _places(self) -> dict[tuple[str, int], int]:
+        return {(n.part, n.index): i for i, n in enumerate(self.nodes)}
+
+
+def planar(structure: Structure, normal: str = "z") -> Structure:
+    """Hold every freedom out of a plane: the plane problem in its 3-D clothes.
+
+    Parameters
+    ----------
+    structure : Structure
+    normal : str
+        ``"x"``, ``"y"`` or ``"z"``: the axis across the plane. Kept are the two displacements in the
+        plane and the rotation about the normal.
+
+    Returns
+    -------
+    Structure
+
+    Raises
+    ------
+    StructureError
+        If ``normal`` is no axis, or the joints are given as a table.
+    """
+    axis = main_axis(parse_direction(normal, "planar"))
+    if isinstance(structure.joints, JoinTable):
+        raise StructureError("planar: the joints are a JoinTable; give its rows with columns='u v θz' instead")
+    kept = {(axis + 1) % 3, (axis + 2) % 3, 3 + axis}
+    supports = [Support(node, [FREEDOMS[f] for f in sorted(node.freedoms - kept)]) for node in structure.nodes]
+    return structure.with_(joints=(*structure.joints, *supports))
+
+
+def _typed(items: Iterable, kinds: object, what: str) -> tuple:
+    if isinstance(items, (str, bytes)) or not isinstance(items, Iterable):
+        raise StructureError(f"Structure: {what} = {items!r}; expected a list")
+    found = tuple(items)
+    allowed = kinds.__args__  # type: ignore[attr-defined]
+    for item in found:
+        if not isinstance(item, allowed):
+            names = ", ".join(k.__name__ for k in allowed)
+            raise StructureError(f"Structure: {item!r} among {what}; expected one of {names}")
+    return found
+
+
+def _check_names(s: Structure) -> None:
+    parts = [item.name for item in (*s.elements, *s.drives)]
+    signals = [item.name for item in (*s.inputs, *s.outputs)]
+    for kind, names in (("part", parts), ("signal", signals)):
+        twice = [name for i, name in enumerate(names) if name in names[:i]]
+        if twice:
+            raise StructureError(f"Structure {s.name!r}: the {kind} name {twice[0]!r} is used twice; rename one")
+
+
+def _check_nodes(s: Structure) -> None:
+    used: list[tuple[object, Node | None]] = []
+    if not isinstance(s.joints, JoinTable):
+        used += [(j, n) for j in s.joints for n in j.nodes]
+    elif len(s.joints.rows) != len(s.nodes) or len(s.joints.drives) != len(s.drives):
+        raise StructureError(
+            f"Structure {s.name!r}: the join table has {len(s.joints.rows)} nodes and {len(s.joints.drives)} drives, "
+            f"the parts have {len(s.nodes)} and {len(s.drives)}"
+        )
+    used += [(f"drive {d.name!r}", n) for d in s.drives for n in (d.node, d.against)]
+    for signal in (*s.inputs, *s.outputs):
+        label = f"{type(signal).__name__} {signal.name!r}"
+        used += [(label, n) for n in _signal_nodes(signal)]
+        _check_part(s, signal, label)
+    for who, node in used:
+        if node is not None:
+            try:
+                s.number(node)
+            except StructureError as error:
+                raise StructureError(f"{who}: {error}") from None
+
+
+def _signal_nodes(signal: Input | Output) -> tuple[Node | None, ...]:
+    if isinstance(signal, Force | Torque):
+        return signal.at
+    if isinstance(signal, Position | Velocity | Rotation | AngularVelocity):
+        return (signal.at, signal.minus)
+    return (signal.top, signal.load) if isinstance(signal, SwayAngle) else ()
+
+
+def _check_part(s: Structure, signal: Input | Output, who: str) -> None:
+    if isinstance(signal, MotorTorque | DriveAngle | DriveSpeed):
+        known, wanted = tuple(d.name for d in s.drives), signal.drive
+    elif isinstance(signal, Tension):
+        known, wanted = tuple(p.name for p in s.elements if isinstance(p, Rope | Spring)), signal.line
+    else:
+        return
+    if wanted not in known:
+        raise StructureError(f"{who}: there is no {wanted!r}{did_you_mean(wanted, known)}")
+
+
+def _check_coincidence(s: Structure) -> None:
+    joints = () if isinstance(s.joints, JoinTable) else s.joints
+    for joint in joints:
+        if isinstance(joint, Support):
+            continue
+        a, b = joint.nodes
+        gap = math.dist(a.position, b.position)
+        if gap > _COINCIDE * s.size:
+            raise StructureError(
+                f"{joint}: the nodes are {gap:.6g} m apart, at {a.position} and {b.position}; joined nodes coincide. "
+                "Move a part, or put a RigidBody with two points or a Beam between them"
+            )
+        if isinstance(joint, Weld | Slide) and a.freedoms != b.freedoms:
+            poor = a if len(a.freedoms) < 6 else b
+            raise StructureError(f"{joint}: {poor} has no rotations to share; use Pin")
+
+
+def _check_drives(s: Structure) -> None:
+    table = s.join_table
+    for drive in s.drives:
+        columns = [drive.column + i for i in range(3) if abs(drive.direction[i]) > 1e-9]
+        mine = [table.rows[s.number(drive.node)][c] for c in columns]
+        other = (
+            [0] * len(columns) if drive.against is None else [table.rows[s.number(drive.against)][c] for c in columns]
+        )
+        if mine == other:
+            kind = "rotation" if isinstance(drive, RotaryDrive) else "displacement"
+            against = "the ground" if drive.against is None else str(drive.against)
+            remedy = "Hinge" if isinstance(drive, RotaryDrive) else "Slide"
+            raise StructureError(
+                f"drive {drive.name!r}: its joint holds the {kind} along {drive.direction} between {drive.node} and "
+                f"{against}, so nothing can turn; free it with a {remedy} along that axis, or correct the axis"
+            )
+
+
+def _check_pieces(s: Structure) -> None:
+    """Every part must hang together with the others, through joints, drives or the ground."""
+    ground = "the ground"
+    linked: dict[str, set[str]] = {name: set() for name in (*(p.name for p in s.elements), ground)}
+
+    def link(names: Iterable[str]) -> None:
+        first, *rest = names
+        for name in rest:
+            linked[first].add(name)
+            linked[name].add(first)
+
+    if isinstance(s.joints, JoinTable):
+        owners: dict[int, list[str]] = {}
+        for node, row in zip(s.nodes, s.joints.rows, strict=True):
+            for number in (row[f] for f in node.freedoms):
+                owners.setdefault(number, [ground] if number == 0 else []).append(node.part)
+        for names in owners.values():
+            link(names)
+    else:
+        for joint in s.joints:
+            link([n.part for n in joint.nodes] + ([ground] if isinstance(joint, Support) else []))
+    for drive in s.drives:
+        link([drive.node.part, ground if drive.against is None else drive.against.part])
+    pieces = _pieces(linked)
+    if len(pieces) > 1:
+        loose = min(pieces[1:], key=len)
+        raise StructureError(
+            f"structure {s.name!r} is in {len(pieces)} separate pieces: {', '.join(sorted(loose))} "
+            f"{'is' if len(loose) == 1 else 'are'} not joined to {sorted(pieces[0] - {ground})[0]}; "
+            "add a Weld, Pin, Hinge, Slide or Support"
+        )
+
+
+def _pieces(linked: dict[str, set[str]]) -> list[set[str]]:
+    pieces: list[set[str]] = []
+    left = {name: None for name in linked if linked[name] or name != "the ground"}
+    while left:
+        todo, piece = [next(iter(left))], set()
+        while todo:
+            name = todo.pop()
+            if name not in piece:
+                piece.add(name)
+                todo += linked[name]
+        pieces.append(piece)
+        left = {name: None for name in left if name not in piece}
+    return pieces
+
+
+__all__ = ["Structure", "planar"]

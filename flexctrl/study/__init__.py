@@ -1,0 +1,1 @@
+"""What it costs and how far to trust it: responses, comparisons, ledgers."""
