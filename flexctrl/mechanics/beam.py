@@ -1,0 +1,323 @@
+"""The beam element on its corotated frame: motion, forces and element matrices.
+
+The element frame R_e has its x axis through both nodes and its twist from the mean of the nodal
+rotations. Deformations are measured in it: the stretch of the chord and the rotation vectors
+θ₁, θ₂ of the nodes. Velocities of the nodes seen in the frame carry the constant consistent mass
+matrix (Crisfield, Galvanetto & Jelenić 1997). At rest the tangents are the textbook matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.mechanics.rotation import inverse_tangent, rotation_vector
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+PARAMETERS = (
+    *("axes00", "axes01", "axes02", "axes10", "axes11", "axes12", "axes20", "axes21", "axes22"),
+    *("L", "EA", "GJ", "a_y", "b_y", "a_z", "b_z", "mass", "polar", "rotary_y", "rotary_z"),
+)
+"""Per element: axes at rest (row by row), length, EA, GJ, bending coefficients, mass coefficients."""
+
+
+@dataclass(frozen=True)
+class NodeMotion:
+    """Symbols of a node: position x, rotation R since rest, velocity v, spin w, and their rates a, b."""
+
+    x: ca.SX
+    R: ca.SX
+    v: ca.SX
+    w: ca.SX
+    a: ca.SX
+    b: ca.SX
+
+
+@dataclass(frozen=True)
+class BeamForce:
+    """A force on an element by what it works on; shares add, and reach the nodes by `nodal_force` once.
+
+    Attributes
+    ----------
+    deformation : casadi.SX, 7
+        Works on stretch, θ₁ and θ₂.
+    torque : casadi.SX, 3
+        Works on the spin of the frame, in the frame.
+    nodal : casadi.SX, 12
+        Forces and moments on the nodes, in the frame.
+    """
+
+    deformation: ca.SX
+    torque: ca.SX
+    nodal: ca.SX
+
+    def __add__(self, other: BeamForce) -> BeamForce:
+        return BeamForce(self.deformation + other.deformation, self.torque + other.torque, self.nodal + other.nodal)
+
+    def __mul__(self, factor: float) -> BeamForce:
+        return BeamForce(self.deformation * factor, self.torque * factor, self.nodal * factor)
+
+
+def no_force() -> BeamForce:
+    """Return the force that is not there."""
+    import casadi as ca
+
+    return BeamForce(ca.SX(7, 1), ca.SX(3, 1), ca.SX(12, 1))
+
+
+@dataclass(frozen=True)
+class BeamMotion:
+    """What the effects may use of a moving beam element; vectors in the element frame unless said.
+
+    Attributes
+    ----------
+    p : dict of str to casadi.SX
+        Parameters by name.
+    frame : casadi.SX, 3 × 3
+        R_e, columns in space axes.
+    chord : casadi.SX
+        Distance of the nodes [m].
+    normal, arms : tuple
+        How the twist of the frame hangs on the nodal rotations.
+    stretch : casadi.SX
+        Length of the chord less L [m].
+    theta : tuple of two casadi.SX
+        Rotation vectors of the nodes against the frame [rad].
+    spin : casadi.SX
+        Spin of the frame.
+    rates, accelerations : tuple of four casadi.SX
+        v₁, ω₁, v₂, ω₂ and their rates, absolute, resolved in the frame.
+    """
+
+    p: dict[str, ca.SX]
+    frame: ca.SX
+    chord: ca.SX
+    normal: tuple[ca.SX, ca.SX]
+    arms: tuple[ca.SX, ca.SX]
+    stretch: ca.SX
+    theta: tuple[ca.SX, ca.SX]
+    spin: ca.SX
+    rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
+    accelerations: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
+
+
+def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
+    """Return the force on the nodes in space axes (12): Bᵀ n + Gᵀ t + f, turned out of the frame."""
+    import casadi as ca
+
+    n = force.deformation
+    t1, t2 = inverse_tangent(m.theta[0], n[1:4]), inverse_tangent(m.theta[1], n[4:7])
+    torque = force.torque - (t1 + t2)
+    along, across = m.normal
+    lever = torque[0] / across
+    pull = ca.vertcat(n[0], torque[2] / m.chord, -(torque[1] + lever * along) / m.chord)
+    turn = [t + 0.5 * lever * arm for t, arm in zip((t1, t2), m.arms, strict=True)]
+    f = force.nodal
+    blocks = (f[0:3] - pull, f[3:6] + turn[0], f[6:9] + pull, f[9:12] + turn[1])
+    return ca.vertcat(*[m.frame @ block for block in blocks])
+
+
+def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> BeamMotion:
+    """Return the motion of an element from that of its nodes.
+
+    Parameters
+    ----------
+    first, second : NodeMotion
+    parameters : casadi.SX
+        In the order of `PARAMETERS`.
+
+    Returns
+    -------
+    BeamMotion
+    """
+    import casadi as ca
+
+    p = {name: parameters[i] for i, name in enumerate(PARAMETERS)}
+    rest = ca.reshape(parameters[:9], 3, 3).T
+    d = second.x - first.x
+    chord = ca.sqrt(ca.dot(d, d))
+    e1 = d / chord
+    sides = [node.R @ rest[:, 1] for node in (first, second)]
+    mean = 0.5 * (sides[0] + sides[1])
+    e3 = ca.cross(e1, mean)
+    e3 = e3 / ca.sqrt(ca.dot(e3, e3))
+    e2 = ca.cross(e3, e1)
+    frame = ca.horzcat(e1, e2, e3)
+    normal = (ca.dot(mean, e1), ca.dot(mean, e2))
+    # q×e3 for the lever arms of the twist, in frame axes; q = (q1, q2, q3) there
+    local = [frame.T @ side for side in sides]
+    arms = tuple(ca.vertcat(q[1], -q[0], 0) for q in local)
+    rates = tuple(frame.T @ v for v in (first.v, first.w, second.v, second.w))
+    accelerations = tuple(frame.T @ a for a in (first.a, first.b, second.a, second.b))
+    dv = rates[2] - rates[0]
+    spin_y, spin_z = -dv[2] / chord, dv[1] / chord
+    twist = 0.5 * (ca.dot(rates[1], arms[0]) + ca.dot(rates[3], arms[1]))
+    spin = ca.vertcat((twist + spin_y * normal[0]) / normal[1], spin_y, spin_z)
+    theta = tuple(rotation_vector(frame.T @ (node.R @ rest)) for node in (first, second))
+    return BeamMotion(
+        p=p,
+        frame=frame,
+        chord=chord,
+        normal=normal,
+        arms=arms,  # type: ignore[arg-type]
+        stretch=chord - p["L"],
+        theta=theta,  # type: ignore[arg-type]
+        spin=spin,
+        rates=rates,  # type: ignore[arg-type]
+        accelerations=accelerations,  # type: ignore[arg-type]
+    )
+
+
+def bowing(m: BeamMotion) -> ca.SX:
+    """Return the strain from bending of the axis between the nodes, ∫½(v'² + w'²)/L for the cubic shape."""
+    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
+    return (2.0 * (y1 * y1 + y2 * y2 + z1 * z1 + z2 * z2) - y1 * y2 - z1 * z2) / 30.0
+
+
+def elastic_force(m: BeamMotion) -> BeamForce:
+    """Return minus the gradient of `strain_energy`."""
+    import casadi as ca
+
+    (x1, y1, z1), (x2, y2, z2) = (_components(t) for t in m.theta)
+    N = m.p["EA"] * (m.stretch / m.p["L"] + bowing(m))
+    torque = m.p["GJ"] / m.p["L"] * (x2 - x1)
+    s = N * m.p["L"] / 30.0
+    m1 = ca.vertcat(
+        -torque,
+        m.p["a_y"] * y1 + m.p["b_y"] * y2 + s * (4.0 * y1 - y2),
+        m.p["a_z"] * z1 + m.p["b_z"] * z2 + s * (4.0 * z1 - z2),
+    )
+    m2 = ca.vertcat(
+        torque,
+        m.p["b_y"] * y1 + m.p["a_y"] * y2 + s * (4.0 * y2 - y1),
+        m.p["b_z"] * z1 + m.p["a_z"] * z2 + s * (4.0 * z2 - z1),
+    )
+    return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
+
+
+def strain_energy(m: BeamMotion) -> ca.SX:
+    """Return ½ EA L ε² + torsion + bending, ε the mean axial strain with bowing [J]."""
+    (x1, y1, z1), (x2, y2, z2) = (_components(t) for t in m.theta)
+    strain = m.stretch / m.p["L"] + bowing(m)
+    return 0.5 * (
+        m.p["EA"] * m.p["L"] * strain**2
+        + m.p["GJ"] / m.p["L"] * (x2 - x1) ** 2
+        + m.p["a_y"] * (y1**2 + y2**2)
+        + 2.0 * m.p["b_y"] * y1 * y2
+        + m.p["a_z"] * (z1**2 + z2**2)
+        + 2.0 * m.p["b_z"] * z1 * z2
+    )
+
+
+def viscous_force(m: BeamMotion) -> BeamForce:
+    """Return −K_e ḋ, the force of a damping equal to the stiffness on the rates of deformation."""
+    import casadi as ca
+
+    relative = [m.rates[1] - m.spin, m.rates[3] - m.spin]
+    # ḋ of a rotation vector is T⁻¹ times the relative spin; T⁻¹(θ) = T⁻ᵀ(−θ)
+    (x1, y1, z1), (x2, y2, z2) = (_components(inverse_tangent(-t, r)) for t, r in zip(m.theta, relative, strict=True))
+    N = m.p["EA"] / m.p["L"] * (m.rates[2] - m.rates[0])[0]
+    torque = m.p["GJ"] / m.p["L"] * (x2 - x1)
+    m1 = ca.vertcat(-torque, m.p["a_y"] * y1 + m.p["b_y"] * y2, m.p["a_z"] * z1 + m.p["b_z"] * z2)
+    m2 = ca.vertcat(torque, m.p["b_y"] * y1 + m.p["a_y"] * y2, m.p["b_z"] * z1 + m.p["a_z"] * z2)
+    return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
+
+
+def momentum(m: BeamMotion, rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Return M_e applied to nodal velocities (or accelerations) in the frame: four blocks."""
+    import casadi as ca
+
+    (vx1, vy1, vz1), (wx1, wy1, wz1), (vx2, vy2, vz2), (wx2, wy2, wz2) = (_components(r) for r in rates)
+    mass, polar = m.p["mass"], m.p["polar"]
+    py1, lz1, py2, lz2 = _bending_momentum(m, (vy1, wz1, vy2, wz2), m.p["rotary_z"])
+    pz1, ly1, pz2, ly2 = _bending_momentum(m, (vz1, -wy1, vz2, -wy2), m.p["rotary_y"])
+    return (
+        ca.vertcat(mass / 6.0 * (2.0 * vx1 + vx2), py1, pz1),
+        ca.vertcat(polar / 6.0 * (2.0 * wx1 + wx2), -ly1, lz1),
+        ca.vertcat(mass / 6.0 * (vx1 + 2.0 * vx2), py2, pz2),
+        ca.vertcat(polar / 6.0 * (wx1 + 2.0 * wx2), -ly2, lz2),
+    )
+
+
+def _bending_momentum(m: BeamMotion, rates: tuple, rotary: ca.SX) -> tuple:
+    """Consistent cubic mass in one plane (Przemieniecki 1968, with rotary inertia ρI)."""
+    v1, w1, v2, w2 = rates
+    L, c = m.p["L"], m.p["mass"] / 420.0
+    r = rotary / (30.0 * L)
+    return (
+        c * (156.0 * v1 + 22.0 * L * w1 + 54.0 * v2 - 13.0 * L * w2) + r * (36.0 * (v1 - v2) + 3.0 * L * (w1 + w2)),
+        c * L * (22.0 * v1 + 4.0 * L * w1 + 13.0 * v2 - 3.0 * L * w2)
+        + r * L * (3.0 * (v1 - v2) + 4.0 * L * w1 - L * w2),
+        c * (54.0 * v1 + 13.0 * L * w1 + 156.0 * v2 - 22.0 * L * w2) - r * (36.0 * (v1 - v2) + 3.0 * L * (w1 + w2)),
+        c * L * (-13.0 * v1 - 3.0 * L * w1 - 22.0 * v2 + 4.0 * L * w2)
+        + r * L * (3.0 * (v1 - v2) - L * w1 + 4.0 * L * w2),
+    )
+
+
+def inertial_force(m: BeamMotion) -> BeamForce:
+    """Return the force of inertia.
+
+    Lagrange's equations of T = ½ Vᵀ M_e V, V the nodal velocities in the frame:
+    d/dt(R_E p) − (ω × on the rotations) − ∂T/∂q, with R_E changing by the frame's spin.
+    """
+    import casadi as ca
+
+    p = momentum(m, m.rates)
+    turning = tuple(ca.cross(m.spin, v) for v in m.rates)
+    rate = momentum(m, tuple(a - t for a, t in zip(m.accelerations, turning, strict=True)))  # type: ignore[arg-type]
+    frame_torque = sum((ca.cross(v, q) for v, q in zip(m.rates, p, strict=True)), ca.SX.zeros(3))
+    blocks = [r + ca.cross(m.spin, q) for r, q in zip(rate, p, strict=True)]
+    for i in (1, 3):
+        blocks[i] = blocks[i] - ca.cross(m.rates[i], p[i])
+    return BeamForce(ca.SX(7, 1), -frame_torque, -ca.vertcat(*blocks))
+
+
+def kinetic_energy(m: BeamMotion) -> ca.SX:
+    """Return ½ Vᵀ M_e V [J]."""
+    import casadi as ca
+
+    p = momentum(m, m.rates)
+    return 0.5 * sum(ca.dot(v, q) for v, q in zip(m.rates, p, strict=True))
+
+
+def drag(m: BeamMotion) -> BeamForce:
+    """Return −M_e V, the force of a damping equal to the mass on the nodal velocities."""
+    import casadi as ca
+
+    return BeamForce(ca.SX(7, 1), ca.SX(3, 1), -ca.vertcat(*momentum(m, m.rates)))
+
+
+def weight(m: BeamMotion, g: np.ndarray) -> BeamForce:
+    """Return the force of gravity g [m/s²], minus the gradient of `height_energy`."""
+    import casadi as ca
+
+    local = m.frame.T @ g
+    half = 0.5 * m.p["mass"] * local
+    c = m.p["mass"] * m.p["L"] / 12.0
+    m1 = c * ca.vertcat(0, -local[2], local[1])
+    # the sag off the chord carries its weight about the frame
+    torque = m.p["mass"] * ca.cross(_sag(m), local)
+    return BeamForce(ca.vertcat(0, m1, -m1), torque, ca.vertcat(half, ca.SX(3, 1), half, ca.SX(3, 1)))
+
+
+def height_energy(m: BeamMotion, g: np.ndarray, middle: ca.SX) -> ca.SX:
+    """Return −∫ρA g·x ds [J], with ``middle`` the mean of the nodal positions in space."""
+    import casadi as ca
+
+    return -m.p["mass"] * ca.dot(ca.DM(g), middle + m.frame @ _sag(m))
+
+
+def _sag(m: BeamMotion) -> ca.SX:
+    """Return the mean deflection of the axis off the chord, in the frame."""
+    import casadi as ca
+
+    difference = m.theta[0] - m.theta[1]
+    return m.p["L"] / 12.0 * ca.vertcat(0, difference[2], -difference[1])
+
+
+def _components(v: ca.SX) -> tuple:
+    return v[0], v[1], v[2]

@@ -1,0 +1,95 @@
+"""Rotations: as casadi expressions for the kernels, as arrays for the drivers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+
+def rotation_vector(R: ca.SX) -> ca.SX:
+    """Return θ with R = exp(θ×), |θ| < π (casadi).
+
+    θ = (|s|/sin|s|) s with 2 s the axial vector of R − Rᵀ; near zero the factor tends to 1 smoothly,
+    and its derivatives stay finite.
+    """
+    import casadi as ca
+
+    s = 0.5 * ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
+    c = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+    square = ca.dot(s, s)
+    small = ca.logic_and(square < 1e-6, c > 0.0)
+    safe = ca.if_else(small, 1.0, square)
+    sine = ca.sqrt(safe)
+    series = 1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0)))
+    return ca.if_else(small, series, ca.atan2(sine, c) / sine) * s
+
+
+def inverse_tangent(theta: ca.SX, v: ca.SX) -> ca.SX:
+    """Return T(θ)⁻ᵀ v = v + ½ θ×v + η θ×(θ×v) (casadi), with η = (1 − (|θ|/2) cot(|θ|/2))/|θ|².
+
+    T maps the rate of the rotation vector to the spatial spin, so T⁻ᵀ carries a moment conjugate to
+    the rotation vector to a moment about space axes (Cardona & Géradin 1988).
+    """
+    import casadi as ca
+
+    square = ca.dot(theta, theta)
+    small = square < 1e-3
+    safe = ca.if_else(small, 1.0, square)
+    half = 0.5 * ca.sqrt(safe)
+    series = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0))
+    eta = ca.if_else(small, series, (1.0 - half / ca.tan(half)) / safe)
+    turned = ca.cross(theta, v)
+    return v + 0.5 * turned + eta * ca.cross(theta, turned)
+
+
+def exponential(theta: np.ndarray) -> np.ndarray:
+    """Return exp(θ×) for rotation vectors of shape (n, 3), as matrices of shape (n, 3, 3)."""
+    square = np.einsum("ni,ni->n", theta, theta)
+    small = square < 1e-8
+    angle = np.sqrt(np.where(small, 1.0, square))
+    a = np.where(small, 1.0 - square / 6.0, np.sin(angle) / angle)
+    b = np.where(small, 0.5 - square / 24.0, (1.0 - np.cos(angle)) / (angle * angle))
+    x, y, z = theta.T
+    R = b[:, None, None] * np.einsum("ni,nj->nij", theta, theta)
+    diagonal = 1.0 - b * square
+    R[:, 0, 0] += diagonal
+    R[:, 1, 1] += diagonal
+    R[:, 2, 2] += diagonal
+    for i, j, part in ((1, 0, z), (2, 1, x), (0, 2, y)):
+        R[:, i, j] += a * part
+        R[:, j, i] -= a * part
+    return R
+
+
+def logarithm(R: np.ndarray) -> np.ndarray:
+    """Return rotation vectors, shape (n, 3), |θ| ≤ π, of matrices of shape (n, 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(R).as_rotvec()
+
+
+def orthonormal(R: np.ndarray) -> np.ndarray:
+    """Return R (n, 3, 3) with its round-off drift from orthonormality removed (one Newton step)."""
+    return R @ (1.5 * np.eye(3) - 0.5 * np.swapaxes(R, -1, -2) @ R)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a × b along the last axis; quicker than numpy.cross for small arrays."""
+    c = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    c[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    c[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    c[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return c
+
+
+def skew_arrays(v: np.ndarray) -> np.ndarray:
+    """Return the matrices of v× for v of shape (n, 3)."""
+    S = np.zeros((*v.shape[:-1], 3, 3))
+    S[..., 2, 1] = v[..., 0]
+    S[..., 0, 2] = v[..., 1]
+    S[..., 1, 0] = v[..., 2]
+    return S - np.swapaxes(S, -1, -2)
