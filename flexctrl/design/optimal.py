@@ -1,0 +1,281 @@
+"""LQR, Kalman filter and LQG that check what the Riccati solver returned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexctrl.design.controller import ControllerError
+from flexctrl.design.feedback import observer_feedback
+from flexctrl.design.wrapping import by_name
+from flexctrl.errors import FlexctrlError
+
+__all__ = ["DesignError", "Estimator", "Regulator", "bryson", "kalman", "lqg", "lqr"]
+
+_TOLERANCE = 1e-8  # largest Riccati residual accepted, relative to the terms of the equation
+
+
+class DesignError(FlexctrlError, RuntimeError):
+    """A design that fails its own check: says which mode or equation, and what to change."""
+
+
+@dataclass(frozen=True, eq=False)
+class Regulator:
+    """A linear-quadratic state feedback u = −K x, checked.
+
+    Attributes
+    ----------
+    gain : numpy.ndarray, shape (n_inputs, n)
+        K.
+    cost : numpy.ndarray, shape (n, n)
+        S, the Riccati solution: the cost from state x is xᵀ S x.
+    poles : numpy.ndarray, shape (n,)
+        Eigenvalues of A − B K, all stable.
+    residual : float
+        What is left of the Riccati equation, relative to its terms.
+    """
+
+    gain: np.ndarray
+    cost: np.ndarray
+    poles: np.ndarray
+    residual: float
+
+
+@dataclass(frozen=True, eq=False)
+class Estimator:
+    """A steady Kalman filter gain, checked.
+
+    Attributes
+    ----------
+    gain : numpy.ndarray, shape (n, n_outputs)
+        L.
+    covariance : numpy.ndarray, shape (n, n)
+        Of the estimation error.
+    poles : numpy.ndarray, shape (n,)
+        Eigenvalues of A − L C, all stable.
+    residual : float
+        What is left of the Riccati equation, relative to its terms.
+    """
+
+    gain: np.ndarray
+    covariance: np.ndarray
+    poles: np.ndarray
+    residual: float
+
+
+def bryson(plant: Any, outputs: Mapping[str, float], inputs: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cost matrices that weigh each signal by its largest acceptable value (Bryson's rule).
+
+    Q = Σ c_iᵀ c_i / ŷ_i² over the outputs named, R = diag(1/û_j²).
+
+    Parameters
+    ----------
+    plant : control.StateSpace
+        With named signals.
+    outputs : mapping of str to float
+        Output → largest acceptable deviation; outputs left out cost nothing.
+    inputs : mapping of str to float
+        Input → largest acceptable command; all of them.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Q, shape (n, n), and R, shape (n_inputs, n_inputs), for `lqr`.
+    """
+    largest = by_name(outputs, plant.output_labels, np.inf, "bryson: outputs")
+    command = by_name(inputs, plant.input_labels, np.inf, "bryson: inputs")
+    if np.isinf(command).any() or min(command.min(initial=1), largest.min(initial=1)) <= 0:
+        raise ControllerError(
+            f"bryson: every input of {list(plant.input_labels)} needs a largest command > 0, outputs too"
+        )
+    rows = plant.C / largest[:, None]
+    return rows.T @ rows, np.diag(command**-2.0)
+
+
+def lqr(plant: Any, state_cost: np.ndarray, input_cost: np.ndarray) -> Regulator:
+    """Return the state feedback that minimises ∫ xᵀ Q x + uᵀ R u (a sum for a sampled plant).
+
+    ``control.lqr`` (or ``dlqr``) does the work; the Riccati residual is then checked, improved by Newton steps
+    (Kleinman 1968) if need be, and the closed-loop poles are verified.
+
+    Parameters
+    ----------
+    plant : control.StateSpace
+        Continuous or sampled.
+    state_cost : numpy.ndarray, shape (n, n)
+        Q, symmetric, positive semidefinite.
+    input_cost : numpy.ndarray, shape (n_inputs, n_inputs)
+        R, symmetric, positive definite.
+
+    Returns
+    -------
+    Regulator
+
+    Raises
+    ------
+    DesignError
+        If no stabilising solution was found; names the mode that cannot be moved or that the cost does not see.
+    """
+    A, B = plant.A, plant.B
+    Q, R = _cost(state_cost, len(A), "state cost"), _cost(input_cost, B.shape[1], "input cost")
+    sampled = bool(plant.isdtime(strict=True))
+    blame = ("no input moves", "the state cost does not see")
+    K, S, residual = _riccati(A, B, Q, R, sampled, "lqr", blame, plant.state_labels)
+    return Regulator(K, S, np.linalg.eigvals(A - B @ K), residual)
+
+
+def kalman(plant: Any, process: np.ndarray, measurement: np.ndarray) -> Estimator:
+    """Return the steady Kalman filter gain for white noise on the states and on the outputs.
+
+    Parameters
+    ----------
+    plant : control.StateSpace
+        Continuous (noise intensities) or sampled (covariances; the gain is that of the one-step predictor).
+    process : numpy.ndarray, shape (n, n)
+        Noise on ẋ; ``plant.B @ W @ plant.B.T`` for noise on the inputs.
+    measurement : numpy.ndarray, shape (n_outputs, n_outputs)
+        Noise on y, positive definite.
+
+    Returns
+    -------
+    Estimator
+
+    Raises
+    ------
+    DesignError
+        If no stable filter was found; names the mode that no output sees or that no noise moves.
+    """
+    A, C = plant.A, plant.C
+    W, V = _cost(process, len(A), "process noise"), _cost(measurement, len(C), "measurement noise")
+    sampled = bool(plant.isdtime(strict=True))
+    blame = ("no output sees", "the process noise does not move")
+    K, P, residual = _riccati(A.T, C.T, W, V, sampled, "kalman", blame, plant.state_labels)
+    return Estimator(K.T, P, np.linalg.eigvals(A - K.T @ C), residual)
+
+
+def lqg(
+    plant: Any, state_cost: np.ndarray, input_cost: np.ndarray, process: np.ndarray, measurement: np.ndarray
+) -> Any:
+    """Return the LQG controller: `lqr` on the states that `kalman` estimates.
+
+    Parameters
+    ----------
+    plant : control.StateSpace
+        Continuous or sampled, for example the rigid twin.
+    state_cost, input_cost : numpy.ndarray
+        Q and R of `lqr`.
+    process, measurement : numpy.ndarray
+        Noises of `kalman`.
+
+    Returns
+    -------
+    control.StateSpace
+        From the plant's outputs to its inputs; see `observer_feedback`.
+    """
+    regulator = lqr(plant, state_cost, input_cost)
+    estimator = kalman(plant, process, measurement)
+    return observer_feedback(regulator.gain, estimator.gain, plant)
+
+
+Solution = tuple[np.ndarray, np.ndarray, float]
+
+
+def _riccati(
+    A: np.ndarray,
+    B: np.ndarray,
+    Q: np.ndarray,
+    R: np.ndarray,
+    sampled: bool,
+    what: str,
+    blame: tuple[str, str],
+    states: list[str],
+) -> Solution:
+    try:
+        K, S, residual = _solved(A, B, Q, R, sampled)
+        radius = _growth(np.linalg.eigvals(A - B @ K), sampled).max(initial=-1.0)
+    except (np.linalg.LinAlgError, ValueError, ArithmeticError) as error:
+        raise DesignError(f"{what}: {error}; {_reason(A, B, Q, sampled, blame, states)}") from error
+    if not residual < _TOLERANCE or not radius < 0:
+        raise DesignError(
+            f"{what}: the Riccati residual is {residual:.1e} and the least stable pole is "
+            f"{'outside' if radius >= 0 else 'inside'} the stable region; {_reason(A, B, Q, sampled, blame, states)}"
+        )
+    return K, S, residual
+
+
+def _solved(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, sampled: bool) -> Solution:
+    import control
+
+    K, S, _ = (control.dlqr if sampled else control.lqr)(A, B, Q, R)
+    K, S = np.asarray(K), np.asarray(S)
+    best = (K, S, _residual(A, B, Q, R, S, sampled))
+    for _ in range(5):
+        if best[2] < 1e-13:
+            break
+        S = _policy_cost(A, B, Q, R, best[0], sampled)
+        tried = (_gain(A, B, R, S, sampled), S, _residual(A, B, Q, R, S, sampled))
+        if not tried[2] < best[2]:
+            break
+        best = tried
+    return best
+
+
+def _policy_cost(
+    A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, K: np.ndarray, sampled: bool
+) -> np.ndarray:
+    from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
+
+    closed, cost = A - B @ K, Q + K.T @ R @ K
+    S = solve_discrete_lyapunov(closed.T, cost) if sampled else solve_continuous_lyapunov(closed.T, -cost)
+    return (S + S.T) / 2
+
+
+def _gain(A: np.ndarray, B: np.ndarray, R: np.ndarray, S: np.ndarray, sampled: bool) -> np.ndarray:
+    if sampled:
+        return np.linalg.solve(R + B.T @ S @ B, B.T @ S @ A)
+    return np.linalg.solve(R, B.T @ S)
+
+
+def _residual(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, S: np.ndarray, sampled: bool) -> float:
+    """Norm of the Riccati equation's left side over the sum of the norms of its terms."""
+    K = _gain(A, B, R, S, sampled)
+    quadratic = K.T @ B.T @ S @ (A if sampled else np.eye(len(A)))
+    linear = (A.T @ S @ A, -S) if sampled else (A.T @ S, S @ A)
+    terms = (*linear, -quadratic, Q)
+    scale = sum(float(np.linalg.norm(term)) for term in terms)
+    return float(np.linalg.norm(sum(terms))) / scale if scale else 0.0
+
+
+def _growth(poles: np.ndarray, sampled: bool) -> np.ndarray:
+    return np.abs(poles) - 1.0 if sampled else poles.real
+
+
+def _reason(
+    A: np.ndarray, B: np.ndarray, Q: np.ndarray, sampled: bool, blame: tuple[str, str], states: list[str]
+) -> str:
+    """The first mode that is not damped by itself and that B cannot move or Q does not see (Hautus test)."""
+    poles, right = np.linalg.eig(A)
+    scale = float(np.linalg.norm(A))
+    for pole, vector in zip(poles, right.T, strict=True):
+        if _growth(np.array([pole]), sampled)[0] < -1e-9 * scale:
+            continue
+        shifted = pole * np.eye(len(A)) - A
+        name = states[int(np.argmax(np.abs(vector)))]
+        for columns, complaint in ((np.hstack([shifted, B]), blame[0]), (np.hstack([shifted.conj().T, Q]), blame[1])):
+            sizes = np.linalg.norm(columns, axis=0)
+            scaled = columns / np.where(sizes > 0, sizes, 1.0)
+            if np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-9:
+                return f"{complaint} the mode at {pole:.4g} (mostly state {name!r})"
+    return "check the scaling of the model and of the weights"
+
+
+def _cost(matrix: np.ndarray, n: int, what: str) -> np.ndarray:
+    array = np.atleast_2d(np.asarray(matrix, dtype=float))
+    if array.shape != (n, n) or not np.isfinite(array).all():
+        raise ControllerError(f"the {what} must be finite and of shape {(n, n)}, not {array.shape}")
+    if not np.allclose(array, array.T, rtol=1e-10, atol=1e-12 * np.abs(array).max(initial=0.0)):
+        raise ControllerError(f"the {what} must be symmetric")
+    return (array + array.T) / 2

@@ -1,0 +1,178 @@
+"""Functions of time with exact derivatives, the stuff reference commands are made of."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from bisect import bisect_right
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+from flexctrl.design.controller import ControllerError
+
+__all__ = ["Constant", "PiecewisePolynomial", "Sum", "Trajectory"]
+
+_ROUND_OFF = 1e-12  # a sample instant this near a break (relative) counts as past it, not a sample early
+
+
+class Trajectory(ABC):
+    """A scalar function of time with its derivative.
+
+    Only ``__call__`` and ``derivative`` must be given; breaks are the instants (s) at which the value or a
+    derivative jumps, and the value there is the one after the jump. The acceleration of ``path`` is
+    ``path.derivative.rate(t)``, or as a trajectory ``path.derivative.derivative``.
+    """
+
+    @abstractmethod
+    def __call__(self, t: float) -> float:
+        """Return the value at time t (s)."""
+
+    @property
+    @abstractmethod
+    def derivative(self) -> Trajectory:
+        """The rate as a trajectory of its own (the impulse of a jump is left out)."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Instants at which the value or a derivative jumps, s."""
+        return ()
+
+    @property
+    def shortest_period(self) -> float:
+        """Shortest period a shaper in it was designed for, s; inf if there is none."""
+        return math.inf
+
+    def rate(self, t: float) -> float:
+        """Return the rate at time t.
+
+        Parameters
+        ----------
+        t : float
+            Time, s.
+
+        Returns
+        -------
+        float
+            Unit of the value per second.
+        """
+        return self.derivative(t)
+
+
+@dataclass(frozen=True)
+class PiecewisePolynomial(Trajectory):
+    """Σ_k c[i][k] (t − knots[i])^k from knot i until the next, the last one for ever.
+
+    Attributes
+    ----------
+    knots : tuple of float
+        Increasing instants, s.
+    coefficients : tuple of tuple of float
+        One row per knot, ascending powers.
+    before : float
+        Value before the first knot.
+    """
+
+    knots: tuple[float, ...]
+    coefficients: tuple[tuple[float, ...], ...]
+    before: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.knots) != len(self.coefficients) or not self.knots:
+            raise ControllerError(f"{len(self.knots)} knots need as many rows, not {len(self.coefficients)}")
+        require_finite("piecewise polynomial", *self.knots, self.before, *(c for row in self.coefficients for c in row))
+        if any(b <= a for a, b in zip(self.knots, self.knots[1:], strict=False)):
+            raise ControllerError(f"the knots of a trajectory must increase: {self.knots}")
+
+    def __call__(self, t: float) -> float:
+        piece = bisect_right(self._reached, t) - 1
+        if piece < 0:
+            return self.before
+        s, value = t - self.knots[piece], 0.0
+        for coefficient in self._descending[piece]:
+            value = value * s + coefficient
+        return value
+
+    @cached_property
+    def _reached(self) -> tuple[float, ...]:
+        return tuple(knot - _ROUND_OFF * (1.0 + abs(knot)) for knot in self.knots)
+
+    @cached_property
+    def _descending(self) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(row[::-1]) for row in self.coefficients)
+
+    @cached_property
+    def derivative(self) -> PiecewisePolynomial:
+        rows = tuple(tuple(k * c for k, c in enumerate(row))[1:] or (0.0,) for row in self.coefficients)
+        return PiecewisePolynomial(self.knots, rows)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return self.knots
+
+
+@dataclass(frozen=True)
+class Constant(Trajectory):
+    """The same value at all times: a set point, or an operating point to work about.
+
+    Attributes
+    ----------
+    value : float
+        SI units of the signal.
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        require_finite("constant", self.value)
+
+    def __call__(self, t: float) -> float:
+        return self.value
+
+    @property
+    def derivative(self) -> Trajectory:
+        return Constant(0.0)
+
+
+@dataclass(frozen=True)
+class Sum(Trajectory):
+    """The sum of several trajectories: there and back, a disturbance on a move.
+
+    Attributes
+    ----------
+    terms : tuple of Trajectory
+        Added up.
+    """
+
+    terms: tuple[Trajectory, ...]
+
+    def __call__(self, t: float) -> float:
+        return sum(term(t) for term in self.terms)
+
+    @cached_property
+    def derivative(self) -> Trajectory:
+        return Sum(tuple(term.derivative for term in self.terms))
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return distinct(b for term in self.terms for b in term.breaks)
+
+    @property
+    def shortest_period(self) -> float:
+        return min((term.shortest_period for term in self.terms), default=math.inf)
+
+
+def distinct(instants: Iterable[float]) -> tuple[float, ...]:
+    """Return instants in order, those that differ by round-off only once."""
+    kept: list[float] = []
+    for instant in sorted(instants):
+        if not kept or instant - kept[-1] > _ROUND_OFF * (1.0 + abs(instant)):
+            kept.append(instant)
+    return tuple(kept)
+
+
+def require_finite(what: str, *values: float) -> None:
+    """Raise a `ControllerError` naming the first value that is not finite."""
+    for value in values:
+        if not math.isfinite(value):
+            raise ControllerError(f"{what}: {value} is not a finite number")

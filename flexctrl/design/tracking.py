@@ -1,0 +1,319 @@
+"""How commands enter: references followed, reference signals bound, plant inputs driven as functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from flexctrl.design.controller import Controller, ControllerError, as_controller
+from flexctrl.design.piecewise import distinct
+from flexctrl.design.shaping import check_grid
+from flexctrl.design.wrapping import Stateless, Wrapper, breaks_of, check_names, discretised
+
+__all__ = ["Commanded", "FeedForward", "OpenLoop", "Together", "Tracking"]
+
+Signal = Callable[[float], float]  # a Trajectory, or any function of time
+Pairs = tuple[tuple[int, Signal], ...]  # place in the vector, what is added there
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking(Wrapper):
+    """Feedback on the deviation from a reference: u = F(y − r(t)).
+
+    With u = −kp y − kd ẏ inside this is u = kp (r − y) + kd (ṙ − ẏ), given the references of both signals::
+
+        move = Shaped(TrapezoidalVelocity(5.0, 1.0, 0.3), zvd(omega))
+        Tracking(pd(kp, kd, measured="travel", rate="travel_rate", command="torque"),
+                 {"travel": move, "travel_rate": move.derivative})
+
+    A constant reference is an operating point: a law designed on a model linearised there works about it.
+
+    Attributes
+    ----------
+    controller : Controller
+        A regulator from measured signals to plant inputs.
+    reference : mapping of str to Trajectory
+        For some of its inputs (any function of t will do); the others are fed back as they are.
+    """
+
+    reference: Mapping[str, Signal] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _ = self._pairs
+
+    @cached_property
+    def _pairs(self) -> Pairs:
+        return _indexed(self.reference, self.inputs, "Tracking")
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return _merged(self.controller, *self.reference.values())
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.command(t, x, self._deviation(t, y))
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.rate(t, x, self._deviation(t, y)) if x.size else x
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.update(t, x, self._deviation(t, y)) if x.size else x
+
+    def sampled(self, sample_time: float) -> Controller:
+        _check_grids(self.reference, sample_time)
+        return Tracking(discretised(self.controller, sample_time), self.reference)
+
+    def _deviation(self, t: float, y: np.ndarray) -> np.ndarray:
+        deviation = np.array(y, dtype=float)
+        for place, reference in self._pairs:
+            deviation[place] -= reference(t)
+        return deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Commanded(Wrapper):
+    """A controller some of whose inputs are reference signals, bound to functions of time: u = F(y, r(t)).
+
+    For laws that take references beside the measurements, such as those of
+    ``control.create_statefbk_iosystem``.
+
+    Attributes
+    ----------
+    controller : Controller
+        Reads plant outputs and reference signals.
+    signals : mapping of str to Trajectory
+        What each reference signal is; the inputs left over must be plant outputs.
+    """
+
+    signals: Mapping[str, Signal] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _ = self._pairs
+
+    @cached_property
+    def _pairs(self) -> Pairs:
+        return _indexed(self.signals, self.controller.inputs, "Commanded")
+
+    @cached_property
+    def _measured(self) -> np.ndarray:
+        return _places(self.inputs, self.controller.inputs)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return tuple(name for name in self.controller.inputs if name not in self.signals)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return _merged(self.controller, *self.signals.values())
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.command(t, x, self._completed(t, y))
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.rate(t, x, self._completed(t, y)) if x.size else x
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.update(t, x, self._completed(t, y)) if x.size else x
+
+    def sampled(self, sample_time: float) -> Controller:
+        _check_grids(self.signals, sample_time)
+        return Commanded(discretised(self.controller, sample_time), self.signals)
+
+    def _completed(self, t: float, y: np.ndarray) -> np.ndarray:
+        full = np.empty(len(self._measured) + len(self._pairs))
+        full[self._measured] = y
+        for place, signal in self._pairs:
+            full[place] = signal(t)
+        return full
+
+
+@dataclass(frozen=True, eq=False)
+class OpenLoop(Stateless):
+    """Plant inputs driven as functions of time, nothing measured.
+
+    Attributes
+    ----------
+    commands : mapping of str to Trajectory
+        Plant input → function of t.
+    sample_time : float
+        0.0 = continuous; else evaluated at the samples and held.
+    """
+
+    commands: Mapping[str, Signal]
+    sample_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        _indexed(self.commands, self.outputs, "OpenLoop")
+
+    @cached_property
+    def _signals(self) -> tuple[Signal, ...]:
+        return tuple(self.commands.values())
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return tuple(self.commands)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return _merged(*self.commands.values())
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([signal(t) for signal in self._signals], dtype=float)
+
+    def sampled(self, sample_time: float) -> Controller:
+        """Return the same commands evaluated every ``sample_time`` seconds and held.
+
+        Parameters
+        ----------
+        sample_time : float
+            Seconds.
+
+        Returns
+        -------
+        OpenLoop
+        """
+        _check_grids(self.commands, sample_time)
+        return OpenLoop(self.commands, sample_time)
+
+
+@dataclass(frozen=True, eq=False)
+class FeedForward(Wrapper):
+    """Functions of time added to what a controller commands: u = F(y) + u_ff(t).
+
+    Attributes
+    ----------
+    controller : Controller
+        Any.
+    commands : mapping of str to Trajectory
+        For some of the plant inputs it commands; a constant is the load that holds an operating point.
+    """
+
+    commands: Mapping[str, Signal] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _ = self._pairs
+
+    @cached_property
+    def _pairs(self) -> Pairs:
+        return _indexed(self.commands, self.outputs, "FeedForward")
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return _merged(self.controller, *self.commands.values())
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        u = np.array(self.controller.command(t, x, y), dtype=float)
+        for place, signal in self._pairs:
+            u[place] += signal(t)
+        return u
+
+    def sampled(self, sample_time: float) -> Controller:
+        _check_grids(self.commands, sample_time)
+        return FeedForward(discretised(self.controller, sample_time), self.commands)
+
+
+class Together:
+    """Several controllers side by side, one per drive say; what they command to the same input adds up.
+
+    Parameters
+    ----------
+    *controllers : Controller
+        All continuous or all sampled alike.
+
+    Raises
+    ------
+    ControllerError
+        If their sample times differ.
+    """
+
+    def __init__(self, *controllers: Controller) -> None:
+        parts = tuple(as_controller(c) for c in controllers)
+        times = {part.sample_time for part in parts}
+        if len(times) != 1:
+            raise ControllerError(
+                f"Together needs controllers of one sample time, not {sorted(times)} s: wrap them in Sampled"
+            )
+        self.parts = parts
+        self.sample_time = times.pop()
+        self.inputs = _united(part.inputs for part in parts)
+        self.outputs = _united(part.outputs for part in parts)
+        ends = np.cumsum([0, *(len(part.initial()) for part in parts)]).tolist()
+        self._slices = tuple(slice(a, b) for a, b in pairwise(ends))
+        self._reads = tuple(_places(part.inputs, self.inputs) for part in parts)
+        self._writes = tuple(_places(part.outputs, self.outputs) for part in parts)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return _merged(*self.parts)
+
+    def initial(self) -> np.ndarray:
+        return np.concatenate([part.initial() for part in self.parts])
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        u = np.zeros(len(self.outputs))
+        for part, own, reads, writes in zip(self.parts, self._slices, self._reads, self._writes, strict=True):
+            u[writes] += part.command(t, x[own], y[reads])
+        return u
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        if not x.size:
+            return x
+        parts = zip(self.parts, self._slices, self._reads, strict=True)
+        return np.concatenate([part.rate(t, x[own], y[reads]) for part, own, reads in parts])
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        if not x.size:
+            return x
+        parts = zip(self.parts, self._slices, self._reads, strict=True)
+        return np.concatenate([part.update(t, x[own], y[reads]) for part, own, reads in parts])
+
+    def sampled(self, sample_time: float) -> Controller:
+        """Return the same controllers, each sampled.
+
+        Parameters
+        ----------
+        sample_time : float
+            Seconds.
+
+        Returns
+        -------
+        Together
+        """
+        return Together(*(discretised(part, sample_time) for part in self.parts))
+
+
+def _indexed(signals: Mapping[str, Signal], names: tuple[str, ...], what: str) -> Pairs:
+    check_names(signals, names, what)
+    for name, signal in signals.items():
+        if not callable(signal):
+            raise ControllerError(
+                f"{what}: {name!r} is given {signal!r}, no function of time; use Constant({signal!r})"
+            )
+    return tuple((names.index(name), signal) for name, signal in signals.items())
+
+
+def _merged(*parts: object) -> tuple[float, ...]:
+    return distinct(instant for part in parts for instant in breaks_of(part))
+
+
+def _united(groups: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for group in groups for name in group))
+
+
+def _places(names: tuple[str, ...], among: tuple[str, ...]) -> np.ndarray:
+    return np.array([among.index(name) for name in names], dtype=int)
+
+
+def _check_grids(signals: Mapping[str, Signal], sample_time: float) -> None:
+    for signal in signals.values():
+        check_grid(getattr(signal, "shortest_period", np.inf), sample_time)

@@ -1,0 +1,208 @@
+"""What wrappers share: passing through, sampling, and values given by signal name."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexctrl.design.controller import Controller, ControllerError, as_controller
+from flexctrl.errors import did_you_mean
+
+__all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised"]
+
+
+def breaks_of(controller: object) -> tuple[float, ...]:
+    """Return the instants at which a controller's (or a trajectory's) command jumps.
+
+    Parameters
+    ----------
+    controller : Controller or Trajectory
+        Anything; without ``breaks`` it has none.
+
+    Returns
+    -------
+    tuple of float
+        Seconds, in order.
+    """
+    return tuple(getattr(controller, "breaks", ()))
+
+
+class Stateless:
+    """A law without states: u = command(t, y)."""
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return x
+
+    update = rate
+
+
+@dataclass(frozen=True, eq=False)
+class Wrapper:
+    """Passes everything through to the controller it is wrapped around.
+
+    Attributes
+    ----------
+    controller : Controller
+        Given as anything `as_controller` takes.
+    """
+
+    controller: Controller
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "controller", as_controller(self.controller))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.controller.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return self.controller.outputs
+
+    @property
+    def sample_time(self) -> float:
+        return self.controller.sample_time
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return breaks_of(self.controller)
+
+    def initial(self) -> np.ndarray:
+        return self.controller.initial()
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.command(t, x, y)
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.rate(t, x, y)
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.controller.update(t, x, y)
+
+    def sampled(self, sample_time: float) -> Controller:
+        """Return the same wrapper round the sampled controller.
+
+        Parameters
+        ----------
+        sample_time : float
+            Seconds.
+
+        Returns
+        -------
+        Controller
+            Sampled; whatever the wrapper adds is evaluated at the sample instants and held.
+        """
+        return dataclasses.replace(self, controller=discretised(self.controller, sample_time))
+
+
+@dataclass(frozen=True, eq=False)
+class IntegratedController(Wrapper):
+    """Any continuous controller, sampled: its state is integrated between samples with y held.
+
+    LSODA at a relative tolerance of 1e-9 (about a millisecond a sample); time runs on between samples.
+
+    Attributes
+    ----------
+    controller : Controller
+        Continuous.
+    sample_time : float
+        Seconds.
+    """
+
+    sample_time: float = 0.0
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        if not x.size:
+            return x
+        from scipy.integrate import solve_ivp
+
+        run = solve_ivp(
+            lambda s, z: self.controller.rate(s, z, y),
+            (t, t + self.sample_time),
+            x,
+            method="LSODA",
+            rtol=1e-9,
+            atol=1e-12,
+            t_eval=(t + self.sample_time,),
+        )
+        if not run.success or not np.isfinite(run.y).all():
+            raise ControllerError(
+                f"the state of {type(self.controller).__name__} could not be integrated over the sample at "
+                f"t = {t} s: {run.message}"
+            )
+        return run.y[:, -1]
+
+
+def discretised(controller: Controller, sample_time: float) -> Controller:
+    """Return a continuous controller as sampled every ``sample_time`` seconds, y held between samples.
+
+    Parameters
+    ----------
+    controller : Controller
+        Continuous. Exact if it is linear, also inside wrappers; else its state is integrated.
+    sample_time : float
+        Seconds.
+
+    Returns
+    -------
+    Controller
+        With the same inputs and outputs.
+
+    Raises
+    ------
+    ControllerError
+        If it is already sampled at another rate.
+    """
+    own = controller.sample_time
+    if own == sample_time:
+        return controller
+    if own:
+        raise ControllerError(
+            f"the controller is already sampled every {own} s and cannot be resampled to {sample_time} s"
+        )
+    sampler: Any = getattr(controller, "sampled", None)
+    return sampler(sample_time) if sampler else IntegratedController(controller, sample_time)
+
+
+def by_name(values: Mapping[str, float], names: Sequence[str], default: float, what: str) -> np.ndarray:
+    """Return ``values`` as an array in the order of ``names``.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Not NaN.
+    names : sequence of str
+        The signals there are.
+    default : float
+        For names that ``values`` leaves out.
+    what : str
+        What the values are, for the error message.
+
+    Returns
+    -------
+    numpy.ndarray, shape (len(names),)
+
+    Raises
+    ------
+    ControllerError
+        If a name is unknown or a value is NaN.
+    """
+    check_names(values, names, what)
+    array = np.array([values.get(name, default) for name in names], dtype=float)
+    if np.isnan(array).any():
+        raise ControllerError(f"{what} of {names[int(np.argmax(np.isnan(array)))]!r} is not a number")
+    return array
+
+
+def check_names(given: Iterable[str], names: Sequence[str], what: str) -> None:
+    """Raise a `ControllerError` for the first name that is not a signal of the controller."""
+    for name in given:
+        if name not in names:
+            raise ControllerError(f"{what}: the controller has no signal {name!r}{did_you_mean(name, names)}")
