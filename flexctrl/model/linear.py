@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
+
+from flexctrl.errors import LinearizationError, StructureError, did_you_mean
+
+if TYPE_CHECKING:
+    import control
+
+    from flexctrl.model.condense import Audit
+    from flexctrl.model.discrete import Hold
+    from flexctrl.model.modal import ModalSystem
+    from flexctrl.model.modes import Modes
+    from flexctrl.model.response import FrequencyResponse
+    from flexctrl.model.statespace import Form
 
 __all__ = ["LinearModel", "PartMatrices"]
 
@@ -25,7 +40,7 @@ class PartMatrices:
     mass: sp.csc_matrix
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearModel:
     """M q̈ + C q̇ + K q = B u,  y = Cq q + Cv q̇ + D u, with names.
 
@@ -59,3 +74,195 @@ class LinearModel:
     outputs: tuple[str, ...]
     name: str = "linear"
     parts: Mapping[str, PartMatrices] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n, m, p = len(self.coordinates), len(self.inputs), len(self.outputs)
+        shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "B": (n, m), "Cq": (p, n), "Cv": (p, n), "D": (p, m)}
+        for name, shape in shapes.items():
+            _check_matrix(name, getattr(self, name), shape)
+
+    # -- views and transformations
+
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
+        """The same dynamics seen through some of the signals only.
+
+        Parameters
+        ----------
+        inputs, outputs : sequence of str, optional
+            Names to keep, in the order wanted; all of them if left out.
+
+        Returns
+        -------
+        LinearModel
+
+        Raises
+        ------
+        StructureError
+            For a name that is not a signal of this model.
+        """
+        u = _indices(self.inputs if inputs is None else inputs, self.inputs, "input")
+        y = _indices(self.outputs if outputs is None else outputs, self.outputs, "output")
+        return replace(
+            self,
+            B=self.B[:, u],
+            Cq=self.Cq[y],
+            Cv=self.Cv[y],
+            D=self.D[np.ix_(y, u)],
+            inputs=tuple(self.inputs[i] for i in u),
+            outputs=tuple(self.outputs[i] for i in y),
+        )
+
+    def projected(
+        self,
+        basis: np.ndarray | sp.spmatrix,
+        coordinates: Sequence[str],
+        left: np.ndarray | sp.spmatrix | None = None,
+    ) -> LinearModel:
+        """Galerkin projection q = T b: Tᵀ M T, …; names of signals and parts are kept.
+
+        Parameters
+        ----------
+        basis : array or sparse matrix, shape (n, k)
+            Columns T.
+        coordinates : sequence of k str
+            Names of the new coordinates b.
+        left : array or sparse matrix, shape (n, k), optional
+            Test functions, if they are not T (Petrov–Galerkin).
+
+        Returns
+        -------
+        LinearModel
+        """
+        T = sp.csc_matrix(basis)
+        L = (T if left is None else sp.csc_matrix(left)).T
+
+        def congruent(A: sp.csc_matrix) -> sp.csc_matrix:
+            return sp.csc_matrix(L @ A @ T)
+
+        parts = {k: PartMatrices(congruent(v.stiffness), congruent(v.mass)) for k, v in self.parts.items()}
+        return replace(
+            self,
+            M=congruent(self.M),
+            C=congruent(self.C),
+            K=congruent(self.K),
+            B=L @ self.B,
+            Cq=(T.T @ self.Cq.T).T,
+            Cv=(T.T @ self.Cv.T).T,
+            coordinates=tuple(coordinates),
+            parts=parts,
+        )
+
+    # -- analysis
+
+    def audit(self) -> Audit:
+        """Label every coordinate dynamic, static (massless but stiff), relaxing or mechanism.
+
+        See :func:`flexctrl.model.condense.audit`.
+        """
+        from flexctrl.model.condense import audit
+
+        return audit(self)
+
+    def condense(self) -> LinearModel:
+        """Eliminate the massless, undamped freedoms exactly; see :func:`flexctrl.model.condense.condense`."""
+        from flexctrl.model.condense import condense
+
+        return condense(self)
+
+    def modes(self, count: int | None = None) -> Modes:
+        """Undamped modes, lowest first; see :func:`flexctrl.model.modes.modes`.
+
+        Parameters
+        ----------
+        count : int, optional
+            How many; left out: all of them up to 1000 coordinates, the 20 lowest beyond.
+        """
+        from flexctrl.model.modes import modes
+
+        return modes(self, count)
+
+    def damped_poles(self, count: int | None = None) -> np.ndarray:
+        """Roots s of det(s² M + s C + K) = 0; see :func:`flexctrl.model.poles.damped_poles`."""
+        from flexctrl.model.poles import damped_poles
+
+        return damped_poles(self, count)
+
+    def frequency_response(
+        self, omega: np.ndarray | Sequence[float] | None = None, span: tuple[float, float] | None = None
+    ) -> FrequencyResponse:
+        """Response y(iω)/u(iω); see :func:`flexctrl.model.response.frequency_response`.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Angular frequencies, rad/s; left out: an adaptive grid with every peak and anti-resonance.
+        span : tuple of two floats, optional
+            Limits of the adaptive grid, rad/s.
+        """
+        from flexctrl.model.response import frequency_response
+
+        return frequency_response(self, omega, span)
+
+    # -- export
+
+    def to_ss(self, form: Form | None = None, modes: Modes | None = None) -> control.StateSpace:
+        """First-order model for python-control; see :func:`flexctrl.model.statespace.to_ss`.
+
+        Parameters
+        ----------
+        form : Form, optional
+            ``ModalForm()`` (default) or ``PhysicalForm()``.
+        modes : Modes, optional
+            Keep these modes only (modal form).
+        """
+        from flexctrl.model.statespace import to_ss
+
+        return to_ss(self, form, modes)
+
+    def discretize(self, dt: float, hold: Hold | None = None) -> control.StateSpace:
+        """Exact sampled model; see :func:`flexctrl.model.discrete.discretize`.
+
+        Parameters
+        ----------
+        dt : float
+            Sampling time, s.
+        hold : Hold, optional
+            ``ZeroOrder(delay=…)`` (default) or ``FirstOrder(delay=…)``.
+        """
+        from flexctrl.model.discrete import discretize
+
+        return discretize(self, dt, hold)
+
+    def save_mat(self, path: str | Path) -> None:
+        """Write a MATLAB/Scilab file; see :func:`flexctrl.model.matfile.save_mat`."""
+        from flexctrl.model.matfile import save_mat
+
+        save_mat(self, path)
+
+    @classmethod
+    def load_mat(cls, path: str | Path) -> LinearModel:
+        """Read what :meth:`save_mat` wrote."""
+        from flexctrl.model.matfile import load_mat
+
+        return load_mat(path)
+
+    @cached_property
+    def _modal(self) -> ModalSystem:
+        from flexctrl.model.modal import modal_system
+
+        return modal_system(self)
+
+
+def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, int]) -> None:
+    if value.shape != shape:
+        raise LinearizationError(f"{name} has shape {value.shape}; the names ask for {shape}")
+    data = value.data if sp.issparse(value) else value
+    if not np.isfinite(data).all():
+        raise LinearizationError(f"{name} holds a value that is not finite; check the parameters it came from")
+
+
+def _indices(wanted: Sequence[str], known: tuple[str, ...], kind: str) -> list[int]:
+    for name in wanted:
+        if name not in known:
+            raise StructureError(f"{kind} {name!r} is not a signal of this model{did_you_mean(name, known)}")
+    return [known.index(name) for name in wanted]

@@ -1,0 +1,312 @@
+"""Eigenpairs of K φ = λ M φ that are right at the low end, with exact zeros where zero is meant.
+
+A dense solver of the pencil (K, M) is wrong by eps·λ_max in every λ, which is all of the lowest ones
+of a fine mesh; a solver of the inverted pencil (M, K − σM) is wrong by eps·λ²/|σ|. Low pairs are taken
+from the inverted one, high pairs from the direct one in the M-orthogonal rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+
+from flexctrl.errors import LinearizationError
+
+__all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "shifted", "stiffness_noise"]
+
+EPS = float(np.finfo(float).eps)
+RIGID_NOISE = 30.0
+SOFT_NOISE = 1e6
+RIGID_GAP = 1e-8
+HIDDEN, SINGULAR = -1, -2
+
+
+@dataclass(frozen=True)
+class Eigenpairs:
+    """Pairs in ascending order of λ; the rigid ones have λ = 0 exactly.
+
+    Attributes
+    ----------
+    values : numpy.ndarray, shape (k,)
+        λ = ω², (rad/s)²; negative where the equilibrium is unstable.
+    shapes : numpy.ndarray, shape (n, k)
+        φ, with φᵀ M φ = 1.
+    rigid : numpy.ndarray of bool, shape (k,)
+        Which of them are rigid-body modes.
+    """
+
+    values: np.ndarray
+    shapes: np.ndarray
+    rigid: np.ndarray
+
+
+def coordinate_scales(M: sp.spmatrix, C: sp.spmatrix, K: sp.spmatrix) -> np.ndarray:
+    """Scales s (powers of two, so that scaling rounds nothing) with diag(S (K + w²M) S) about 1.
+
+    Parameters
+    ----------
+    M, C, K : sparse matrices, shape (n, n)
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        q = s · scaled coordinate.
+    """
+    m, c, k = (np.abs(A.diagonal()) for A in (M, C, K))
+    both = (m > 0) & (k > 0)
+    w2 = float(np.median(k[both] / m[both])) if both.any() else 1.0
+    d = k + w2 * m + np.sqrt(w2) * c
+    return 2.0 ** -np.round(0.5 * np.log2(np.where(d > 0, d, 1.0)))
+
+
+def stiffness_noise(K: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
+    """Spread of φᵀ K φ when every entry of K carries its own rounding error.
+
+    Parameters
+    ----------
+    K : sparse matrix, shape (n, n)
+    shapes : numpy.ndarray, shape (n, k)
+
+    Returns
+    -------
+    numpy.ndarray, shape (k,)
+    """
+    squares = shapes * shapes
+    return EPS * np.sqrt(np.einsum("ij,ij->j", squares, abs(K).power(2) @ squares))
+
+
+@dataclass(frozen=True)
+class _Pencil:
+    """K − σM, factorised; `below` counts the λ under σ (Sylvester), HIDDEN if the pivoting hides it."""
+
+    K: sp.csc_matrix
+    M: sp.csc_matrix
+    sigma: float
+    lu: sla.SuperLU
+    below: int
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """(K − σM)⁻¹ rhs with one step of refinement."""
+        x = self.lu.solve(rhs)
+        return x + self.lu.solve(rhs - self.K @ x + self.sigma * (self.M @ x))
+
+    def iterate(self, x: np.ndarray) -> np.ndarray:
+        """One step of inverse iteration."""
+        return self.solve(self.M @ x)
+
+    def lanczos(self, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        """The `count` pairs nearest to σ, ascending."""
+        n = self.K.shape[0]
+        inverse = sla.LinearOperator((n, n), matvec=self.solve, dtype=float)
+        start = self.iterate(np.random.default_rng(seed).standard_normal(n))
+        lam, phi = sla.eigsh(
+            self.K, count, M=self.M, sigma=self.sigma, OPinv=inverse, v0=start, ncv=min(n, 2 * count + 20)
+        )
+        order = np.argsort(lam)
+        return lam[order], phi[:, order]
+
+
+def shifted(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> _Pencil:
+    """Factorise K − σM, symmetric pivoting, sparse.
+
+    Parameters
+    ----------
+    K, M : sparse matrices, shape (n, n)
+    sigma : float
+        Shift, (rad/s)².
+
+    Returns
+    -------
+    object with ``solve``, ``iterate``, ``lanczos`` and ``below``
+
+    Raises
+    ------
+    LinearizationError
+        If K − σM is singular: a freedom with neither mass nor stiffness, or σ an eigenvalue.
+    """
+    options = {"SymmetricMode": True}
+    try:
+        lu = sla.splu(sp.csc_matrix(K - sigma * M), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    except RuntimeError as error:
+        raise LinearizationError(
+            f"K - ({sigma:.3g}) M is singular: a freedom has neither mass nor stiffness; see audit()"
+        ) from error
+    hidden = (lu.perm_r != lu.perm_c).any()
+    below = HIDDEN if hidden else int(np.count_nonzero(lu.U.diagonal() < 0))
+    return _Pencil(sp.csc_matrix(K), sp.csc_matrix(M), sigma, lu, below)
+
+
+def complete_pairs(K: sp.csc_matrix, M: sp.csc_matrix) -> Eigenpairs:
+    """All eigenpairs, dense; M positive definite.
+
+    Parameters
+    ----------
+    K, M : sparse matrices, shape (n, n), symmetric, scaled
+
+    Returns
+    -------
+    Eigenpairs
+    """
+    k, m = K.toarray(), M.toarray()
+    lam, phi = _direct(k, m)
+    top = np.abs(lam).max(initial=0.0)
+    if top == 0.0:
+        return _settled(K, M, lam, phi, 0.0)
+    sigma = _below_all(K, M, -_soft_scale(K, M))
+    for _ in range(4):
+        if top <= 1e4 * -sigma:
+            break
+        pencil = shifted(K, M, sigma)
+        lam, phi = _low_and_high(pencil, k, m, np.sqrt(top * -sigma))
+        scale = _first_flexible(K, lam, phi, sigma)
+        if scale == 0.0 or 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
+            break
+        sigma = _below_all(K, M, -scale)
+    return _settled(K, M, lam, phi, sigma)
+
+
+def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
+    """At least `count` lowest eigenpairs by shift-invert Lanczos; none is missed (Sturm count).
+
+    Parameters
+    ----------
+    K, M : sparse matrices, shape (n, n), symmetric, scaled
+        M may be singular; K may be indefinite.
+    count : int
+
+    Returns
+    -------
+    Eigenpairs
+        A few more than asked, so that repeated modes are not cut in two.
+
+    Raises
+    ------
+    LinearizationError
+        If the Sturm count of K − μM never agrees with the modes found.
+    """
+    n = K.shape[0]
+    wanted, sigma = min(count + 8, n - 2), -_soft_scale(K, M)
+    for seed in range(20):
+        sigma = _below_all(K, M, sigma)
+        lam, phi = shifted(K, M, sigma).lanczos(wanted, seed)
+        scale = _first_flexible(K, lam, phi, sigma)
+        if scale == 0.0 and 2 * wanted < n - 2:
+            wanted *= 2
+        elif scale > 0.0 and not 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
+            sigma = -scale
+        elif _none_missed(K, M, lam, count):
+            return _settled(K, M, lam, phi, sigma)
+    raise LinearizationError("the lowest modes could not be certified by a Sturm count; ask for another count")
+
+
+def _soft_scale(K: sp.csc_matrix, M: sp.csc_matrix) -> float:
+    """The first positive λ within a factor of 10, by Sturm counts; rigid ones look like the lowest decade."""
+    k, m = K.diagonal(), M.diagonal()
+    both = (k > 0) & (m > 0)
+    high = float((k[both] / m[both]).min()) if both.any() else 1.0
+    decades = [0, 15]
+    none = _count_below(K, M, 1e-15 * high)
+    while decades[1] - decades[0] > 1:
+        middle = sum(decades) // 2
+        decades[int(_count_below(K, M, 10.0**-middle * high) <= none)] = middle
+    return 10.0 ** -decades[0] * high
+
+
+def _below_all(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> float:
+    """A shift at or under σ with no λ under it, and far enough from 0 to be seen beside K."""
+    for _ in range(60):
+        if _count_below(K, M, sigma) in (0, HIDDEN):
+            return sigma
+        sigma *= 4.0
+    raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
+
+
+def _count_below(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> int:
+    """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell."""
+    try:
+        return shifted(K, M, sigma).below
+    except LinearizationError:
+        return SINGULAR
+
+
+def _direct(k: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        return la.eigh(k, m)
+    except la.LinAlgError as error:
+        raise LinearizationError("the mass matrix is not positive definite on the freedoms kept") from error
+
+
+def _low_and_high(pencil: _Pencil, k: np.ndarray, m: np.ndarray, split: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs under `split` from the inverted pencil, the rest from the direct one in their complement."""
+    inverse = pencil.solve(np.eye(len(k)))
+    theta, y = la.eigh(m @ (0.5 * (inverse + inverse.T)) @ m, m)
+    low = y[:, theta > 1.0 / (split - pencil.sigma)][:, ::-1]
+    after = pencil.iterate(low)
+    theta, z = la.eigh(low.T @ (m @ after), low.T @ (m @ low))
+    low, lam_low = (after @ z)[:, ::-1], pencil.sigma + 1.0 / theta[::-1]
+    if low.shape[1] == len(k):
+        return lam_low, low
+    rest = la.qr(m @ low)[0][:, low.shape[1] :]
+    lam_high, y = _direct(rest.T @ k @ rest, rest.T @ m @ rest)
+    return np.concatenate([lam_low, lam_high]), np.hstack([low, rest @ y])
+
+
+def _first_flexible(K: sp.csc_matrix, lam: np.ndarray, phi: np.ndarray, sigma: float) -> float:
+    """Smallest |λ| that stands clear of rounding; 0 if none does."""
+    floor = np.maximum(RIGID_NOISE * stiffness_noise(K, phi), 1e3 * EPS * abs(sigma))
+    clear = np.abs(lam)[np.abs(lam) > floor]
+    return float(clear.min()) if clear.size else 0.0
+
+
+def _none_missed(K: sp.csc_matrix, M: sp.csc_matrix, lam: np.ndarray, count: int) -> bool:
+    """Whether as many λ lie under some gap beyond `count` as were found there."""
+    for i in range(min(count, lam.size - 1), lam.size):
+        gap = lam[i] - lam[i - 1] if i else 0.0
+        if gap > 1e-6 * abs(lam[i]):
+            return _count_below(K, M, 0.5 * (lam[i] + lam[i - 1])) in (i, HIDDEN)
+    return True
+
+
+def _settled(K: sp.csc_matrix, M: sp.csc_matrix, lam: np.ndarray, phi: np.ndarray, sigma: float) -> Eigenpairs:
+    """Orthonormalise, polish the soft vectors, set λ of the rigid ones to 0 and sort."""
+    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * stiffness_noise(K, phi), 1e4 * EPS * abs(sigma))
+    flexible = np.abs(lam)[~soft].min(initial=np.inf)
+    rigid = np.zeros(lam.size, dtype=bool)
+    lam = lam.copy()
+    if soft.any():
+        phi, lam[soft] = _polished(K, M, phi, soft, sigma)
+        noise = stiffness_noise(K, phi)
+        near = (np.abs(lam) <= RIGID_GAP * flexible) & soft
+        rigid = soft & ((np.abs(lam) <= RIGID_NOISE * noise) | near)
+        lam[rigid] = 0.0
+    phi = _orthonormal(M, np.hstack([phi[:, rigid], phi[:, ~rigid]]))
+    lam = np.concatenate([lam[rigid], lam[~rigid]])
+    order = np.argsort(lam, kind="stable")
+    return Eigenpairs(lam[order], phi[:, order], np.sort(rigid)[::-1][order])
+
+
+def _polished(
+    K: sp.csc_matrix, M: sp.csc_matrix, phi: np.ndarray, soft: np.ndarray, sigma: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Inverse iteration on the soft subspace, then Rayleigh–Ritz within it."""
+    x = phi[:, soft]
+    if sigma != 0.0:
+        pencil = shifted(K, M, sigma)
+        for _ in range(3):
+            x = _orthonormal(M, pencil.iterate(x))
+    ritz, y = la.eigh(x.T @ (K @ x))
+    polished = phi.copy()
+    polished[:, soft] = x @ y
+    return polished, ritz
+
+
+def _orthonormal(M: sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
+    """M-orthonormal columns spanning the same nested spaces (Cholesky, twice)."""
+    for _ in range(2):
+        gram = phi.T @ (M @ phi)
+        phi = la.solve_triangular(la.cholesky(gram, lower=True), phi.T, lower=True).T
+    return phi

@@ -1,0 +1,218 @@
+"""Freedoms without mass: which are stiff (static), which creep through a damper (relaxing), which are mechanisms.
+
+They are null vectors of M, along coordinates or not. Numerical ranks are judged on matrices scaled to unit
+diagonal, component by component of their graph, so that a light part does not pass for a massless one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+from scipy.sparse.csgraph import connected_components
+
+from flexctrl.errors import LinearizationError
+
+__all__ = ["Massless", "as_dense", "massless", "null_split", "pivots", "solved"]
+
+MASS_RANK = 1e-12
+STIFFNESS_RANK = 1e-13
+MASS_DUST = 1e-26
+DENSE_BLOCK = 1500
+
+
+@dataclass(frozen=True)
+class Massless:
+    """Bases (columns, in scaled coordinates) of the three kinds of massless freedom.
+
+    Attributes
+    ----------
+    static : scipy.sparse.csc_matrix, shape (n, r)
+        Neither mass nor damping, but stiffness.
+    relaxing : scipy.sparse.csc_matrix, shape (n, d)
+        Damping but no mass (K-orthogonal to the static ones): first-order states.
+    mechanisms : scipy.sparse.csc_matrix, shape (n, k)
+        Neither mass, damping nor stiffness.
+    """
+
+    static: sp.csc_matrix
+    relaxing: sp.csc_matrix
+    mechanisms: sp.csc_matrix
+
+    @property
+    def every(self) -> sp.csc_matrix:
+        """Static and relaxing together, shape (n, r + d)."""
+        return sp.csc_matrix(sp.hstack([self.static, self.relaxing]))
+
+
+def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
+    """Sort the null space of M.
+
+    Parameters
+    ----------
+    M, C, K : sparse matrices, shape (n, n)
+        Scaled to about unit diagonal.
+
+    Returns
+    -------
+    Massless
+
+    Raises
+    ------
+    LinearizationError
+        If M is not positive semidefinite, or a massless freedom without damping of its own is pushed by
+        velocities of others (gyroscopic), which would need the derivative of the inputs.
+    """
+    null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
+    own = null.T @ C @ null
+    undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK)
+    static, relaxing = null @ undamped, null @ damped
+    if static.shape[1] and max(_peak(C @ static), _peak(C.T @ static)) > 1e-11 * _peak(C):
+        raise LinearizationError(
+            "a massless freedom without damping of its own is moved by velocities of others; give it inertia or damping"
+        )
+    free, _ = null_split(static.T @ K @ static, STIFFNESS_RANK)
+    if relaxing.shape[1] and static.shape[1] and not free.shape[1]:
+        relaxing = relaxing - static @ solved(static.T @ K @ static, static.T @ K @ relaxing)
+    return Massless(sp.csc_matrix(static), sp.csc_matrix(relaxing), sp.csc_matrix(static @ free))
+
+
+def null_split(A: sp.spmatrix, tolerance: float, semidefinite: bool = False) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    """Bases of the null space of a symmetric matrix and of a complement.
+
+    Parameters
+    ----------
+    A : sparse matrix, shape (n, n)
+    tolerance : float
+        Eigenvalues of the matrix scaled to unit diagonal under this are zero.
+    semidefinite : bool
+        Refuse a negative eigenvalue.
+
+    Returns
+    -------
+    null, rest : sparse matrices, shapes (n, r) and (n, n - r)
+        Unit vectors wherever the null space lies along coordinates.
+    """
+    A = sp.csc_matrix(A)
+    n = A.shape[0]
+    size = np.sqrt(abs(A).max(axis=1).toarray().ravel()) if n else np.zeros(0)
+    diagonal = np.sqrt(np.abs(A.diagonal()))
+    scale = np.where(diagonal > 0, diagonal, size)
+    empty = np.flatnonzero(size == 0.0)
+    full = np.flatnonzero(size > 0.0)
+    unit = sp.identity(n, format="csc")
+    if not full.size:
+        return unit[:, empty], unit[:, full]
+    invert = sp.diags(1.0 / scale[full])
+    block = sp.csc_matrix(invert @ A[full][:, full] @ invert)
+    if _definite(block):
+        return unit[:, empty], unit[:, full]
+    null, rest = _split_components(block, tolerance, semidefinite)
+    back = unit[:, full] @ invert
+    return sp.csc_matrix(sp.hstack([unit[:, empty], back @ null])), sp.csc_matrix(back @ rest)
+
+
+def pivots(basis: sp.csc_matrix) -> np.ndarray:
+    """One coordinate for each column: its own where it lies along one, else by pivoted QR.
+
+    Parameters
+    ----------
+    basis : sparse matrix, shape (n, r)
+
+    Returns
+    -------
+    numpy.ndarray of int, shape (r,)
+    """
+    basis = sp.csc_matrix(basis)
+    basis.eliminate_zeros()
+    single = np.diff(basis.indptr) == 1
+    chosen = np.zeros(basis.shape[1], dtype=int)
+    chosen[single] = basis[:, single].indices
+    if not single.all():
+        others = basis[:, ~single].toarray()
+        others[chosen[single]] = 0.0
+        chosen[~single] = la.qr(others.T, pivoting=True)[2][: others.shape[1]]
+    return chosen
+
+
+def solved(A: sp.spmatrix, rhs: sp.spmatrix | np.ndarray) -> sp.csc_matrix:
+    """A⁻¹ rhs for a well-conditioned sparse A."""
+    return sp.csc_matrix(sla.splu(sp.csc_matrix(A)).solve(as_dense(rhs)))
+
+
+def as_dense(A: sp.spmatrix | np.ndarray) -> np.ndarray:
+    """A as an ndarray."""
+    return A.toarray() if isinstance(A, sp.spmatrix | sp.sparray) else np.asarray(A)
+
+
+def _without_dust(M: sp.csc_matrix) -> sp.csc_matrix:
+    """Drop rows whose mass is only the rounding error of a rotation (cos 90° squared)."""
+    diagonal = np.abs(M.diagonal())
+    dust = diagonal < MASS_DUST * diagonal.max(initial=0.0)
+    keep = sp.diags((~dust).astype(float))
+    return sp.csc_matrix(keep @ M @ keep)
+
+
+def _peak(A: sp.spmatrix) -> float:
+    return float(abs(A).max()) if A.shape[0] and A.shape[1] and A.nnz else 0.0
+
+
+def _definite(block: sp.csc_matrix) -> bool:
+    """Whether all pivots of the unit-diagonal matrix stand clear of zero."""
+    try:
+        lu = sla.splu(
+            block,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:
+        return False
+    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > 1e-8).all())
+
+
+def _split_components(
+    block: sp.csc_matrix, tolerance: float, semidefinite: bool
+) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    count, label = connected_components(block, directed=False)
+    order = np.argsort(label, kind="stable")
+    bounds = np.searchsorted(label[order], np.arange(count + 1))
+    nulls, rests = [], []
+    for i in range(count):
+        rows = order[bounds[i] : bounds[i + 1]]
+        null, rest = _split_dense(block[rows][:, rows], tolerance, semidefinite)
+        embed = sp.identity(block.shape[0], format="csc")[:, rows]
+        nulls.append(embed @ null)
+        rests.append(embed @ rest)
+    return sp.csc_matrix(sp.hstack(nulls)), sp.csc_matrix(sp.hstack(rests))
+
+
+def _split_dense(block: sp.csc_matrix, tolerance: float, semidefinite: bool) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    if block.shape[0] > DENSE_BLOCK:
+        return _null_iterative(block, tolerance)
+    values, vectors = la.eigh(block.toarray())
+    limit = tolerance * max(np.abs(values).max(), 1.0)
+    if semidefinite and values.min() < -1e-9 * np.abs(values).max():
+        raise LinearizationError(
+            f"the mass matrix is not positive semidefinite (scaled eigenvalue {values.min():.2e}); "
+            "check for a negative mass or inertia"
+        )
+    null = np.abs(values) <= limit
+    return sp.csc_matrix(vectors[:, null]), sp.csc_matrix(vectors[:, ~null])
+
+
+def _null_iterative(block: sp.csc_matrix, tolerance: float) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    """Null vectors of a large component, by Lanczos near zero; the rest stays one unit vector a pivot."""
+    n, wanted = block.shape[0], 8
+    while True:
+        values, vectors = sla.eigsh(block, wanted, sigma=-1e-9, v0=np.ones(n))
+        null = np.abs(values) <= tolerance * 10
+        if not null.all() or wanted == n - 1:
+            break
+        wanted = min(2 * wanted, n - 1)
+    basis = sp.csc_matrix(vectors[:, null])
+    others = np.setdiff1d(np.arange(n), pivots(basis))
+    return basis, sp.identity(n, format="csc")[:, others]

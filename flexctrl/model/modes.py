@@ -1,0 +1,323 @@
+"""Undamped modes with what a control engineer asks of them: frequency, damping, who moves, who drives, who sees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.errors import LinearizationError, StructureError
+from flexctrl.model.basis import canonical, clusters
+from flexctrl.model.condense import Scaled, scaled, static_map
+from flexctrl.model.eigen import Eigenpairs, complete_pairs, lowest_pairs, stiffness_noise
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.massless import STIFFNESS_RANK, null_split
+
+__all__ = ["Modes", "modes"]
+
+DENSE = 300
+COMPLETE = 1000
+DEFAULT_COUNT = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of K φ = ω² M φ, in ascending order of ω²: unstable, rigid-body, flexible.
+
+    Attributes
+    ----------
+    omega_squared : numpy.ndarray, shape (k,)
+        (rad/s)²; exactly 0 for rigid-body modes, negative for unstable ones.
+    shapes : numpy.ndarray, shape (n, k)
+        Mass-normalised, φᵀ M φ = 1; largest entry positive; repeated modes in one deterministic basis.
+    rigid : int
+        How many rigid-body modes.
+    unstable : int
+        How many modes with ω² < 0 (they grow as exp(growth · t) when undamped).
+    massless : int
+        How many infinite eigenvalues the pencil has (freedoms without mass); they are not listed.
+    decay : numpy.ndarray, shape (k,)
+        φᵀ C φ, 1/s: twice ζω.
+    input_gain : numpy.ndarray, shape (k, n_inputs)
+        φᵀ B.
+    output_gain, output_rate_gain : numpy.ndarray, shape (n_outputs, k)
+        Cq φ and Cv φ.
+    coordinates, inputs, outputs : tuple of str
+    strain_shares, kinetic_shares : mapping of part name to numpy.ndarray, shape (k,)
+        Part of the mode's strain (kinetic) energy that lives in the part; 0 strain in rigid-body modes.
+    """
+
+    omega_squared: np.ndarray
+    shapes: np.ndarray
+    rigid: int
+    unstable: int
+    massless: int
+    decay: np.ndarray
+    input_gain: np.ndarray
+    output_gain: np.ndarray
+    output_rate_gain: np.ndarray
+    coordinates: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    strain_shares: Mapping[str, np.ndarray] = field(default_factory=dict)
+    kinetic_shares: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return self.omega_squared.size
+
+    @property
+    def omega(self) -> np.ndarray:
+        """Undamped angular frequency, rad/s; 0 for rigid-body and unstable modes. Shape (k,)."""
+        return np.sqrt(np.maximum(self.omega_squared, 0.0))
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Undamped frequency, Hz. Shape (k,)."""
+        return self.omega / (2.0 * np.pi)
+
+    @property
+    def growth(self) -> np.ndarray:
+        """Undamped growth rate sqrt(-ω²), 1/s; 0 where ω² ≥ 0. Shape (k,)."""
+        return np.sqrt(np.maximum(-self.omega_squared, 0.0))
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Damping ratio ζ = φᵀ C φ / 2ω; 0 where ω = 0 (see `decay` there). Shape (k,)."""
+        omega = self.omega
+        return np.where(omega > 0, self.decay / (2.0 * np.where(omega > 0, omega, 1.0)), 0.0)
+
+    @property
+    def flexible(self) -> slice:
+        """The modes with ω² > 0."""
+        return slice(self.unstable + self.rigid, len(self))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """``"unstable"``, ``"rigid"`` or ``"flexible"`` for each mode."""
+        rest = len(self) - self.unstable - self.rigid
+        return ("unstable",) * self.unstable + ("rigid",) * self.rigid + ("flexible",) * rest
+
+    @property
+    def input_participation(self) -> np.ndarray:
+        """(φᵀ b)² as a share of its sum over these modes: share of the input's immediate acceleration.
+
+        Shape (k, n_inputs); columns add to 1 (or are 0 for an input that moves none of them).
+        """
+        return _shares(self.input_gain**2, axis=0)
+
+    @property
+    def output_participation(self) -> np.ndarray:
+        """(Cq φ)² as a share of its sum over these modes. Shape (n_outputs, k); rows add to 1 (or 0)."""
+        return _shares(self.output_gain**2, axis=1)
+
+    def select(self, keep: np.ndarray | list[int]) -> Modes:
+        """Some of the modes, in ascending order.
+
+        Parameters
+        ----------
+        keep : array_like of int
+            Mode numbers, from 0.
+
+        Returns
+        -------
+        Modes
+        """
+        index = np.unique(np.asarray(keep, dtype=int))
+        if index.size and (index[0] < 0 or index[-1] >= len(self)):
+            raise StructureError(f"mode numbers run from 0 to {len(self) - 1}; got {index.tolist()}")
+        kinds = [self.kinds[i] for i in index]
+        return Modes(
+            omega_squared=self.omega_squared[index],
+            shapes=self.shapes[:, index],
+            rigid=kinds.count("rigid"),
+            unstable=kinds.count("unstable"),
+            massless=self.massless,
+            decay=self.decay[index],
+            input_gain=self.input_gain[index],
+            output_gain=self.output_gain[:, index],
+            output_rate_gain=self.output_rate_gain[:, index],
+            coordinates=self.coordinates,
+            inputs=self.inputs,
+            outputs=self.outputs,
+            strain_shares={k: v[index] for k, v in self.strain_shares.items()},
+            kinetic_shares={k: v[index] for k, v in self.kinetic_shares.items()},
+        )
+
+    def dominant_part(self, mode: int) -> str:
+        """The part that holds most of the mode's strain energy (kinetic energy for a rigid-body mode).
+
+        Parameters
+        ----------
+        mode : int
+            Mode number, from 0.
+
+        Returns
+        -------
+        str
+            Empty if the model does not know its parts.
+        """
+        shares = self.kinetic_shares if self.kinds[mode] == "rigid" else self.strain_shares
+        return max(shares, key=lambda name: shares[name][mode]) if shares else ""
+
+    def dominant_coordinate(self, mode: int) -> str:
+        """The coordinate with the largest entry of the shape."""
+        return self.coordinates[int(np.argmax(np.abs(self.shapes[:, mode])))]
+
+    def __str__(self) -> str:
+        return _table(self)
+
+
+def modes(linear: LinearModel, count: int | None = None) -> Modes:
+    """Undamped modes: shift-invert Lanczos for a few of many, dense for all.
+
+    A mode counts as rigid-body when φᵀKφ is indistinguishable from the rounding of K's entries, or is both
+    under 1e-8 of the first flexible ω² and within 1e6 of that rounding: a slow pendulum on a stiff structure
+    stays a pendulum. No mode is missed: the number found is checked by a Sturm count.
+
+    Parameters
+    ----------
+    linear : LinearModel
+        K symmetric.
+    count : int, optional
+        How many; left out: all of them up to 1000 coordinates, the 20 lowest beyond.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    LinearizationError
+        If K is not symmetric (use ``damped_poles``), M not positive semidefinite.
+    MechanismError
+        For a motion with neither mass nor stiffness.
+    """
+    return modes_of(linear, scaled(linear), count)
+
+
+def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
+    """As :func:`modes`, with the scaling and the massless freedoms already known.
+
+    Parameters
+    ----------
+    linear : LinearModel
+    base : Scaled
+        Of the same model.
+    count : int or None
+
+    Returns
+    -------
+    Modes
+    """
+    n = len(linear.coordinates)
+    _check_count(count)
+    refuse_unsymmetric(base.model.K)
+    null = base.massless.every
+    finite = n - null.shape[1]
+    wanted = min(finite, count or (finite if n <= COMPLETE else DEFAULT_COUNT))
+    K, M = _symmetric(base.model.K) + _grounded(base), _symmetric(base.model.M)
+    if n <= DENSE or wanted + 30 > finite // 2:
+        T, _ = static_map(K, null)
+        pairs = complete_pairs(sp.csc_matrix(T.T @ K @ T), sp.csc_matrix(T.T @ M @ T))
+        pairs = Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid)
+    else:
+        pairs = lowest_pairs(K, M, wanted)
+    return _described(linear, base, _settled_basis(base, K, pairs), wanted)
+
+
+def refuse_unsymmetric(K: sp.spmatrix) -> None:
+    """Raise LinearizationError if K is not symmetric to 1e-9 of its largest entry (scaled).
+
+    Parameters
+    ----------
+    K : sparse matrix, shape (n, n)
+    """
+    skew = abs(K - K.T).max() / max(abs(K).max(), np.finfo(float).tiny) if K.nnz else 0.0
+    if skew > 1e-9:
+        raise LinearizationError(
+            f"K is not symmetric (relative difference {skew:.1e}; follower loads?): undamped modes do not "
+            "exist as real shapes; use damped_poles()"
+        )
+
+
+def _check_count(count: int | None) -> None:
+    if count is not None and count < 1:
+        raise StructureError(f"count = {count}: ask for at least one mode")
+
+
+def _symmetric(A: sp.csc_matrix) -> sp.csc_matrix:
+    return sp.csc_matrix(0.5 * (A + A.T))
+
+
+def _grounded(base: Scaled) -> sp.csc_matrix:
+    """Unit stiffness on massless motions that only a damper holds; no mode moves them."""
+    relaxing, K = base.massless.relaxing, base.model.K
+    if not relaxing.shape[1]:
+        return sp.csc_matrix(K.shape)
+    creeping = relaxing @ null_split(relaxing.T @ K @ relaxing, STIFFNESS_RANK)[0]
+    return sp.csc_matrix(creeping @ creeping.T)
+
+
+def _settled_basis(base: Scaled, K: sp.csc_matrix, pairs: Eigenpairs) -> Eigenpairs:
+    """Equal eigenvalues made equal, their vectors turned to the canonical basis."""
+    groups = clusters(pairs.values, pairs.rigid, 30.0 * stiffness_noise(K, pairs.shapes))
+    values = pairs.values.copy()
+    for group in groups:
+        values[group] = values[group].mean()
+    damping = pairs.shapes.T @ (base.model.C @ pairs.shapes)
+    weight = np.sqrt(np.abs(base.model.M.diagonal()))
+    return Eigenpairs(values, canonical(pairs.shapes, weight, damping, groups), pairs.rigid)
+
+
+def _described(linear: LinearModel, base: Scaled, pairs: Eigenpairs, count: int) -> Modes:
+    values, rigid = pairs.values[:count], pairs.rigid[:count]
+    shapes = base.scales[:, None] * pairs.shapes[:, :count]
+    strain = {name: _energy(part.stiffness, shapes) for name, part in linear.parts.items()}
+    kinetic = {name: _energy(part.mass, shapes) for name, part in linear.parts.items()}
+    return Modes(
+        omega_squared=values,
+        shapes=shapes,
+        rigid=int(np.count_nonzero(rigid)),
+        unstable=int(np.count_nonzero(values < 0)),
+        massless=base.massless.every.shape[1],
+        decay=_energy(linear.C, shapes),
+        input_gain=shapes.T @ linear.B,
+        output_gain=linear.Cq @ shapes,
+        output_rate_gain=linear.Cv @ shapes,
+        coordinates=linear.coordinates,
+        inputs=linear.inputs,
+        outputs=linear.outputs,
+        strain_shares=_by_part({name: np.where(rigid, 0.0, e) for name, e in strain.items()}),
+        kinetic_shares=_by_part(kinetic),
+    )
+
+
+def _energy(A: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
+    return np.einsum("ij,ij->j", shapes, A @ shapes)
+
+
+def _by_part(energy: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    if not energy:
+        return {}
+    shares = _shares(np.array(list(energy.values())), axis=0)
+    return dict(zip(energy, shares, strict=True))
+
+
+def _shares(values: np.ndarray, axis: int) -> np.ndarray:
+    total = values.sum(axis=axis, keepdims=True)
+    return values / np.where(total != 0, total, 1.0)
+
+
+def _table(modes: Modes) -> str:
+    head = "mode  kind        frequency Hz     omega rad/s     damping  moves most"
+    lines = [head + ("   lives in" if modes.strain_shares else "")]
+    for i, kind in enumerate(modes.kinds):
+        rate = f"grows {modes.growth[i]:.6g}/s" if kind == "unstable" else f"{modes.omega[i]:.8g}"
+        line = f"{i + 1:4d}  {kind:8s} {modes.frequencies[i]:15.8g} {rate:>15s} {modes.damping[i]:11.4g}"
+        line += f"  {modes.dominant_coordinate(i)}"
+        lines.append(line + (f"   {modes.dominant_part(i)}" if modes.strain_shares else ""))
+    if modes.massless:
+        lines.append(f"{modes.massless} massless freedoms (infinite frequency) are not listed")
+    return "\n".join(lines)
