@@ -281,7 +281,7 @@ def kinetic_energy(m: BeamMotion) -> ca.SX:
     import casadi as ca
 
     p = momentum(m, m.rates)
-    return 0.5 * sum(ca.dot(v, q) for v, q in zip(m.rates, p, strict=True))
+    return 0.5 * ca.dot(ca.vertcat(*m.rates), ca.vertcat(*p))
 
 
 def drag(m: BeamMotion) -> BeamForce:

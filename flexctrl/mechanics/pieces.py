@@ -77,11 +77,11 @@ def spring_energy(m: LineMotion) -> ca.SX:
     return 0.5 * m.p["stiffness"] * (m.length - m.p["length"]) ** 2
 
 
-def rope_tension(m: LineMotion) -> ca.SX:
-    """Return the tension of a rope [N]: that of a spring while taut and not negative, else zero."""
+def unilateral(m: LineMotion, pull: ca.SX) -> ca.SX:
+    """Return what a rope makes of a pull [N]: the pull while taut and not negative, else zero."""
     import casadi as ca
 
-    return ca.if_else(m.length > m.p["length"], ca.fmax(spring_tension(m), 0.0), 0.0)
+    return ca.if_else(m.length > m.p["length"], ca.fmax(pull, 0.0), 0.0)
 
 
 def rope_energy(m: LineMotion) -> ca.SX:

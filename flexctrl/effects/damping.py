@@ -1,0 +1,112 @@
+"""Damping: proportional to mass and stiffness, or mode by mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from flexctrl.effects.effect import Effect
+from flexctrl.errors import StructureError
+from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, drag, viscous_force
+from flexctrl.mechanics.pieces import DriveMotion, LineMotion, space_inertia
+from flexctrl.structure.freedoms import check_finite
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+
+@dataclass(frozen=True)
+class RayleighDamping(Effect):
+    """C = α M + β K: α on absolute velocities, β on the rates of deformation of each part.
+
+    At rest the tangent is exactly α M + β K with K as assembled; in large motion the β part is
+    frame-invariant. ζ(ω) = α/(2ω) + βω/2.
+
+    Parameters
+    ----------
+    alpha : float
+        Mass factor α [1/s], ≥ 0.
+    beta : float
+        Stiffness factor β [s], ≥ 0.
+
+    Raises
+    ------
+    StructureError
+        For a negative factor.
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_finite(self.alpha, "alpha", "RayleighDamping", least=0.0)
+        check_finite(self.beta, "beta", "RayleighDamping", least=0.0)
+
+    @classmethod
+    def through(cls, zeta: float, omega1: float, omega2: float) -> RayleighDamping:
+        """Return the damping whose ratio is ``zeta`` at two frequencies.
+
+        Parameters
+        ----------
+        zeta : float
+            Damping ratio at both.
+        omega1, omega2 : float
+            Frequencies [rad/s].
+
+        Returns
+        -------
+        RayleighDamping
+        """
+        return cls(2.0 * zeta * omega1 * omega2 / (omega1 + omega2), 2.0 * zeta / (omega1 + omega2))
+
+    def beam(self, m: BeamMotion) -> BeamForce:
+        """−β K_e ḋ − α M_e V."""
+        return viscous_force(m) * self.beta + drag(m) * self.alpha
+
+    def spring(self, m: LineMotion) -> ca.SX:
+        """β k ℓ̇."""
+        return self.beta * m.p["stiffness"] * m.rate
+
+    def rope(self, m: LineMotion) -> ca.SX:
+        """β k ℓ̇."""
+        return self.beta * m.p["stiffness"] * m.rate
+
+    def body(self, node: NodeMotion, p: dict[str, ca.SX]) -> ca.SX:
+        """−α times the momentum."""
+        import casadi as ca
+
+        return -self.alpha * ca.vertcat(p["mass"] * node.v, space_inertia(node, p) @ node.w)
+
+    def drive(self, m: DriveMotion) -> ca.SX:
+        """−β k_θ on the rate of the shaft's twist, −α J θ̇_d on the motor."""
+        import casadi as ca
+
+        torque = self.beta * m.p["stiffness"] * (m.p["ratio"] * m.driven_rate - m.source_rate)
+        motor = torque - self.alpha * m.p["inertia"] * m.source_rate
+        return ca.vertcat(-m.p["ratio"] * torque * m.gradient, motor)
+
+
+@dataclass(frozen=True)
+class ModalDamping(Effect):
+    """C = M Φ diag(2 ζᵢ ωᵢ) Φᵀ M from the undamped modes about the machine's equilibrium.
+
+    Parameters
+    ----------
+    ratios : float or sequence of float
+        Damping ratio of every flexible mode, or of the first ones in order (the rest are undamped).
+
+    Raises
+    ------
+    StructureError
+        For a ratio that is negative or not a number.
+    """
+
+    ratios: tuple[float, ...] | float
+
+    def __init__(self, ratios: float | Sequence[float]) -> None:
+        values = ratios if isinstance(ratios, Sequence) else (ratios,)
+        checked = tuple(check_finite(z, "ratio", "ModalDamping", least=0.0) for z in values)
+        if not checked:
+            raise StructureError("ModalDamping: no ratios given; give one number or one per mode")
+        object.__setattr__(self, "ratios", checked if isinstance(ratios, Sequence) else checked[0])

@@ -1,0 +1,71 @@
+"""What an effect is: a share of force on each kind of piece, nothing where it does not act."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, no_force
+from flexctrl.mechanics.pieces import DriveMotion, LineMotion
+from flexctrl.structure.drives import Drive
+from flexctrl.structure.elements import Part
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+
+class Effect:
+    """One piece of physics. Effects are frozen values; a model is the sum of their shares.
+
+    A subclass overrides only what it acts on. Each method returns casadi expressions of the motion
+    it is given: forces with the sign in which they act, energies whose gradient they are minus of.
+    """
+
+    def beam(self, m: BeamMotion) -> BeamForce:
+        """Force on a beam element."""
+        return no_force()
+
+    def beam_energy(self, m: BeamMotion, middle: ca.SX) -> ca.SX:
+        """Energy stored in a beam element; ``middle`` is the mean of its nodes' positions."""
+        return _nothing()
+
+    def spring(self, m: LineMotion) -> ca.SX:
+        """Tension in a spring beside its own [N]."""
+        return _nothing()
+
+    def rope(self, m: LineMotion) -> ca.SX:
+        """Tension in a rope [N], before the rope's own limit: it never pushes."""
+        return _nothing()
+
+    def rope_energy(self, m: LineMotion) -> ca.SX:
+        """Energy stored in a rope."""
+        return _nothing()
+
+    def body(self, node: NodeMotion, p: dict[str, ca.SX]) -> ca.SX:
+        """Force and moment on a point mass or rigid body (6)."""
+        return _nothing(6)
+
+    def body_energy(self, node: NodeMotion, p: dict[str, ca.SX]) -> ca.SX:
+        """Energy stored in a point mass or rigid body."""
+        return _nothing()
+
+    def drive(self, m: DriveMotion) -> ca.SX:
+        """Force on the driven node, the node that carries the motor, and the source angle (13)."""
+        return _nothing(13)
+
+    def drive_energy(self, m: DriveMotion) -> ca.SX:
+        """Energy stored in a drive."""
+        return _nothing()
+
+    def bends(self, part: Part | Drive) -> bool:
+        """Whether the effect gives a part freedom to deform."""
+        return False
+
+    def parts(self) -> tuple[Effect, ...]:
+        """The effects it is composed of: itself, unless it stands for several."""
+        return (self,)
+
+
+def _nothing(rows: int = 1) -> ca.SX:
+    import casadi as ca
+
+    return ca.SX(rows, 1)

@@ -1,0 +1,16 @@
+"""Large motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flexctrl.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class LargeRotation(Effect):
+    """Parts may move and turn as far as they like: element frames ride along.
+
+    Without it the model is the linear one about the shape at rest, without prestress: K stays as
+    assembled (a hanging chain then has no pendulum stiffness; linearise a large-rotation model for that).
+    """

@@ -1,0 +1,370 @@
+"""One piece of physics run over index tables: ``r[scatter] += kernel(z[gather], params)``.
+
+A structure is the same small function many times over. The function is written once in casadi SX;
+the tables say which entries of the state vector z each item reads and where in r its result adds up.
+Two backends give the same numbers to round-off: casadi's virtual machine, always there, and machine
+code through LLVM (the extra ``fast``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from flexctrl.errors import FlexctrlError, MissingExtraError
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+FLOAT = np.dtype(np.float64)
+_INDEX_LIMIT = 2**31
+
+
+class KernelError(FlexctrlError, ValueError):
+    """A kernel, index table or vector of the wrong shape, type or range; says which and what was expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """The physics of one item as a casadi expression.
+
+    Attributes
+    ----------
+    name : str
+        An identifier; used in messages only.
+    inputs : casadi.SX, n_in × 1
+        Symbols read from the state vector.
+    params : casadi.SX, n_par × 1
+        Symbols that belong to the item.
+    outputs : casadi.SX, n_out × 1
+        Expressions of both; structural zeros are allowed.
+
+    Raises
+    ------
+    KernelError
+        If a field is not a column, inputs or params are not symbols, or outputs need other symbols.
+    """
+
+    name: str
+    inputs: ca.SX
+    params: ca.SX
+    outputs: ca.SX
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier():
+            raise KernelError(f"kernel name {self.name!r} is not an identifier")
+        for label in ("inputs", "params", "outputs"):
+            shape = getattr(self, label).shape
+            if shape[1] != 1:
+                raise KernelError(f"kernel {self.name!r}: {label} has shape {shape}, expected a column (n, 1)")
+        for label in ("inputs", "params"):
+            if not getattr(self, label).is_valid_input():
+                raise KernelError(f"kernel {self.name!r}: {label} holds expressions, expected casadi symbols only")
+        free = self.function().get_free()
+        if free:
+            raise KernelError(f"kernel {self.name!r}: outputs use {', '.join(free)}, neither among inputs nor params")
+
+    @cached_property
+    def _function(self) -> ca.Function:
+        import casadi as ca
+
+        outputs = ca.densify(self.outputs)
+        return ca.Function(self.name, [self.inputs, self.params], [outputs], {"cse": True, "allow_free": True})
+
+    def function(self) -> ca.Function:
+        """Return the casadi function (inputs, params) → outputs, dense; built once."""
+        return self._function
+
+    @property
+    def instructions(self) -> int:
+        """Number of instructions of casadi's virtual machine, loads and stores included."""
+        return self._function.n_instructions()
+
+    @property
+    def n_in(self) -> int:
+        """Entries of z an item reads."""
+        return self.inputs.shape[0]
+
+    @property
+    def n_par(self) -> int:
+        """Parameters of an item."""
+        return self.params.shape[0]
+
+    @property
+    def n_out(self) -> int:
+        """Values an item adds into r."""
+        return self.outputs.shape[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Checked private copies of the tables of a batch.
+
+    Attributes
+    ----------
+    gather : ndarray of int32, (n, n_in)
+    params : ndarray of float64, (n, n_par)
+    scatter : ndarray of int32, (n, n_out)
+    z_size, r_size : int
+        Least lengths of z and r that no index leaves.
+    """
+
+    gather: np.ndarray
+    params: np.ndarray
+    scatter: np.ndarray
+    z_size: int
+    r_size: int
+
+    @classmethod
+    def of(cls, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> Tables:
+        """Check tables against a kernel and copy them.
+
+        Raises
+        ------
+        KernelError
+            If a shape does not fit the kernel, or an index is negative or no integer.
+        """
+        n = len(np.atleast_1d(gather))
+        reads = _index_table(kernel, "gather", gather, (n, kernel.n_in))
+        writes = _index_table(kernel, "scatter", scatter, (n, kernel.n_out))
+        values = parameter_table(kernel, params, n)
+        return cls(reads, values, writes, int(reads.max(initial=-1)) + 1, int(writes.max(initial=-1)) + 1)
+
+
+def parameter_table(kernel: Kernel, params: np.ndarray, n: int) -> np.ndarray:
+    """Return a C-ordered float64 copy of ``params``, refused unless of shape (n, n_par)."""
+    values = np.array(params, dtype=FLOAT, order="C")
+    if values.shape != (n, kernel.n_par):
+        raise KernelError(
+            f"kernel {kernel.name!r}: params has shape {values.shape}, expected {(n, kernel.n_par)} (items, n_par)"
+        )
+    return values
+
+
+def _index_table(kernel: Kernel, label: str, table: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    table = np.asarray(table)
+    name = f"kernel {kernel.name!r}: {label}"
+    if table.shape != shape:
+        raise KernelError(f"{name} has shape {table.shape}, expected {shape} (items, entries of the kernel)")
+    if table.size == 0:
+        return np.zeros(shape, np.int32)
+    if not np.issubdtype(table.dtype, np.integer):
+        raise KernelError(f"{name} has type {table.dtype}, expected integers")
+    bad = (table < 0) | (table >= _INDEX_LIMIT)
+    if bad.any():
+        item, entry = np.argwhere(bad)[0]
+        raise KernelError(
+            f"{name}[{item}, {entry}] is {table[item, entry]}, expected 0 to 2³¹ − 1; "
+            "a freedom that is held needs a dummy slot of its own at the end of the vector"
+        )
+    return np.array(table, dtype=np.int32, order="C")
+
+
+def check_vector(array: np.ndarray, size: int, label: str) -> None:
+    """Refuse anything but a C-contiguous float64 vector of at least ``size`` entries."""
+    if array.dtype != FLOAT or not array.flags.c_contiguous:
+        raise KernelError(
+            f"{label} is {array.dtype}{'' if array.flags.c_contiguous else ', not contiguous'}; "
+            "expected a contiguous float64 vector, see numpy.ascontiguousarray"
+        )
+    if array.size < size:
+        raise KernelError(f"{label} has {array.size} entries, the index table needs at least {size}")
+    if label == "r" and not array.flags.writeable:
+        raise KernelError("r is read-only, and results are added into it")
+
+
+class Run(Protocol):
+    """A kernel bound to tables by a backend. z and r must not overlap; see the backend for threads."""
+
+    def __call__(self, z: np.ndarray, r: np.ndarray) -> None:
+        """Add the outputs of all items into r."""
+
+    def with_params(self, params: np.ndarray) -> Run:
+        """Return the same run with other parameters; index tables and code are shared."""
+
+    def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
+        """Return the run on these two arrays, checked once; it keeps them alive and sees what is written to them."""
+
+
+class Backend(Protocol):
+    """How kernels are run."""
+
+    def bind(self, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> Run:
+        """Check the tables and return the run over them."""
+
+
+@dataclass(frozen=True)
+class CasadiVM:
+    """casadi's virtual machine: needs nothing else. A bound run has work arrays, so one thread at a time."""
+
+    def bind(self, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> Run:
+        """Check the tables and return the run over them; raises KernelError."""
+        tables = Tables.of(kernel, gather, params, scatter)
+        return _VMRun(kernel, tables, tables.gather.astype(np.intp), tables.scatter.astype(np.intp).ravel())
+
+
+@dataclass(frozen=True, eq=False)
+class _VMRun:
+    kernel: Kernel
+    tables: Tables
+    gather: np.ndarray
+    scatter: np.ndarray
+    inputs: np.ndarray = field(init=False)
+    outputs: np.ndarray = field(init=False)
+    buffer: object = field(init=False, default=None)
+    evaluate: Callable[[], Any] = field(init=False)
+
+    def __post_init__(self) -> None:
+        # one item is one column for casadi, so its column-major matrices are our row-major tables
+        n = len(self.gather)
+        object.__setattr__(self, "inputs", np.zeros((n, self.kernel.n_in)))
+        object.__setattr__(self, "outputs", np.zeros(n * self.kernel.n_out))
+        object.__setattr__(self, "evaluate", self._evaluator(n))
+
+    def _evaluator(self, n: int) -> Callable[[], Any]:
+        if n == 0 or self.kernel.n_out == 0:
+            return tuple
+        buffer, evaluate = self.kernel.function().map(n).buffer()
+        for i, array in enumerate((self.inputs, self.tables.params)):
+            if array.size:
+                buffer.set_arg(i, memoryview(array))
+        buffer.set_res(0, memoryview(self.outputs))
+        # casadi's evaluator holds the buffer by address only: somebody has to keep it alive
+        object.__setattr__(self, "buffer", buffer)
+        return evaluate
+
+    def __call__(self, z: np.ndarray, r: np.ndarray) -> None:
+        check_vector(z, self.tables.z_size, "z")
+        check_vector(r, self.tables.r_size, "r")
+        self._add(z.reshape(-1), r.reshape(-1))
+
+    def _add(self, z: np.ndarray, r: np.ndarray) -> None:
+        if self.gather.size:
+            z.take(self.gather, out=self.inputs, mode="clip")  # in range already; "raise" would copy
+        self.evaluate()
+        np.add.at(r, self.scatter, self.outputs)
+
+    def with_params(self, params: np.ndarray) -> _VMRun:
+        params = parameter_table(self.kernel, params, len(self.gather))
+        return replace(self, tables=replace(self.tables, params=params))
+
+    def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
+        check_vector(z, self.tables.z_size, "z")
+        check_vector(r, self.tables.r_size, "r")
+        return partial(self._add, z.reshape(-1), r.reshape(-1))
+
+
+def _host_lanes() -> int:
+    _require_llvmlite()
+    from flexctrl.mechanics import llvm
+
+    return llvm.host_lanes()
+
+
+def _require_llvmlite() -> None:
+    if find_spec("llvmlite") is None:
+        raise MissingExtraError("compiled kernels need llvmlite: pip install flexctrl[fast], or use CasadiVM()")
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """Machine code through LLVM, several items at a time; bound runs may be called from several threads.
+
+    Attributes
+    ----------
+    lanes : int
+        Items computed at once: 1, 2, 4 or 8. By default what suits this processor.
+    optimize_up_to : int
+        Kernels of more instructions are compiled without optimisation: about six times faster to
+        compile, up to twice slower to run.
+
+    Raises
+    ------
+    MissingExtraError
+        If llvmlite is not installed.
+    """
+
+    lanes: int = field(default_factory=_host_lanes)
+    optimize_up_to: int = 6000
+
+    def __post_init__(self) -> None:
+        _require_llvmlite()
+        if self.lanes not in (1, 2, 4, 8):
+            raise KernelError(f"lanes is {self.lanes}, expected 1, 2, 4 or 8")
+
+    def bind(self, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> CompiledRun:
+        """Check the tables, compile the kernel unless this process has done so, and return the run.
+
+        Raises
+        ------
+        KernelError
+            If a table does not fit, or the kernel has an operation that cannot be compiled.
+        """
+        from flexctrl.mechanics import llvm
+
+        tables = Tables.of(kernel, gather, params, scatter)
+        level = 2 if kernel.instructions <= self.optimize_up_to else 0
+        return llvm.CompiledRun.of(kernel, llvm.compile_kernel(kernel, self.lanes, level), tables)
+
+
+def best_backend() -> Backend:
+    """Return `Compiled` if llvmlite is installed, else `CasadiVM`."""
+    return CasadiVM() if find_spec("llvmlite") is None else Compiled()
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """A kernel with the tables of its items.
+
+    Values common to all items that change in every step (a step length, say) are best kept in z and
+    gathered by every item: they cost nothing to change.
+
+    Attributes
+    ----------
+    kernel : Kernel
+    gather : ndarray of int, (n, n_in)
+        Entries of z each item reads.
+    params : ndarray of float, (n, n_par)
+    scatter : ndarray of int, (n, n_out)
+        Entries of r each item adds to; repeats add up, in the order of the items. Results for held
+        freedoms go to a dummy slot, by convention the last entry of r.
+    backend : Backend
+        By default the best there is.
+    """
+
+    kernel: Kernel
+    gather: np.ndarray
+    params: np.ndarray
+    scatter: np.ndarray
+    backend: Backend = field(default_factory=best_backend)
+
+    @cached_property
+    def run(self) -> Run:
+        """The bound run; made when first asked for."""
+        return self.backend.bind(self.kernel, self.gather, self.params, self.scatter)
+
+    def add_into(self, z: np.ndarray, r: np.ndarray) -> None:
+        """Add the outputs of all items to r, in place.
+
+        Parameters
+        ----------
+        z, r : ndarray of float64, contiguous
+            At least one longer than the largest index in their table; r must not overlap z.
+
+        Raises
+        ------
+        KernelError
+            If a vector is too short, not float64 or not contiguous, or a table does not fit the kernel.
+        """
+        self.run(z, r)
+
+    def with_params(self, params: np.ndarray) -> Batch:
+        """Return the batch with other parameters, (n, n_par); code and index tables are shared."""
+        other = replace(self, params=params)
+        other.__dict__["run"] = self.run.with_params(params)  # seeds the cached property
+        return other

@@ -1,0 +1,143 @@
+"""All kernels of a model on one flat vector: forces, their slopes, energies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.mechanics.kernel import Backend, Run
+from flexctrl.model.families import DRIVE_SLOT, NODE_SLOT, Family
+from flexctrl.model.followers import Pose
+from flexctrl.model.motion import Motion, State
+
+
+@dataclass(frozen=True)
+class Forces:
+    """The sum of all families.
+
+    Attributes
+    ----------
+    motion : Motion
+    families : tuple of Family
+    backend : Backend
+    """
+
+    motion: Motion
+    families: tuple[Family, ...]
+    backend: Backend
+
+    @property
+    def _drive_base(self) -> int:
+        return NODE_SLOT * len(self.motion.place)
+
+    @property
+    def _seed_base(self) -> int:
+        return self._drive_base + DRIVE_SLOT * self.motion.gears.count
+
+    def slots(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the flat vector the kernels read."""
+        motion = self.motion
+        nodes = len(motion.place)
+        rates = motion.rates(state, v)
+        accelerations = motion.accelerations(state, rates, v, a)
+        z = np.empty(self._seed_base)
+        slots = z[: self._drive_base].reshape(nodes, NODE_SLOT)
+        slots[:, :3] = state.x
+        slots[:, 3:12] = state.R.reshape(nodes, 9)
+        slots[:, 12:18] = rates[: motion.source_base].reshape(nodes, 6)
+        slots[:, 18:24] = accelerations[: motion.source_base].reshape(nodes, 6)
+        if motion.gears.count:
+            drives = z[self._drive_base :].reshape(-1, DRIVE_SLOT)
+            own = np.append(state.q, 0.0)[motion.sources]
+            drives[:, 0] = np.where(motion.gears.rigid, motion.gears.ratio * state.driven, own)
+            drives[:, 1] = rates[motion.source_base :]
+            drives[:, 2] = accelerations[motion.source_base :]
+            drives[:, 3] = motion.gears.unwind(Pose(state.x, state.R), state.driven)[1]
+        return z
+
+    def raw(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the raw forces of all families, inertia included."""
+        z = self.slots(state, v, a)
+        raw = np.zeros(self.motion.raw)
+        for batch in self._force:
+            batch(z, raw)
+        return raw
+
+    def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the forces on the degrees of freedom, inertia included."""
+        return self.motion.collect(state, self.raw(state, v, a))
+
+    def slope(
+        self,
+        state: State,
+        v: np.ndarray,
+        a: np.ndarray,
+        seeds: tuple[float, float, float],
+        loads: np.ndarray | None = None,
+    ) -> sp.csr_matrix:
+        """Return ∂(balance)/∂(own motion) for increments that add ``seeds`` × to place, rates and accelerations.
+
+        Exact where the machine is at rest; in motion the turning of levers of followers is left out of the rates.
+        """
+        z = np.append(self.slots(state, v, a), seeds)
+        blocks = np.zeros(self._pattern[0].size)
+        for batch in self._tangent:
+            batch(z, blocks)
+        size = self.motion.raw + self.motion.n
+        rows, columns = self._pattern
+        J = sp.csr_matrix((blocks, (rows, columns)), shape=(size, size))
+        T = self.motion.jacobian(state)
+        slope = (T.T @ J @ T).tocsr()
+        if self.motion.plain or seeds[0] == 0.0:
+            return slope
+        raw = self.raw(state, v, a)
+        return slope + seeds[0] * self.motion.stiffening(state, raw if loads is None else raw + loads)
+
+    def energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
+        """Return kinetic energy, stored energy and dissipated power."""
+        z = self.slots(state, v, np.zeros_like(v))
+        total = np.zeros(3)
+        for batch in self._energy:
+            batch(z, total)
+        return float(total[0]), float(total[1]), float(total[2])
+
+    @cached_property
+    def _force(self) -> tuple[Run, ...]:
+        base, sources = self._drive_base, self.motion.source_base
+        return tuple(
+            self.backend.bind(f.force, f.gather(base), f.parameters, f.scatter(sources)) for f in self.families
+        )
+
+    @cached_property
+    def _energy(self) -> tuple[Run, ...]:
+        base = self._drive_base
+        return tuple(
+            self.backend.bind(f.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
+            for f in self.families
+        )
+
+    @cached_property
+    def _tangent(self) -> tuple[Run, ...]:
+        found, start = [], 0
+        for f in self.families:
+            size = f.scatter(self.motion.source_base).shape[1] ** 2
+            scatter = start + np.arange(f.count * size).reshape(f.count, size)
+            start += f.count * size
+            seeds = np.tile(self._seed_base + np.arange(3), (f.count, 1))
+            found.append(
+                self.backend.bind(f.tangent, np.hstack([f.gather(self._drive_base), seeds]), f.parameters, scatter)
+            )
+        return tuple(found)
+
+    @cached_property
+    def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """Raw rows and columns of all tangent blocks, in the order in which they are written (column by column)."""
+        rows, columns = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+        for f in self.families:
+            cells = f.scatter(self.motion.source_base)
+            rows.append(np.tile(cells, (1, cells.shape[1])).ravel())
+            columns.append(np.repeat(cells, cells.shape[1], axis=1).ravel())
+        return np.concatenate(rows), np.concatenate(columns)

@@ -1,0 +1,334 @@
+"""The model: a structure under some effects, ready to be balanced, linearised and run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch, ShaftElasticity
+from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.mechanics.kernel import Backend, best_backend
+from flexctrl.mechanics.rotation import exponential
+from flexctrl.model.assembly import assembled, mass_blocks, stiffness_blocks
+from flexctrl.model.families import families_of
+from flexctrl.model.forces import Forces
+from flexctrl.model.motion import Motion, State, motion_of
+from flexctrl.model.signals import Signals, signals_of
+from flexctrl.structure.drives import Drive
+from flexctrl.structure.elements import Beam, Part, Rope
+from flexctrl.structure.structure import Structure
+from flexctrl.structure.ties import Group
+
+
+@dataclass(frozen=True)
+class Model:
+    """The equations of motion of a structure under some effects: Tᵀ (f(x, v, a) + loads) = 0.
+
+    Made by `assemble`. ``coordinates`` names the degrees of freedom in the order of every vector and matrix.
+
+    Attributes
+    ----------
+    structure : Structure
+    effects : tuple of Effect
+        Composites taken apart.
+    motion : Motion
+    backend : Backend
+        How the kernels run.
+    viscous : scipy.sparse.csr_matrix, shape (n, n)
+        Damping that acts on the degrees of freedom themselves (modal damping); empty without.
+    """
+
+    structure: Structure
+    effects: tuple[Effect, ...]
+    motion: Motion
+    backend: Backend
+    viscous: sp.csr_matrix = field(repr=False)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom."""
+        return self.motion.names
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self.motion.n
+
+    @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return tuple(i.name for i in self.structure.inputs)
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(o.name for o in self.structure.outputs)
+
+    @cached_property
+    def large(self) -> bool:
+        """Whether parts may move as far as they like."""
+        return any(isinstance(e, LargeRotation) for e in self.effects)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was held or released so that rigid loops close."""
+        return self.motion.notes
+
+    @property
+    def rest(self) -> State:
+        """The machine as drawn, at rest."""
+        return self.motion.rest
+
+    @cached_property
+    def signals(self) -> Signals:
+        """Inputs and outputs, ready to be evaluated."""
+        return signals_of(self.structure, self.motion)
+
+    @cached_property
+    def forces(self) -> Forces:
+        """All kernels of the model, bound to their tables."""
+        rigid = frozenset(p.name for p in self.structure.elements if not self.bends(p))
+        return Forces(self.motion, families_of(self.structure, self.effects, rigid), self.backend)
+
+    def bends(self, part: Part | Drive) -> bool:
+        """Tell whether some effect lets a part deform."""
+        return any(e.bends(part) for e in self.effects)
+
+    def mass(self) -> sp.csc_matrix:
+        """Return M at rest from the consistent element matrices, shape (n, n), in the order of `coordinates`."""
+        return self._mass
+
+    def stiffness(self) -> sp.csc_matrix:
+        """Return K at rest from the element matrices, shape (n, n), without prestress; it may be singular."""
+        return self._stiffness
+
+    @cached_property
+    def _mass(self) -> sp.csc_matrix:
+        return assembled(self.motion, mass_blocks(self.structure, self.motion))
+
+    @cached_property
+    def _stiffness(self) -> sp.csc_matrix:
+        return assembled(self.motion, stiffness_blocks(self.structure, self.motion, self.bends))
+
+    @cached_property
+    def _small(self) -> tuple[np.ndarray, sp.csr_matrix]:
+        """The constant load and damping of the linear model about the shape at rest."""
+        still = np.zeros(self.n)
+        load = self.forces.balance(self.rest, still, still)
+        damping = -self.forces.slope(self.rest, still, still, (0.0, 1.0, 0.0)).tocsr()
+        return load, damping + self.viscous
+
+    def input_vector(self, inputs: Mapping[str, float]) -> np.ndarray:
+        """Return input values in order; what is not named is zero.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float
+
+        Returns
+        -------
+        numpy.ndarray, shape (inputs,)
+
+        Raises
+        ------
+        StructureError
+            For an unknown name.
+        """
+        u = np.zeros(len(self.inputs))
+        for name, value in inputs.items():
+            if name not in self.inputs:
+                raise StructureError(f"model has no input {name!r}{did_you_mean(name, self.inputs)}")
+            u[self.inputs.index(name)] = value
+        return u
+
+    def loads(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return Tᵀ B u, the generalised forces of the inputs."""
+        return self.motion.collect(state if self.large else self.rest, self.signals.loads @ u)
+
+    def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the sum of all forces on the degrees of freedom except the inputs; zero when they obey.
+
+        Parameters
+        ----------
+        state : State
+        v, a : numpy.ndarray, shape (n,)
+            Rates and accelerations of the degrees of freedom.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        if self.large:
+            return self.forces.balance(state, v, a) - self.viscous @ v
+        load, damping = self._small
+        return load - self._stiffness @ state.q - damping @ v - self._mass @ a
+
+    def slope(
+        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float], u: np.ndarray
+    ) -> sp.csr_matrix:
+        """Return ∂(balance + loads)/∂(own motion) for a motion that adds ``seeds`` × increment to (place, v, a)."""
+        if self.large:
+            slope = self.forces.slope(state, v, a, seeds, self.signals.loads @ u)
+            return slope - seeds[1] * self.viscous
+        _, damping = self._small
+        return -(seeds[0] * self._stiffness + seeds[1] * damping + seeds[2] * self._mass).tocsr()
+
+    def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
+        """Return the state after a step of the degrees of freedom."""
+        if self.large:
+            return self.motion.advance(state, step, v, t)
+        q = state.q + step
+        raw = (self.motion.jacobian(self.rest) @ q)[: self.motion.source_base].reshape(-1, 6)
+        gears = self.motion.gears
+        both = np.hstack([raw[gears.node], raw[gears.base]])
+        still = gears.gradient(self.motion.rest)  # type: ignore[arg-type]
+        driven = np.einsum("ki,ki->k", still, both)
+        return State(self.rest.x + raw[:, :3], exponential(raw[:, 3:]), q, v, driven, t)
+
+    def rates(self, state: State) -> np.ndarray:
+        """Return the raw rates of a state."""
+        return self.motion.rates(state if self.large else self.rest, state.v)
+
+    def measure(self, state: State) -> np.ndarray:
+        """Return the outputs of a state, shape (outputs,)."""
+        return self.signals.outputs(state, self.rates(state))
+
+    def energy(self, state: State) -> tuple[float, float, float]:
+        """Return kinetic energy [J], stored energy [J] and dissipated power [W] of a state."""
+        if self.large:
+            kinetic, stored, power = self.forces.energy(state, state.v)
+            return kinetic, stored, power + float(state.v @ (self.viscous @ state.v))
+        load, damping = self._small
+        kinetic = 0.5 * float(state.v @ (self._mass @ state.v))
+        stored = 0.5 * float(state.q @ (self._stiffness @ state.q)) - float(load @ state.q)
+        return kinetic, stored, float(state.v @ (damping @ state.v))
+
+    def displace(self, q: Mapping[str, float] | np.ndarray) -> State:
+        """Return the machine at rest after a displacement of the degrees of freedom from the drawn shape.
+
+        Parameters
+        ----------
+        q : mapping of coordinate name to float, or numpy.ndarray of shape (n,)
+            Displacements [m], rotations [rad] (rotation vectors in space axes).
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        StructureError
+            For an unknown coordinate.
+        """
+        step = np.zeros(self.n)
+        if isinstance(q, Mapping):
+            for name, value in q.items():
+                step[self.coordinate(name)] = value
+        else:
+            step[:] = q
+        return self.advance(self.rest, step, np.zeros(self.n), 0.0)
+
+    def coordinate(self, name: str) -> int:
+        """Return the place of a degree of freedom by name.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        StructureError
+            If there is none of that name.
+        """
+        if name not in self.coordinates:
+            raise StructureError(f"model has no coordinate {name!r}{did_you_mean(name, self.coordinates)}")
+        return self.coordinates.index(name)
+
+    def with_(self, *, backend: Backend) -> Model:
+        """Return the same model on another backend.
+
+        Parameters
+        ----------
+        backend : Backend
+
+        Returns
+        -------
+        Model
+        """
+        return replace(self, backend=backend)
+
+
+def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend | None = None) -> Model:
+    """Put a structure under some effects.
+
+    Parameters
+    ----------
+    structure : Structure
+    effects : sequence of Effect
+        What the scene asks for, e.g. ``[Gravity(), Flexible(), LargeRotation()]``. What no effect
+        bends is rigid; an effect left out costs nothing.
+    backend : Backend, optional
+        How the kernels run; default: compiled if the extra ``[fast]`` is installed.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    StructureError
+        For something that is no effect, an effect given twice, or a loop of rigid parts.
+    """
+    parts = _flat(effects)
+    rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
+    groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
+    elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))
+    motion = motion_of(structure, structure.bodies + groups, elastic)
+    empty = sp.csr_matrix((motion.n, motion.n))
+    return Model(structure, parts, motion, backend or best_backend(), empty)
+
+
+def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, ...]:
+    """Return the rigid twin: the same without the effects that let parts deform.
+
+    Parameters
+    ----------
+    model_or_effects : Model or sequence of Effect
+
+    Returns
+    -------
+    Model or tuple of Effect
+        What was given, with `BeamFlexibility`, `ShaftElasticity` and `RopeStretch` left out.
+
+    Raises
+    ------
+    StructureError
+        If rigid parts form a loop.
+    """
+    if isinstance(model_or_effects, Model):
+        kept = rigid(model_or_effects.effects)
+        assert isinstance(kept, tuple)
+        return assemble(model_or_effects.structure, kept, model_or_effects.backend)
+    flexible = (BeamFlexibility, ShaftElasticity, RopeStretch)
+    return tuple(e for e in _flat(model_or_effects) if not isinstance(e, flexible))
+
+
+def _flat(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    for effect in effects:
+        if not isinstance(effect, Effect):
+            raise StructureError(f"assemble: {effect!r} is no effect; give e.g. flexctrl.Gravity()")
+    parts = tuple(p for e in effects for p in e.parts())
+    twice = [type(p).__name__ for i, p in enumerate(parts) if type(p) in map(type, parts[:i])]
+    if twice:
+        raise StructureError(f"assemble: the effect {twice[0]} is given twice; keep one")
+    return parts

@@ -1,0 +1,216 @@
+"""Inputs and outputs of a model, ready to be evaluated and linearised."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.model.motion import Motion, State
+from flexctrl.structure.elements import Rope, Spring
+from flexctrl.structure.signals import (
+    AngularVelocity,
+    DriveAngle,
+    DriveSpeed,
+    Force,
+    Input,
+    MotorTorque,
+    Output,
+    Position,
+    Rotation,
+    SwayAngle,
+    Tension,
+    Velocity,
+)
+from flexctrl.structure.structure import Structure
+
+Gauge = Callable[[State, np.ndarray], float]
+Slope = Callable[[State, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One output: its value, and its slope as (cells, on raw motion, cells, on raw rates)."""
+
+    value: Gauge
+    slope: Slope
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What acts on a model and what is measured of it.
+
+    Attributes
+    ----------
+    loads : scipy.sparse.csr_matrix, shape (raw, inputs)
+        Raw forces of unit inputs.
+    measures : tuple of Measure
+    """
+
+    loads: sp.csr_matrix
+    measures: tuple[Measure, ...]
+
+    def outputs(self, state: State, rates: np.ndarray) -> np.ndarray:
+        """Return the outputs of a state with raw rates."""
+        return np.array([m.value(state, rates) for m in self.measures])
+
+    def slopes(self, state: State, rates: np.ndarray, raw: int) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """Return ∂outputs/∂(raw motion) and ∂outputs/∂(raw rates)."""
+        place, speed = [], []
+        for i, m in enumerate(self.measures):
+            cells, on_place, speed_cells, on_speed = m.slope(state, rates)
+            place += [(i, c, v) for c, v in zip(cells, on_place, strict=True)]
+            speed += [(i, c, v) for c, v in zip(speed_cells, on_speed, strict=True)]
+        return _matrix(place, len(self.measures), raw), _matrix(speed, len(self.measures), raw)
+
+
+def _matrix(entries: list, rows: int, columns: int) -> sp.csr_matrix:
+    r, c, v = (np.array(part) for part in zip(*entries, strict=True)) if entries else (np.zeros(0, int),) * 3
+    return sp.csr_matrix((v, (r, c)), shape=(rows, columns), dtype=float)
+
+
+def signals_of(structure: Structure, motion: Motion) -> Signals:
+    """Return the signals of a structure."""
+    entries = [
+        (cell, i, value)
+        for i, signal in enumerate(structure.inputs)
+        for cell, value in _load(structure, motion, signal)
+    ]
+    loads = _matrix(entries, motion.raw, len(structure.inputs))
+    return Signals(loads, tuple(_measure(structure, motion, o) for o in structure.outputs))
+
+
+def _load(s: Structure, motion: Motion, signal: Input) -> list[tuple[int, float]]:
+    if isinstance(signal, MotorTorque):
+        return [(motion.source_base + _drive(s, signal.drive), 1.0)]
+    offset = 0 if isinstance(signal, Force) else 3
+    return [(6 * s.number(n) + offset + k, d) for n in signal.at for k, d in enumerate(signal.direction) if d]
+
+
+def _drive(s: Structure, name: str) -> int:
+    return [d.name for d in s.drives].index(name)
+
+
+def _measure(s: Structure, motion: Motion, output: Output) -> Measure:
+    if isinstance(output, DriveAngle):
+        return _drive_angle(motion, _drive(s, output.drive))
+    if isinstance(output, DriveSpeed):
+        cell = motion.source_base + _drive(s, output.drive)
+        return Measure(lambda state, rates: float(rates[cell]), lambda state, rates: (*_none, *_one(cell)))
+    if isinstance(output, SwayAngle):
+        return _sway(s, output)
+    if isinstance(output, Tension):
+        return _tension(s, output)
+    if isinstance(output, Rotation):
+        return _rotation(s, motion, output)
+    return _linear(s, output)
+
+
+_none = (np.zeros(0, dtype=int), np.zeros(0))
+
+
+def _one(cell: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([cell]), np.array([1.0])
+
+
+def _linear(s: Structure, output: Position | Velocity | AngularVelocity) -> Measure:
+    direction = np.array(output.direction)
+    offset = 3 if isinstance(output, AngularVelocity) else 0
+    signs = [(s.number(output.at), 1.0), *([(s.number(output.minus), -1.0)] if output.minus else [])]
+    cells = np.concatenate([6 * n + offset + np.arange(3) for n, _ in signs])
+    weights = np.concatenate([sign * direction for _, sign in signs])
+    if isinstance(output, Position):
+        nodes, signed = np.array([n for n, _ in signs]), np.array([sign for _, sign in signs])
+        return Measure(
+            lambda state, rates: float(signed @ (state.x[nodes] @ direction)),
+            lambda state, rates: (cells, weights, *_none),
+        )
+    return Measure(lambda state, rates: float(weights @ rates[cells]), lambda state, rates: (*_none, cells, weights))
+
+
+def _drive_angle(motion: Motion, drive: int) -> Measure:
+    number, ratio = int(motion.sources[drive]), float(motion.gears.ratio[drive])
+    cell = motion.source_base + drive
+    if motion.gears.rigid[drive]:
+        return Measure(
+            lambda state, rates: ratio * float(state.driven[drive]), lambda state, rates: (*_one(cell), *_none)
+        )
+    return Measure(lambda state, rates: float(state.q[number]), lambda state, rates: (*_one(cell), *_none))
+
+
+def _pair(top: int, load: int) -> np.ndarray:
+    return np.concatenate([6 * load + np.arange(3), 6 * top + np.arange(3)])
+
+
+def _sway(s: Structure, output: SwayAngle) -> Measure:
+    top, load = s.number(output.top), s.number(output.load)
+    along, down = np.array(output.direction), np.array(output.down)
+    cells = _pair(top, load)
+
+    def value(state: State, rates: np.ndarray) -> float:
+        d = state.x[load] - state.x[top]
+        return float(np.arctan2(along @ d, down @ d))
+
+    def slope(state: State, rates: np.ndarray) -> tuple:
+        d = state.x[load] - state.x[top]
+        a, b = along @ d, down @ d
+        g = (b * along - a * down) / (a * a + b * b)
+        return (cells, np.concatenate([g, -g]), *_none)
+
+    return Measure(value, slope)
+
+
+def _tension(s: Structure, output: Tension) -> Measure:
+    line = s.part(output.line)
+    assert isinstance(line, Rope | Spring)
+    start, end = s.number(line.start), s.number(line.end)
+    cells, k, rest, c = _pair(start, end), line.stiffness, line.length, line.damping
+    slack = isinstance(line, Rope)
+
+    def parts(state: State, rates: np.ndarray) -> tuple[float, float, np.ndarray, np.ndarray]:
+        d = state.x[end] - state.x[start]
+        length = float(np.linalg.norm(d))
+        n, dv = d / length, rates[cells[:3]] - rates[cells[3:]]
+        force = k * (length - rest) + c * float(n @ dv)
+        return (0.0 if slack and (length <= rest or force < 0.0) else force), length, n, dv
+
+    def value(state: State, rates: np.ndarray) -> float:
+        return parts(state, rates)[0]
+
+    def slope(state: State, rates: np.ndarray) -> tuple:
+        force, length, n, dv = parts(state, rates)
+        on = 0.0 if slack and force == 0.0 else 1.0
+        g = on * (k * n + c * (dv - n * (n @ dv)) / length)
+        return (cells, np.concatenate([g, -g]), cells, on * c * np.concatenate([n, -n]))
+
+    return Measure(value, slope)
+
+
+def _rotation(s: Structure, motion: Motion, output: Rotation) -> Measure:
+    at = s.number(output.at)
+    base = len(s.nodes) if output.minus is None else s.number(output.minus)
+    axis = np.array(output.direction)
+    T = motion.jacobian(motion.rest)
+    # how many turns: from the summed degrees of freedom as they move the nodes at rest
+    turning = axis @ (T[6 * at + 3 : 6 * at + 6] - T[6 * base + 3 : 6 * base + 6]).toarray()
+    cells = np.concatenate([6 * at + 3 + np.arange(3), 6 * base + 3 + np.arange(3)])
+
+    def twist(state: State) -> tuple[np.ndarray, np.ndarray, float, float]:
+        Q = state.R[base].T @ state.R[at]
+        axial = 0.5 * np.array([Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]])
+        return Q, axial, float(axial @ axis), 0.5 * (float(np.trace(Q)) - 1.0)
+
+    def value(state: State, rates: np.ndarray) -> float:
+        _, _, sine, cosine = twist(state)
+        angle = float(np.arctan2(sine, cosine))
+        return angle + 2.0 * np.pi * float(np.round((turning @ state.q - angle) / (2.0 * np.pi)))
+
+    def slope(state: State, rates: np.ndarray) -> tuple:
+        Q, axial, sine, cosine = twist(state)
+        on_sine = 0.5 * (np.trace(Q) * np.eye(3) - Q).T @ axis
+        g = state.R[base] @ ((cosine * on_sine + sine * axial) / (sine**2 + cosine**2))
+        return (cells, np.concatenate([g, -g]), *_none)
+
+    return Measure(value, slope)
