@@ -7,19 +7,8 @@ from flexctrl.design.feedback import FilteredRate, observer, observer_feedback, 
 from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
 from flexctrl.design.optimal import DesignError, Estimator, Regulator, bryson, kalman, lqg, lqr
 from flexctrl.design.piecewise import Constant, PiecewisePolynomial, Sum, Trajectory
-from flexctrl.design.shapers import (
-    Mode,
-    Shaper,
-    convolve,
-    ei,
-    um_zv,
-    um_zv_fit,
-    um_zvd,
-    um_zvd_fit,
-    zv,
-    zvd,
-    zvdd,
-)
+from flexctrl.design.shaper import Mode, Shaper, convolve
+from flexctrl.design.shapers import ei, um_zv, um_zv_fit, um_zvd, um_zvd_fit, zv, zvd, zvdd
 from flexctrl.design.shaping import CoarseGridWarning, Shaped, fir
 from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Together, Tracking
 from flexctrl.design.trajectories import (

@@ -54,16 +54,56 @@ class Controller(Protocol):
     def sample_time(self) -> float: ...
 
     def initial(self) -> np.ndarray:
-        """Return its state at the start, shape (n,)."""
+        """Return its state at the start.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the plant inputs, shape (n_outputs,)."""
+        """Return what it commands.
+
+        Parameters
+        ----------
+        t : float
+            Time, s.
+        x : numpy.ndarray, shape (n,)
+            Its state.
+        y : numpy.ndarray, shape (n_inputs,)
+            Measured plant outputs.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_outputs,)
+            Plant inputs.
+        """
 
     def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return dx/dt of a continuous controller, shape (n,)."""
+        """Return dx/dt; continuous controllers only.
+
+        Parameters
+        ----------
+        t, x, y
+            As for `command`.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
 
     def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the next state of a sampled controller, shape (n,)."""
+        """Return the state at the next sample; sampled controllers only.
+
+        Parameters
+        ----------
+        t, x, y
+            As for `command`, at the sample instant.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,9 +121,8 @@ def lqr(plant: Any, state_cost: np.ndarray, input_cost: np.ndarray) -> Regulator
     """
     A, B = plant.A, plant.B
     Q, R = _cost(state_cost, len(A), "state cost"), _cost(input_cost, B.shape[1], "input cost")
-    sampled = bool(plant.isdtime(strict=True))
-    blame = ("no input moves", "the state cost does not see")
-    K, S, residual = _riccati(A, B, Q, R, sampled, "lqr", blame, plant.state_labels)
+    equation = _Riccati(A, B, Q, R, bool(plant.isdtime(strict=True)))
+    K, S, residual = _checked(equation, plant, "lqr", ("no input moves", "the state cost does not see"))
     return Regulator(K, S, np.linalg.eigvals(A - B @ K), residual)
 
 
@@ -150,9 +149,8 @@ def kalman(plant: Any, process: np.ndarray, measurement: np.ndarray) -> Estimato
     """
     A, C = plant.A, plant.C
     W, V = _cost(process, len(A), "process noise"), _cost(measurement, len(C), "measurement noise")
-    sampled = bool(plant.isdtime(strict=True))
-    blame = ("no output sees", "the process noise does not move")
-    K, P, residual = _riccati(A.T, C.T, W, V, sampled, "kalman", blame, plant.state_labels)
+    equation = _Riccati(A.T, C.T, W, V, bool(plant.isdtime(strict=True)))
+    K, P, residual = _checked(equation, plant, "kalman", ("no output sees", "the process noise does not move"))
     return Estimator(K.T, P, np.linalg.eigvals(A - K.T @ C), residual)
 
 
@@ -180,96 +178,109 @@ def lqg(
     return observer_feedback(regulator.gain, estimator.gain, plant)
 
 
-Solution = tuple[np.ndarray, np.ndarray, float]
+Solution = tuple[np.ndarray, np.ndarray, float]  # gain, Riccati solution, residual
 
 
-def _riccati(
-    A: np.ndarray,
-    B: np.ndarray,
-    Q: np.ndarray,
-    R: np.ndarray,
-    sampled: bool,
-    what: str,
-    blame: tuple[str, str],
-    states: list[str],
-) -> Solution:
+@dataclass(frozen=True, eq=False)
+class _Riccati:
+    """The Riccati equation of min ∫ xᵀQx + uᵀRu, ẋ = A x + B u, or of the sum for x⁺ = A x + B u."""
+
+    A: np.ndarray
+    B: np.ndarray
+    Q: np.ndarray
+    R: np.ndarray
+    sampled: bool
+
+    def solve(self) -> Solution:
+        """python-control's solution, improved by Newton steps (Kleinman) as long as they help."""
+        import control
+
+        K, S, _ = (control.dlqr if self.sampled else control.lqr)(self.A, self.B, self.Q, self.R)
+        best = np.asarray(K), np.asarray(S), self.residual(np.asarray(S))
+        for _ in range(5):
+            if best[2] < 1e-13 or self.growth(best[0]) >= 0:
+                break
+            S = self.cost(best[0])
+            tried = self.gain(S), S, self.residual(S)
+            if not tried[2] < best[2]:
+                break
+            best = tried
+        return best
+
+    def cost(self, K: np.ndarray) -> np.ndarray:
+        """Cost of the stable law u = −K x."""
+        from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
+
+        closed, spent = self.A - self.B @ K, self.Q + K.T @ self.R @ K
+        S = solve_discrete_lyapunov(closed.T, spent) if self.sampled else solve_continuous_lyapunov(closed.T, -spent)
+        return (S + S.T) / 2
+
+    def gain(self, S: np.ndarray) -> np.ndarray:
+        """Best law for the cost S."""
+        if self.sampled:
+            return np.linalg.solve(self.R + self.B.T @ S @ self.B, self.B.T @ S @ self.A)
+        return np.linalg.solve(self.R, self.B.T @ S)
+
+    def residual(self, S: np.ndarray) -> float:
+        """Norm of what is left of the equation over the sum of the norms of its terms."""
+        A = self.A
+        quadratic = self.gain(S).T @ self.B.T @ S @ (A if self.sampled else np.eye(len(A)))
+        linear = (A.T @ S @ A, -S) if self.sampled else (A.T @ S, S @ A)
+        terms = (*linear, -quadratic, self.Q)
+        scale = sum(float(np.linalg.norm(term)) for term in terms)
+        return float(np.linalg.norm(sum(terms))) / scale if scale else 0.0
+
+    def growth(self, K: np.ndarray) -> float:
+        """How far the least stable pole is beyond the border of stability; stable if negative."""
+        return float(_beyond(np.linalg.eigvals(self.A - self.B @ K), self.sampled).max(initial=-1.0))
+
+    def mode_is_stuck(self, pole: complex) -> bool:
+        """Whether B cannot move the mode at a pole (Hautus test)."""
+        return _loses_rank(np.hstack([pole * np.eye(len(self.A)) - self.A, self.B]))
+
+    def mode_is_unseen(self, pole: complex) -> bool:
+        """Whether Q does not see the mode at a pole (Hautus test)."""
+        return _loses_rank(np.hstack([(pole * np.eye(len(self.A)) - self.A).conj().T, self.Q]))
+
+
+def _checked(equation: _Riccati, plant: Any, what: str, blame: tuple[str, str]) -> Solution:
     try:
-        K, S, residual = _solved(A, B, Q, R, sampled)
-        radius = _growth(np.linalg.eigvals(A - B @ K), sampled).max(initial=-1.0)
+        K, S, residual = equation.solve()
     except (np.linalg.LinAlgError, ValueError, ArithmeticError) as error:
-        raise DesignError(f"{what}: {error}; {_reason(A, B, Q, sampled, blame, states)}") from error
-    if not residual < _TOLERANCE or not radius < 0:
+        said = " ".join(str(error).split())
+        raise DesignError(f"{what}: {said}; {_reason(equation, plant, blame)}") from error
+    growth = equation.growth(K)
+    if not (residual < _TOLERANCE and growth < 0):
         raise DesignError(
             f"{what}: the Riccati residual is {residual:.1e} and the least stable pole is "
-            f"{'outside' if radius >= 0 else 'inside'} the stable region; {_reason(A, B, Q, sampled, blame, states)}"
+            f"{'outside' if growth >= 0 else 'inside'} the stable region; {_reason(equation, plant, blame)}"
         )
     return K, S, residual
 
 
-def _solved(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, sampled: bool) -> Solution:
-    import control
-
-    K, S, _ = (control.dlqr if sampled else control.lqr)(A, B, Q, R)
-    K, S = np.asarray(K), np.asarray(S)
-    best = (K, S, _residual(A, B, Q, R, S, sampled))
-    for _ in range(5):
-        if best[2] < 1e-13:
-            break
-        S = _policy_cost(A, B, Q, R, best[0], sampled)
-        tried = (_gain(A, B, R, S, sampled), S, _residual(A, B, Q, R, S, sampled))
-        if not tried[2] < best[2]:
-            break
-        best = tried
-    return best
+def _reason(equation: _Riccati, plant: Any, blame: tuple[str, str]) -> str:
+    """The first mode that does not die out by itself and that B cannot move or Q does not see."""
+    poles, shapes = np.linalg.eig(plant.A)
+    slight = -1e-9 * float(np.linalg.norm(plant.A))
+    for pole, shape in zip(poles, shapes.T, strict=True):
+        if _beyond(np.array([pole]), equation.sampled)[0] < slight:
+            continue
+        tests = (equation.mode_is_stuck, equation.mode_is_unseen)
+        for complaint, fails in zip(blame, tests, strict=True):
+            if fails(pole):
+                name = plant.state_labels[int(np.argmax(np.abs(shape)))]
+                return f"{complaint} the mode at {pole:.4g} (mostly state {name!r})"
+    return "check the scaling of the model and of the weights"
 
 
-def _policy_cost(
-    A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, K: np.ndarray, sampled: bool
-) -> np.ndarray:
-    from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
-
-    closed, cost = A - B @ K, Q + K.T @ R @ K
-    S = solve_discrete_lyapunov(closed.T, cost) if sampled else solve_continuous_lyapunov(closed.T, -cost)
-    return (S + S.T) / 2
-
-
-def _gain(A: np.ndarray, B: np.ndarray, R: np.ndarray, S: np.ndarray, sampled: bool) -> np.ndarray:
-    if sampled:
-        return np.linalg.solve(R + B.T @ S @ B, B.T @ S @ A)
-    return np.linalg.solve(R, B.T @ S)
-
-
-def _residual(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, S: np.ndarray, sampled: bool) -> float:
-    """Norm of the Riccati equation's left side over the sum of the norms of its terms."""
-    K = _gain(A, B, R, S, sampled)
-    quadratic = K.T @ B.T @ S @ (A if sampled else np.eye(len(A)))
-    linear = (A.T @ S @ A, -S) if sampled else (A.T @ S, S @ A)
-    terms = (*linear, -quadratic, Q)
-    scale = sum(float(np.linalg.norm(term)) for term in terms)
-    return float(np.linalg.norm(sum(terms))) / scale if scale else 0.0
-
-
-def _growth(poles: np.ndarray, sampled: bool) -> np.ndarray:
+def _beyond(poles: np.ndarray, sampled: bool) -> np.ndarray:
     return np.abs(poles) - 1.0 if sampled else poles.real
 
 
-def _reason(
-    A: np.ndarray, B: np.ndarray, Q: np.ndarray, sampled: bool, blame: tuple[str, str], states: list[str]
-) -> str:
-    """The first mode that is not damped by itself and that B cannot move or Q does not see (Hautus test)."""
-    poles, right = np.linalg.eig(A)
-    scale = float(np.linalg.norm(A))
-    for pole, vector in zip(poles, right.T, strict=True):
-        if _growth(np.array([pole]), sampled)[0] < -1e-9 * scale:
-            continue
-        shifted = pole * np.eye(len(A)) - A
-        name = states[int(np.argmax(np.abs(vector)))]
-        for columns, complaint in ((np.hstack([shifted, B]), blame[0]), (np.hstack([shifted.conj().T, Q]), blame[1])):
-            sizes = np.linalg.norm(columns, axis=0)
-            scaled = columns / np.where(sizes > 0, sizes, 1.0)
-            if np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-9:
-                return f"{complaint} the mode at {pole:.4g} (mostly state {name!r})"
-    return "check the scaling of the model and of the weights"
+def _loses_rank(matrix: np.ndarray) -> bool:
+    sizes = np.linalg.norm(matrix, axis=0)
+    scaled = matrix / np.where(sizes > 0, sizes, 1.0)
+    return bool(np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-9)
 
 
 def _cost(matrix: np.ndarray, n: int, what: str) -> np.ndarray:

@@ -78,6 +78,10 @@ class PiecewisePolynomial(Trajectory):
     before: float = 0.0
 
     def __post_init__(self) -> None:
+        # Plain floats: numpy's scalars would make every evaluation several times slower.
+        object.__setattr__(self, "knots", tuple(map(float, self.knots)))
+        object.__setattr__(self, "coefficients", tuple(tuple(map(float, row)) for row in self.coefficients))
+        object.__setattr__(self, "before", float(self.before))
         if len(self.knots) != len(self.coefficients) or not self.knots:
             raise ControllerError(f"{len(self.knots)} knots need as many rows, not {len(self.coefficients)}")
         require_finite("piecewise polynomial", *self.knots, self.before, *(c for row in self.coefficients for c in row))

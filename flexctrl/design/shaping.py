@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.design.piecewise import Trajectory, distinct
-from flexctrl.design.shapers import Shaper
+from flexctrl.design.shaper import Shaper
 
 __all__ = ["CoarseGridWarning", "Shaped", "check_grid", "fir"]
 

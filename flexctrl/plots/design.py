@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from flexctrl.design.piecewise import Trajectory
-from flexctrl.design.shapers import Shaper
+from flexctrl.design.shaper import Shaper
 
 __all__ = ["shaper_impulses", "shaper_sensitivity", "trajectory_curves", "trajectory_panels"]
 
