@@ -9,8 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.mechanics.kernel import Backend, Run
-from flexctrl.model.families import DRIVE_SLOT, NODE_SLOT, Family
+from flexctrl.model.families import Family
 from flexctrl.model.followers import Pose
+from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.motion import Motion, State
 
 
@@ -82,19 +83,35 @@ class Forces:
 
         Exact where the machine is at rest; in motion the turning of levers of followers is left out of the rates.
         """
-        z = np.append(self.slots(state, v, a), seeds)
-        blocks = np.zeros(self._pattern[0].size)
-        for batch in self._tangent:
-            batch(z, blocks)
-        size = self.motion.raw + self.motion.n
         rows, columns = self._pattern
-        J = sp.csr_matrix((blocks, (rows, columns)), shape=(size, size))
-        T = self.motion.jacobian(state)
-        slope = (T.T @ J @ T).tocsr()
+        slope = self._projected(state, self._blocks(state, v, a, seeds), rows, columns)
         if self.motion.plain or seeds[0] == 0.0:
             return slope
         raw = self.raw(state, v, a)
         return slope + seeds[0] * self.motion.stiffening(state, raw if loads is None else raw + loads)
+
+    def slope_by_part(
+        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]
+    ) -> dict[str, sp.csr_matrix]:
+        """Return each part's own share of `slope`, levers of followers left out."""
+        blocks, (rows, columns) = self._blocks(state, v, a, seeds), self._pattern
+        owners = np.concatenate([np.repeat(f.parts, f.scatter(0).shape[1] ** 2) for f in self.families])
+        return {
+            str(name): self._projected(state, blocks[owners == name], rows[owners == name], columns[owners == name])
+            for name in dict.fromkeys(owners.tolist())
+        }
+
+    def _blocks(self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]) -> np.ndarray:
+        z = np.append(self.slots(state, v, a), seeds)
+        blocks = np.zeros(self._pattern[0].size)
+        for batch in self._tangent:
+            batch(z, blocks)
+        return blocks
+
+    def _projected(self, state: State, blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> sp.csr_matrix:
+        size = self.motion.raw + self.motion.n
+        T = self.motion.jacobian(state)
+        return (T.T @ sp.csr_matrix((blocks, (rows, columns)), shape=(size, size)) @ T).tocsr()
 
     def energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""
@@ -108,14 +125,14 @@ class Forces:
     def _force(self) -> tuple[Run, ...]:
         base, sources = self._drive_base, self.motion.source_base
         return tuple(
-            self.backend.bind(f.force, f.gather(base), f.parameters, f.scatter(sources)) for f in self.families
+            self.backend.bind(f.kernels.force, f.gather(base), f.parameters, f.scatter(sources)) for f in self.families
         )
 
     @cached_property
     def _energy(self) -> tuple[Run, ...]:
         base = self._drive_base
         return tuple(
-            self.backend.bind(f.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
+            self.backend.bind(f.kernels.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
             for f in self.families
         )
 
@@ -128,7 +145,9 @@ class Forces:
             start += f.count * size
             seeds = np.tile(self._seed_base + np.arange(3), (f.count, 1))
             found.append(
-                self.backend.bind(f.tangent, np.hstack([f.gather(self._drive_base), seeds]), f.parameters, scatter)
+                self.backend.bind(
+                    f.kernels.tangent, np.hstack([f.gather(self._drive_base), seeds]), f.parameters, scatter
+                )
             )
         return tuple(found)
 

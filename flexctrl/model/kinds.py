@@ -1,0 +1,247 @@
+"""Kinds of pieces and the sum of what all effects do to each, as casadi kernels.
+
+Kernels read node slots of a flat vector z and add forces to a raw vector. A node's slot holds
+x (3), R (9, row by row), velocity (6) and acceleration (6); a drive's slot θ_d, its two rates, and the
+whole turns of its joint. The tangents read three seeds more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import TYPE_CHECKING
+
+from flexctrl.effects.effect import Effect
+from flexctrl.mechanics import beam, pieces
+from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.kernel import Kernel
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+NODE_SLOT = 24
+DRIVE_SLOT = 4
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What acts on a piece: forces of inertia, all other forces, kinetic and stored energy."""
+
+    inertia: ca.SX
+    force: ca.SX
+    kinetic: ca.SX
+    stored: ca.SX
+
+
+Physics = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX"], Shares]
+"""(effects, node motions, drive slot, parameters) → what acts on the piece."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of piece.
+
+    Attributes
+    ----------
+    name : str
+    nodes : int
+        Nodes a piece.
+    freedoms : int
+        Raw freedoms a node that the piece pushes (3 or 6).
+    drives : int
+        Source angles a piece (0 or 1).
+    parameters : int
+    physics : callable
+    """
+
+    name: str
+    nodes: int
+    freedoms: int
+    drives: int
+    parameters: int
+    physics: Physics
+
+    @property
+    def width(self) -> int:
+        """Raw freedoms a piece pushes."""
+        return self.nodes * self.freedoms + self.drives
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """The kernels of one kind under some effects; made when first used, once a process (`kernels_of`)."""
+
+    kind: Kind
+    effects: tuple[Effect, ...]
+
+    @cached_property
+    def force(self) -> Kernel:
+        """Kernel of the sum of all forces, inertia included."""
+        symbols, parameters, shares = self._rest
+        return _kernel(f"{self.kind.name}_force", symbols, parameters, shares.force + shares.inertia)
+
+    @cached_property
+    def energy(self) -> Kernel:
+        """Kernel of kinetic energy, stored energy and dissipated power."""
+        import casadi as ca
+
+        symbols, parameters, shares = self._rest
+        velocities = self._velocities(symbols)
+        still = ca.substitute(shares.force, velocities, ca.SX.zeros(velocities.numel()))
+        power = ca.dot(still - shares.force, self._raw_rates(symbols))
+        return _kernel(
+            f"{self.kind.name}_energy", symbols, parameters, ca.vertcat(shares.kinetic, shares.stored, power)
+        )
+
+    @cached_property
+    def tangent(self) -> Kernel:
+        """Kernel of ∂force/∂(raw motion), column by column.
+
+        Three more inputs say how a raw increment moves the piece: it changes place, velocity
+        and acceleration by that factor. (1, 0, 0) gives −K, (0, 1, 0) gives −C, (0, 0, 1) gives −M.
+        """
+        import casadi as ca
+
+        symbols, parameters, _ = self._rest
+        seeds = ca.SX.sym("seeds", 3)
+        increment = ca.SX.sym("increment", self.kind.width)
+        shares = self._evaluate(symbols, parameters, increment, seeds)
+        slope = ca.jacobian(ca.cse(shares.force + shares.inertia), increment)
+        slope = ca.substitute(slope, increment, ca.SX.zeros(self.kind.width))
+        return _kernel(f"{self.kind.name}_tangent", ca.vertcat(symbols, seeds), parameters, ca.vec(ca.densify(slope)))
+
+    @cached_property
+    def _rest(self) -> tuple[ca.SX, ca.SX, Shares]:
+        import casadi as ca
+
+        kind = self.kind
+        symbols = ca.SX.sym("z", NODE_SLOT * kind.nodes + DRIVE_SLOT * kind.drives)
+        parameters = ca.SX.sym("p", kind.parameters)
+        return symbols, parameters, self._evaluate(symbols, parameters, ca.SX(kind.width, 1), ca.SX(3, 1))
+
+    def _evaluate(self, symbols: ca.SX, parameters: ca.SX, increment: ca.SX, seeds: ca.SX) -> Shares:
+        import casadi as ca
+
+        count, freedoms = self.kind.nodes, self.kind.freedoms
+        nodes = []
+        for i in range(count):
+            d = increment[freedoms * i : freedoms * (i + 1)]
+            d = d if freedoms == 6 else ca.vertcat(d, ca.SX(3, 1))
+            nodes.append(_node_motion(symbols[NODE_SLOT * i : NODE_SLOT * (i + 1)], d, seeds))
+        slot = symbols[NODE_SLOT * count :]
+        if self.kind.drives:
+            slot = slot + ca.vertcat(seeds, 0) * increment[-1]
+        return self.kind.physics(self.effects, nodes, slot, parameters)
+
+    def _velocities(self, symbols: ca.SX) -> ca.SX:
+        """All velocity symbols, the source's rate included: zeroed to find what dissipates."""
+        import casadi as ca
+
+        count = self.kind.nodes
+        found = [symbols[NODE_SLOT * i + 12 : NODE_SLOT * i + 18] for i in range(count)]
+        return ca.vertcat(*found, *([symbols[NODE_SLOT * count + 1]] if self.kind.drives else []))
+
+    def _raw_rates(self, symbols: ca.SX) -> ca.SX:
+        import casadi as ca
+
+        count = self.kind.nodes
+        found = [symbols[NODE_SLOT * i + 12 : NODE_SLOT * i + 12 + self.kind.freedoms] for i in range(count)]
+        return ca.vertcat(*found, *([symbols[NODE_SLOT * count + 1]] if self.kind.drives else []))
+
+
+def _node_motion(slot: ca.SX, d: ca.SX, seeds: ca.SX) -> NodeMotion:
+    import casadi as ca
+
+    R = ca.reshape(slot[3:12], 3, 3).T
+    turned = R if d.is_zero() else R + ca.skew(seeds[0] * d[3:]) @ R
+    return NodeMotion(
+        slot[:3] + seeds[0] * d[:3],
+        turned,
+        slot[12:15] + seeds[1] * d[:3],
+        slot[15:18] + seeds[1] * d[3:],
+        slot[18:21] + seeds[2] * d[:3],
+        slot[21:24] + seeds[2] * d[3:],
+    )
+
+
+def _kernel(name: str, inputs: ca.SX, parameters: ca.SX, outputs: ca.SX) -> Kernel:
+    import casadi as ca
+
+    return Kernel(name, inputs, parameters, ca.cse(ca.densify(outputs)))
+
+
+@cache
+def kernels_of(kind: Kind, effects: tuple[Effect, ...]) -> Kernels:
+    """Return the kernels of a kind under some effects; equal values share them."""
+    return Kernels(kind, effects)
+
+
+def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    m = beam.beam_motion(nodes[0], nodes[1], parameters)
+    force, middle = beam.no_force(), 0.5 * (nodes[0].x + nodes[1].x)
+    for effect in effects:
+        force = force + effect.beam(m)
+    stored = sum((e.beam_energy(m, middle) for e in effects), ca.SX(1, 1))
+    return Shares(
+        beam.nodal_force(m, beam.inertial_force(m)), beam.nodal_force(m, force), beam.kinetic_energy(m), stored
+    )
+
+
+def _spring(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    m = pieces.line_motion(nodes[0], nodes[1], parameters)
+    tension = sum((e.spring(m) for e in effects), pieces.spring_tension(m))
+    return Shares(ca.SX(6, 1), pieces.line_force(m, tension), ca.SX(1, 1), pieces.spring_energy(m))
+
+
+def _rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    m = pieces.line_motion(nodes[0], nodes[1], parameters)
+    pull = sum((e.rope(m) for e in effects), ca.SX(1, 1))
+    stored = sum((e.rope_energy(m) for e in effects), ca.SX(1, 1))
+    return Shares(ca.SX(6, 1), pieces.line_force(m, pieces.unilateral(m, pull)), ca.SX(1, 1), stored)
+
+
+def _body(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    p = pieces.named(pieces.BODY_PARAMETERS, parameters)
+    force = sum((e.body(nodes[0], p) for e in effects), ca.SX(6, 1))
+    stored = sum((e.body_energy(nodes[0], p) for e in effects), ca.SX(1, 1))
+    return Shares(pieces.body_inertia(nodes[0], p), force, pieces.body_energy(nodes[0], p), stored)
+
+
+def _point(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    shares = _body(effects, nodes, slot, parameters)
+    return Shares(shares.inertia[:3], shares.force[:3], shares.kinetic, shares.stored)
+
+
+def _rotary(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    return _drive(effects, pieces.rotary_motion(nodes[0], nodes[1], slot[:3], slot[3], parameters))
+
+
+def _linear(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    return _drive(effects, pieces.linear_motion(nodes[0], nodes[1], slot[:3], parameters))
+
+
+def _drive(effects: tuple[Effect, ...], m: pieces.DriveMotion) -> Shares:
+    import casadi as ca
+
+    force = sum((e.drive(m) for e in effects), ca.SX(13, 1))
+    stored = sum((e.drive_energy(m) for e in effects), ca.SX(1, 1))
+    inertia = ca.vertcat(ca.SX(12, 1), -m.p["inertia"] * m.source_acceleration)
+    return Shares(inertia, force, 0.5 * m.p["inertia"] * m.source_rate**2, stored)
+
+
+BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam)
+SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
+ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
+POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)
+BODY = Kind("body", 1, 6, 0, len(pieces.BODY_PARAMETERS), _body)
+ROTARY_DRIVE = Kind("rotary_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _rotary)
+LINEAR_DRIVE = Kind("linear_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _linear)
