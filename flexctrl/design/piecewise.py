@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -113,6 +113,42 @@ class PiecewisePolynomial(Trajectory):
     @property
     def breaks(self) -> tuple[float, ...]:
         return self.knots
+
+    @property
+    def pieces(self) -> PiecewisePolynomial:
+        """Itself."""
+        return self
+
+    def convolved(self, amplitudes: Sequence[float], delays: Sequence[float]) -> PiecewisePolynomial:
+        """Return Σ A_i p(t − t_i), the delayed copies added up once and for all.
+
+        Parameters
+        ----------
+        amplitudes, delays : sequence of float
+            A_i, and t_i in s.
+
+        Returns
+        -------
+        PiecewisePolynomial
+        """
+        knots = distinct(knot + delay for knot in self.knots for delay in delays)
+        copies = tuple(zip(amplitudes, delays, strict=True))
+        rows = tuple(
+            tuple(sum(column) for column in zip(*(self._expanded(a, knot - delay) for a, delay in copies), strict=True))
+            for knot in knots
+        )
+        return PiecewisePolynomial(knots, rows, self.before * sum(amplitudes))
+
+    def _expanded(self, amplitude: float, instant: float) -> tuple[float, ...]:
+        """The piece at an instant, times the amplitude, in powers of the time since that instant."""
+        piece = bisect_right(self._reached, instant) - 1
+        row, s = (self.coefficients[piece], instant - self.knots[piece]) if piece >= 0 else ((self.before,), 0.0)
+        shifted = [sum(math.comb(k, m) * row[k] * s ** (k - m) for k in range(m, len(row))) for m in range(len(row))]
+        return (*(amplitude * c for c in shifted), *(0.0,) * (self._width - len(row)))
+
+    @cached_property
+    def _width(self) -> int:
+        return max(map(len, self.coefficients))
 
 
 @dataclass(frozen=True)

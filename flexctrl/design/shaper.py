@@ -144,7 +144,7 @@ class Shaper:
         return math.inf if direction > 0 else 0.0
 
     def _scan(self, omega: float, tolerance: float, direction: int) -> Iterator[np.ndarray]:
-        """Overlapping runs of frequencies, close enough that no rise above the tolerance is missed."""
+        """Overlapping runs of frequencies, so close that no rise of a twentieth above the tolerance is missed."""
         slope = max(sum(map(abs, self.amplitudes)) * self.duration, 1e-9 / omega)
         step, end = 0.1 * tolerance / slope, omega if direction < 0 else 20 * omega
         for first in np.arange(0.0, end, 1000 * step):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from flexctrl.design.piecewise import Trajectory, distinct
+from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, distinct
 from flexctrl.design.shaper import Shaper
 
 __all__ = ["CoarseGridWarning", "Shaped", "check_grid", "fir"]
@@ -36,12 +37,19 @@ class Shaped(Trajectory):
     shaper: Shaper
 
     def __call__(self, t: float) -> float:
-        base = self.trajectory
-        return sum([amplitude * base(t - delay) for amplitude, delay in self._impulses])
+        return self._value(t)
 
     @cached_property
-    def _impulses(self) -> tuple[tuple[float, float], ...]:
-        return tuple(zip(self.shaper.amplitudes, self.shaper.times, strict=True))
+    def _value(self) -> Callable[[float], float]:
+        """The delayed copies added up beforehand, where they are polynomials."""
+        pieces = getattr(self.trajectory, "pieces", None)
+        if isinstance(pieces, PiecewisePolynomial):
+            return pieces.convolved(self.shaper.amplitudes, self.shaper.times)
+        return self._copies
+
+    def _copies(self, t: float) -> float:
+        base = self.trajectory
+        return sum([a * base(t - delay) for a, delay in zip(self.shaper.amplitudes, self.shaper.times, strict=True)])
 
     @cached_property
     def derivative(self) -> Trajectory:

@@ -168,10 +168,14 @@ class OwnLinear:
         return self.law.rate(t, x, y)
 
 
-def test_sampling_any_controller_integrates_its_state():
-    stiff = pid(3.0, 2.0, 1.0, measured="angle", rate=FilteredRate(1e-4), command="torque")
-    exact, integrated = Sampled(stiff, H), Sampled(OwnLinear(as_controller(stiff)), H)
-    np.testing.assert_allclose(replay(integrated, MEASURED[:50]), replay(exact, MEASURED[:50]), rtol=1e-6, atol=1e-8)
+STIFF = pid(3.0, 2.0, 1.0, measured="angle", rate=FilteredRate(1e-4), command="torque")
+RINGING = ct.ss([[0, 1], [-4e4, -0.1]], [[0], [1]], [[1e4, 10]], 0, inputs=["angle"], outputs=["torque"])
+
+
+@pytest.mark.parametrize("controller", [STIFF, RINGING], ids=["stiff", "ringing"])
+def test_sampling_any_controller_integrates_its_state(controller):
+    exact, integrated = Sampled(controller, H), Sampled(OwnLinear(as_controller(controller)), H)
+    np.testing.assert_allclose(replay(integrated, MEASURED[:50]), replay(exact, MEASURED[:50]), rtol=1e-6, atol=1e-6)
 
 
 def test_sampling_reaches_through_wrappers():

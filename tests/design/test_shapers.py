@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from itertools import pairwise
 
 import control as ct
@@ -17,10 +18,13 @@ from flexctrl.design import (
     ControllerError,
     MinimumJerk,
     OpenLoop,
+    Ramp,
     Sampled,
     Shaped,
     Shaper,
+    Spline,
     Step,
+    Sum,
     Tracking,
     TrapezoidalVelocity,
     convolve,
@@ -131,6 +135,13 @@ def test_band_ends_where_the_residual_passes_the_tolerance(design, zeta):
     assert shaper.residual(np.linspace(low, high, 5000), zeta).max() <= tolerance * (1 + 1e-6)
 
 
+def test_a_narrow_hump_ends_the_band():
+    # EI at 5 % stands between its zeros at 0.86 and 1.14: at 4.99 % a hump 1.2 % wide lies across.
+    _, high = ei(1.0).band(0.86, tolerance=0.0499)
+    assert 0.98 < high < 1.0
+    assert ei(1.0).band(0.86, tolerance=0.0501)[1] > 1.19
+
+
 def test_band_is_empty_where_the_residual_is_too_large_and_endless_with_strong_damping():
     assert zv(1.0).band(2.0) == (2.0, 2.0)
     assert zvd(1.0, 0.8).band(1.0, 0.8)[1] == math.inf
@@ -182,14 +193,33 @@ def test_convolution_merges_impulses_and_does_not_mind_order():
     assert convolve().amplitudes == (1.0,)
 
 
-def test_shaped_is_the_sum_of_delayed_copies():
+@pytest.mark.parametrize(
+    "move",
+    [
+        MinimumJerk(2.0, 1.5, at=0.3, start=1.0),
+        Spline((0.0, 1.0, 1.5, 4.0), (1.0, -1.0, 2.0, 2.5)),
+        Ramp(0.5, at=-0.2),
+        Sum((Step(1.0, at=0.5), MinimumJerk(2.0, 1.5))),
+        Shaped(TrapezoidalVelocity(5.0, 1.0, 0.5), zv(9.0)),
+        Constant(3.0),
+    ],
+)
+def test_shaped_is_the_sum_of_delayed_copies(move):
+    shaper = zvd(4.0, 0.1)
+    shaped = Shaped(move, shaper)
+    for t in np.linspace(-1, 9, 97):
+        copies = list(zip(shaper.amplitudes, shaper.times, strict=True))
+        assert shaped(t) == pytest.approx(sum(a * move(t - d) for a, d in copies), abs=1e-14)
+        assert shaped.rate(t) == pytest.approx(sum(a * move.rate(t - d) for a, d in copies), abs=1e-13)
+
+
+def test_shaped_move_arrives_one_shaper_later():
     move, shaper = MinimumJerk(2.0, 1.5, at=0.3), zvd(4.0, 0.1)
     shaped = Shaped(move, shaper)
-    for t in np.linspace(-1, 6, 97):
-        copies = zip(shaper.amplitudes, shaper.times, strict=True)
-        assert shaped(t) == pytest.approx(sum(a * move(t - d) for a, d in copies), abs=1e-15)
-    assert shaped(0.3 + 1.5 + shaper.duration) == pytest.approx(2.0, abs=1e-12)
-    assert set(shaped.breaks) == {b + d for b in (0.3, 1.8) for d in shaper.times}
+    assert shaped(0.3 + 1.5 + shaper.duration) == pytest.approx(2.0, abs=1e-14)
+    assert shaped.breaks == pytest.approx(sorted(b + d for b in (0.3, 1.8) for d in shaper.times))
+    for path in (shaped, Shaped(Sum((move, move)), shaper)):
+        assert path(1.0) == pickle.loads(pickle.dumps(path))(1.0)
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.03])
