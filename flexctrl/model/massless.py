@@ -21,6 +21,7 @@ __all__ = ["Massless", "as_dense", "massless", "null_split", "pivots", "solved"]
 MASS_RANK = 1e-12
 STIFFNESS_RANK = 1e-13
 MASS_DUST = 1e-26
+DUST = 1e-14
 DENSE_BLOCK = 1500
 
 
@@ -67,14 +68,14 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
         velocities of others (gyroscopic), which would need the derivative of the inputs.
     """
     null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
-    own = null.T @ C @ null
+    own = _restricted(C, null)
     undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK)
     static, relaxing = null @ undamped, null @ damped
     if static.shape[1] and max(_peak(C @ static), _peak(C.T @ static)) > 1e-11 * _peak(C):
         raise LinearizationError(
             "a massless freedom without damping of its own is moved by velocities of others; give it inertia or damping"
         )
-    free, _ = null_split(static.T @ K @ static, STIFFNESS_RANK)
+    free, _ = null_split(_restricted(K, static), STIFFNESS_RANK)
     if relaxing.shape[1] and static.shape[1] and not free.shape[1]:
         relaxing = relaxing - static @ solved(static.T @ K @ static, static.T @ K @ relaxing)
     return Massless(sp.csc_matrix(static), sp.csc_matrix(relaxing), sp.csc_matrix(static @ free))
@@ -154,6 +155,13 @@ def _without_dust(M: sp.csc_matrix) -> sp.csc_matrix:
     dust = diagonal < MASS_DUST * diagonal.max(initial=0.0)
     keep = sp.diags((~dust).astype(float))
     return sp.csc_matrix(keep @ M @ keep)
+
+
+def _restricted(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
+    """Nᵀ A N without the entries that are only rounding."""
+    full = sp.csc_matrix(N.T @ A @ N)
+    size = sp.csc_matrix(abs(N).T @ abs(A) @ abs(N))
+    return sp.csc_matrix(full.multiply(abs(full) > DUST * size))
 
 
 def _peak(A: sp.spmatrix) -> float:

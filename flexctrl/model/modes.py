@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.model.basis import canonical, clusters
 from flexctrl.model.condense import Scaled, scaled, static_map
-from flexctrl.model.eigen import Eigenpairs, complete_pairs, lowest_pairs, stiffness_noise
+from flexctrl.model.eigen import EPS, Eigenpairs, complete_pairs, lowest_pairs, stiffness_noise
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.massless import STIFFNESS_RANK, null_split
 
@@ -268,7 +268,9 @@ def _settled_basis(base: Scaled, K: sp.csc_matrix, pairs: Eigenpairs) -> Eigenpa
         values[group] = values[group].mean()
     damping = pairs.shapes.T @ (base.model.C @ pairs.shapes)
     weight = np.sqrt(np.abs(base.model.M.diagonal()))
-    return Eigenpairs(values, canonical(pairs.shapes, weight, damping, groups), pairs.rigid)
+    shapes = canonical(pairs.shapes, weight, damping, groups)
+    dust = np.abs(shapes) < 8.0 * EPS * np.abs(shapes).max(axis=0, initial=0.0)
+    return Eigenpairs(values, np.where(dust & pairs.rigid, 0.0, shapes), pairs.rigid)
 
 
 def _described(linear: LinearModel, base: Scaled, pairs: Eigenpairs, count: int) -> Modes:

@@ -1,0 +1,229 @@
+"""Evaluate H(s) = D + (Cq + s Cv) (s² M + s C + K)⁻¹ B at many s, by the cheapest accurate route."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+
+from flexctrl.errors import LinearizationError
+from flexctrl.model.condense import Scaled, scaled
+from flexctrl.model.eigen import shifted
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.modal import ModalSystem, rayleigh
+from flexctrl.model.modes import COMPLETE, Modes, modes_of
+
+__all__ = ["Transfer", "direct_transfer", "modal_transfer", "residual_transfer", "transfer"]
+
+Transfer = Callable[[np.ndarray], np.ndarray]
+"""s, shape (N,), 1/s ↦ H, shape (n_outputs, n_inputs, N)."""
+
+MOST_MODES = 400
+
+
+def transfer(linear: LinearModel, top: float) -> Transfer:
+    """The evaluator that suits the model.
+
+    Up to 1000 freedoms with classical damping: poles and residues of all modes. Larger ones with Rayleigh or
+    no damping: the modes up to twice `top`, and the others by a power series that converges at least as 4⁻ʲ.
+    Everything else: one sparse factorisation for each s.
+
+    Parameters
+    ----------
+    linear : LinearModel
+    top : float
+        Largest |s| that will be asked for, rad/s.
+
+    Returns
+    -------
+    callable
+        s of shape (N,) to H of shape (n_outputs, n_inputs, N).
+    """
+    if len(linear.coordinates) <= COMPLETE:
+        system = linear._modal
+        return modal_transfer(system) if system.classical else direct_transfer(scaled(linear))
+    base = scaled(linear)
+    fit = rayleigh(base.model)
+    if fit is None:
+        return direct_transfer(base)
+    count = _modes_below(base, (2.0 * top) ** 2)
+    if count > MOST_MODES:
+        return direct_transfer(base)
+    return residual_transfer(base, modes_of(linear, base, count + 2), fit, top)
+
+
+def modal_transfer(system: ModalSystem) -> Transfer:
+    """Sum over poles and residues of a classically damped model.
+
+    Parameters
+    ----------
+    system : ModalSystem
+        Classical.
+
+    Returns
+    -------
+    callable
+    """
+    modes, relax = system.modes, system.relaxation
+    series = _ModalSum(modes, np.diag(system.damping))
+    still = _outer(relax.output, relax.input)
+    moving = _outer(relax.output_rate, relax.input)
+    shape = system.feedthrough.shape
+
+    def evaluate(s: np.ndarray) -> np.ndarray:
+        s = np.asarray(s, dtype=complex)
+        flat = series(s)
+        if relax.rates.size:
+            flat += _divided(still, moving, s, s[:, None] + relax.rates, "a creeping freedom")
+        H = flat.T.reshape(*shape, s.size)
+        return H + system.feedthrough[:, :, None] + system.jump[:, :, None] * s
+
+    return evaluate
+
+
+def direct_transfer(base: Scaled) -> Transfer:
+    """One sparse LU with a step of refinement for each s.
+
+    Parameters
+    ----------
+    base : Scaled
+
+    Returns
+    -------
+    callable
+    """
+    model = base.model
+    M, C, K = (sp.csc_matrix(A, dtype=complex) for A in (model.M, model.C, model.K))
+    B = model.B.astype(complex)
+
+    def one(s: complex) -> np.ndarray:
+        A = sp.csc_matrix(K + s * C + s * s * M)
+        try:
+            lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1)
+        except RuntimeError as error:
+            raise _infinite(s, "the model") from error
+        x = lu.solve(B)
+        x += lu.solve(B - A @ x)
+        return np.asarray(model.D + (model.Cq + s * model.Cv) @ x)
+
+    def evaluate(s: np.ndarray) -> np.ndarray:
+        values = [one(complex(value)) for value in np.asarray(s)]
+        return np.stack(values, axis=-1) if values else np.zeros((*model.D.shape, 0), dtype=complex)
+
+    return evaluate
+
+
+def residual_transfer(base: Scaled, modes: Modes, fit: tuple[float, float], top: float) -> Transfer:
+    """Some modes, and the rest of a Rayleigh-damped model as a power series.
+
+    With C = α M + β K, s² M + s C + K = (1 + β s)(K - μ M), μ = -(s² + α s)/(1 + β s). Deflated by the modes
+    kept, (K - μ M)⁻¹ B = Σ (μ - σ)ʲ x_j with x_j = (K - σ M)⁻¹ M x_(j-1), converging as (|μ - σ|/λ_next)ʲ.
+
+    Parameters
+    ----------
+    base : Scaled
+    modes : Modes
+        The lowest of the same model, past twice `top`.
+    fit : tuple of two floats
+        α and β.
+    top : float
+        Largest |s|, rad/s.
+
+    Returns
+    -------
+    callable
+    """
+    alpha, beta = fit
+    model, phi = base.model, modes.shapes / base.scales[:, None]
+    series = _ModalSum(modes, alpha + beta * modes.omega_squared)
+    sigma = -max(0.01 * top**2, 1e-3 * float(np.abs(modes.omega_squared).max(initial=1.0)))
+    pencil = shifted(model.K, model.M, sigma)
+    MPhi = model.M @ phi
+    x = pencil.solve(model.B - MPhi @ (phi.T @ model.B))
+    still, moving = [], []
+    for _ in range(_terms(top, sigma, modes)):
+        x = x - phi @ (MPhi.T @ x)
+        still.append((model.Cq @ x).ravel())
+        moving.append((model.Cv @ x).ravel())
+        x = pencil.iterate(x)
+    powers = np.array(still), np.array(moving)
+
+    def evaluate(s: np.ndarray) -> np.ndarray:
+        s = np.asarray(s, dtype=complex)
+        _check_top(s, top)
+        scale = 1.0 + beta * s
+        mu = -(s * s + alpha * s) / scale
+        rest = [_horner(terms, mu - sigma) / scale[:, None] for terms in powers]
+        flat = series(s) + rest[0] + s[:, None] * rest[1]
+        return flat.T.reshape(*model.D.shape, s.size) + model.D[:, :, None]
+
+    return evaluate
+
+
+class _ModalSum:
+    """Σ (c0 + s c1) b / (s² + d s + λ), as one matrix product."""
+
+    def __init__(self, modes: Modes, damping: np.ndarray) -> None:
+        self.values, self.damping, self.omega = modes.omega_squared, damping, modes.omega
+        self.still = _outer(modes.output_gain, modes.input_gain)
+        self.moving = _outer(modes.output_rate_gain, modes.input_gain)
+        self.kinds = modes.kinds
+
+    def __call__(self, s: np.ndarray) -> np.ndarray:
+        """Shape (N, n_outputs · n_inputs)."""
+        s = s[:, None]
+        # (s - iω)(s + iω) keeps the difference to a near pole that s² + ω² would lose
+        turning = np.where(self.values > 0, (s - 1j * self.omega) * (s + 1j * self.omega), s * s + self.values)
+        return _divided(self.still, self.moving, s[:, 0], turning + self.damping * s, "a mode")
+
+
+def _divided(still: np.ndarray, moving: np.ndarray, s: np.ndarray, below: np.ndarray, who: str) -> np.ndarray:
+    """Σ_k (still_k + s moving_k) / below_k; a pole without residue counts nothing, another is an error."""
+    hit = below == 0
+    if hit.any():
+        where, mode = np.argwhere(hit).T
+        residue = np.abs(still[mode]).max(axis=1) + np.abs(s[where] * moving[mode].max(axis=1, initial=0.0))
+        if residue.any():
+            raise _infinite(complex(s[where[int(np.argmax(residue))]]), who)
+        below = np.where(hit, 1.0, below)
+    inverse = 1.0 / below
+    result = inverse @ still
+    return result + (s[:, None] * inverse) @ moving if moving.any() else result
+
+
+def _outer(output: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """c_k b_k for every pair of signals, shape (k, n_outputs · n_inputs)."""
+    return np.einsum("pk,km->kpm", output, gain).reshape(gain.shape[0], output.shape[0] * gain.shape[1])
+
+
+def _horner(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
+    total = np.zeros((x.size, terms.shape[1]), dtype=complex)
+    for term in terms[::-1]:
+        total = total * x[:, None] + term
+    return total
+
+
+def _terms(top: float, sigma: float, modes: Modes) -> int:
+    """Terms until the ratio of convergence, to that power, is rounding."""
+    ratio = (top**2 - sigma) / (float(modes.omega_squared[-1]) - sigma)
+    return int(np.clip(np.ceil(np.log(1e-15) / np.log(min(ratio, 0.6))), 4, 70))
+
+
+def _modes_below(base: Scaled, value: float) -> int:
+    """Sturm count of λ < value; a large number where the factors do not tell."""
+    below = shifted(base.model.K, base.model.M, value).below
+    return MOST_MODES + 1 if below < 0 else below
+
+
+def _check_top(s: np.ndarray, top: float) -> None:
+    if s.size and np.abs(s).max() > 1.0001 * top:
+        raise LinearizationError(f"this evaluator holds up to |s| = {top:.6g} rad/s; ask transfer() for more")
+
+
+def _infinite(s: complex, who: str) -> LinearizationError:
+    return LinearizationError(
+        f"the response at s = {s:.6g} is infinite: {who} has an undamped pole there; leave that frequency out"
+        + (" (an integrator: start above 0)" if s == 0 else " or give damping")
+    )
