@@ -1,0 +1,279 @@
+"""One step of the generalised-alpha method on the rotation group.
+
+Chung & Hulbert (1993) in the Lie group form of Brüls, Cardona & Arnold (2012): increments of rotation
+are rotation vectors in space axes. Stiffly accurate enough for structures: second order, unconditionally
+stable, with the high frequencies damped down to the spectral radius ρ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.errors import StructureError
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+from flexctrl.model.solve import SingularMatrixError, Solve, factorise
+
+_TURNED = 0.02
+_POOR = 0.25
+_ITERATIONS = 12
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Constants of the method for a spectral radius at infinity."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    @classmethod
+    def of(cls, rho: float) -> Coefficients:
+        """Return the optimal set for 0 ≤ ρ ≤ 1."""
+        alpha_m, alpha_f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+        gamma = 0.5 + alpha_f - alpha_m
+        return cls(alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A state with its accelerations: the true ones and the method's own; and what feeds it."""
+
+    state: State
+    rate: np.ndarray
+    algorithmic: np.ndarray
+    supply: Supply
+
+
+@dataclass
+class Counts:
+    """What the steps cost."""
+
+    newton: int = 0
+    factorisations: int = 0
+    worst: int = 0
+
+
+class StepError(ArithmeticError):
+    """A step that did not converge; ``worst`` is its worst degree of freedom."""
+
+    def __init__(self, worst: int, reason: str) -> None:
+        super().__init__(reason)
+        self.worst = worst
+
+
+@dataclass
+class Stepper:
+    """Steps of one model; keeps a factorised tangent while it is good.
+
+    Attributes
+    ----------
+    model : Model
+    feed : Feed
+        Where the inputs come from.
+    coefficients : Coefficients
+    tolerance : float
+        Size of the last Newton correction [rad, and m over the size of the machine].
+    """
+
+    model: Model
+    feed: Feed
+    coefficients: Coefficients
+    tolerance: float
+    counts: Counts = field(default_factory=Counts)
+    _solve: Solve | None = None
+    _made_for: float = 0.0
+    _made_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        names = self.model.coordinates
+        self._turning = np.array([not n.endswith(("_u", "_v", "_w", "_slide", "_source")) for n in names], dtype=bool)
+        sources = np.array([n.endswith("_source") for n in names], dtype=bool)
+        self._weight = np.where(self._turning | sources, 1.0, 1.0 / self.model.structure.size)
+
+    def start(self, state: State, supply: Supply, step: float) -> Point:
+        """Return a state with the accelerations it has under its inputs.
+
+        Raises
+        ------
+        SingularMatrixError
+            If a freedom has neither mass nor stiffness.
+        """
+        zero = np.zeros(self.model.n)
+        force = self.model.balance(state, state.v, zero) + self.model.loads(state, supply.u)
+        rate = self._mass(state, supply, step)(force)
+        return Point(state, rate, rate, supply)
+
+    def _mass(self, state: State, supply: Supply, step: float) -> Solve:
+        """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
+        c, zero = self.coefficients, np.zeros(self.model.n)
+        M = -self.model.slope(state, state.v, zero, (0.0, 0.0, 1.0), supply.u)
+        smallest = M.diagonal().min(initial=np.inf)
+        if smallest > 1e-14 * M.diagonal().max(initial=0.0):
+            try:
+                return factorise(M)
+            except SingularMatrixError:
+                pass
+        seeds = (c.beta * step**2, c.gamma * step, 1.0)
+        return factorise(-self.model.slope(state, state.v, zero, seeds, supply.u))
+
+    def step(self, point: Point, h: float) -> Point:
+        """Return the point a step later.
+
+        Raises
+        ------
+        StepError
+            If Newton's method does not converge, even with a fresh tangent.
+        """
+        try:
+            return self._attempt(point, h, fresh=False)
+        except StepError:
+            return self._attempt(point, h, fresh=True)
+
+    def _attempt(self, point: Point, h: float, fresh: bool) -> Point:
+        c, now = self.coefficients, point.state
+        to_v = c.gamma / (h * c.beta)
+        to_rate = (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
+        rate = point.rate
+        algorithmic = ((1.0 - c.alpha_f) * rate + c.alpha_f * point.rate - c.alpha_m * point.algorithmic) / (
+            1.0 - c.alpha_m
+        )
+        step = h * now.v + h * h * ((0.5 - c.beta) * point.algorithmic + c.beta * algorithmic)
+        v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
+        last, contraction = np.inf, 1.0
+        for iteration in range(_ITERATIONS):
+            state = self.model.advance(now, step, v, now.t + h)
+            supply = self.feed.at(state, point.supply, h)
+            force = self.model.balance(state, v, rate) + self.model.loads(state, supply.u)
+            refresh = self._stale(state, h) if iteration == 0 else contraction > _POOR
+            if refresh or fresh:
+                self._factor(state, v, rate, (1.0, to_v, to_rate), supply, h)
+                last = np.inf
+            assert self._solve is not None
+            correction = self._solve(force)
+            size, worst = self._size(correction)
+            self.counts.newton += 1
+            step, v, rate = step + correction, v + to_v * correction, rate + to_rate * correction
+            contraction = size / last if np.isfinite(last) else (0.1 if refresh or fresh else 0.5)
+            if size <= self.tolerance or (np.isfinite(last) and size * min(contraction, 1.0) <= 0.5 * self.tolerance):
+                return self._finish(point, h, step, v, rate, worst)
+            if not np.isfinite(size) or (np.isfinite(last) and contraction > 2.0 and iteration > 3):
+                break
+            last = size
+        raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
+
+    def _finish(self, point: Point, h: float, step: np.ndarray, v: np.ndarray, rate: np.ndarray, worst: int) -> Point:
+        c = self.coefficients
+        self.counts.worst = worst
+        state = self.model.advance(point.state, step, v, point.state.t + h)
+        algorithmic = ((1.0 - c.alpha_f) * rate + c.alpha_f * point.rate - c.alpha_m * point.algorithmic) / (
+            1.0 - c.alpha_m
+        )
+        return Point(state, rate, algorithmic, self.feed.at(state, point.supply, h))
+
+    def _stale(self, state: State, h: float) -> bool:
+        if self._solve is None or abs(h - self._made_for) > 1e-6 * h:
+            return True
+        turned = np.abs(state.q - self._made_at)[self._turning]
+        return bool(turned.size) and float(turned.max()) > _TURNED
+
+    def _factor(
+        self,
+        state: State,
+        v: np.ndarray,
+        rate: np.ndarray,
+        seeds: tuple[float, float, float],
+        supply: Supply,
+        h: float,
+    ) -> None:
+        slope = -self.model.slope(state, v, rate, seeds, supply.u)
+        try:
+            self._solve = factorise(slope - self.feed.slope(state, supply, h, seeds))
+        except SingularMatrixError as error:
+            raise StepError(error.where, "the tangent is singular") from error
+        self.counts.factorisations += 1
+        self._made_for, self._made_at = h, state.q
+
+    def _size(self, correction: np.ndarray) -> tuple[float, int]:
+        if not correction.size:
+            return 0.0, 0
+        sizes = np.abs(correction) * self._weight
+        worst = int(np.argmax(sizes)) if np.isfinite(sizes).all() else int(np.argmax(~np.isfinite(sizes)))
+        return float(sizes[worst]), worst
+
+    def error(self, before: Point, after: Point, moved: np.ndarray, relative: float, absolute: float) -> float:
+        """Return the local error of a step over what is allowed: |β − 1/6| h² |Δa| (Zienkiewicz & Xie 1991)."""
+        h = after.state.t - before.state.t
+        c = self.coefficients
+        local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self._weight
+        allowed = absolute + relative * float((moved * self._weight).max(initial=0.0))
+        return float(local.max(initial=0.0)) / allowed
+
+
+@dataclass(frozen=True)
+class GeneralizedAlpha:
+    """Generalised alpha with a fixed step; second order.
+
+    Parameters
+    ----------
+    step : float
+        Step [s]; shortened a little so that a whole number of steps ends at each sample instant.
+    rho : float
+        Spectral radius at infinite frequency, 0 … 1: 1 keeps all energy, 0 kills the highest frequencies at once.
+
+    Raises
+    ------
+    StructureError
+        For a step that is not positive or ρ outside 0 … 1.
+    """
+
+    step: float
+    rho: float = 0.9
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.step) and self.step > 0.0):
+            raise StructureError(f"GeneralizedAlpha: step = {self.step}; expected seconds > 0")
+        _check_rho(self.rho)
+
+
+@dataclass(frozen=True)
+class AdaptiveAlpha:
+    """Generalised alpha with steps chosen from the estimated error, tried again where it is too large.
+
+    Parameters
+    ----------
+    rho : float
+        Spectral radius at infinite frequency, 0 … 1.
+    first_step : float
+        [s]
+    largest_step : float
+        [s]
+
+    Raises
+    ------
+    StructureError
+        For a value out of range.
+    """
+
+    rho: float = 0.8
+    first_step: float = 1e-4
+    largest_step: float = np.inf
+
+    def __post_init__(self) -> None:
+        _check_rho(self.rho)
+        if not (self.first_step > 0.0 and self.largest_step > 0.0):
+            raise StructureError("AdaptiveAlpha: first_step and largest_step are seconds > 0")
+
+
+def _check_rho(rho: float) -> None:
+    if not 0.0 <= rho <= 1.0:
+        raise StructureError(f"generalised alpha: rho = {rho}; expected 0 … 1 (0.9 damps only the highest frequencies)")
+
+
+Integrator = GeneralizedAlpha | AdaptiveAlpha
+
+__all__ = ["AdaptiveAlpha", "Coefficients", "GeneralizedAlpha", "Integrator", "Point", "StepError", "Stepper"]

@@ -1,0 +1,169 @@
+"""Where a model's inputs come from: nothing, a sampled controller held between instants, or a continuous one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.design.controller import Controller, as_controller
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+_SMALL = 1e-7
+
+
+@dataclass(frozen=True)
+class Supply:
+    """Inputs at an instant: u, the controller's state, and how fast that changes."""
+
+    u: np.ndarray
+    x: np.ndarray
+    rate: np.ndarray
+
+
+@dataclass(frozen=True)
+class Feed:
+    """A controller on a model; without one the inputs stay as they are.
+
+    Attributes
+    ----------
+    model : Model
+    base : numpy.ndarray, shape (inputs,)
+        Constant inputs under the controller's.
+    controller : Controller or None
+    """
+
+    model: Model
+    base: np.ndarray
+    controller: Controller | None
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds between samples; 0 if nothing is sampled."""
+        return self.controller.sample_time if self.controller is not None else 0.0
+
+    @property
+    def continuous(self) -> bool:
+        """Whether the inputs change between breaks."""
+        return self.controller is not None and self.controller.sample_time == 0.0
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Instants at which a continuous command jumps."""
+        return tuple(getattr(self.controller, "breaks", ())) if self.continuous else ()
+
+    @cached_property
+    def _reads(self) -> np.ndarray:
+        assert self.controller is not None
+        return np.array([self.model.outputs.index(name) for name in self.controller.inputs], dtype=int)
+
+    @cached_property
+    def _writes(self) -> np.ndarray:
+        assert self.controller is not None
+        return np.array([self.model.inputs.index(name) for name in self.controller.outputs], dtype=int)
+
+    def measured(self, state: State) -> np.ndarray:
+        """What the controller reads of a state."""
+        return self.model.measure(state)[self._reads] if self._reads.size else np.zeros(0)
+
+    def first(self, state: State) -> Supply:
+        """Return the inputs at the start."""
+        if self.controller is None:
+            return Supply(self.base, np.zeros(0), np.zeros(0))
+        x = np.asarray(self.controller.initial(), dtype=float)
+        return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self._command(state, x)
+
+    def sample(self, state: State, supply: Supply) -> Supply:
+        """Return the inputs from a sample instant on."""
+        assert self.controller is not None
+        y = self.measured(state)
+        u = self._total(self.controller.command(state.t, supply.x, y))
+        x = np.asarray(self.controller.update(state.t, supply.x, y), dtype=float) if supply.x.size else supply.x
+        return Supply(u, x, supply.rate)
+
+    def restart(self, state: State, supply: Supply) -> Supply:
+        """Return the inputs after a break of a continuous command."""
+        return self._command(state, supply.x) if self.continuous else supply
+
+    def _command(self, state: State, x: np.ndarray) -> Supply:
+        assert self.controller is not None
+        y = self.measured(state)
+        rate = np.asarray(self.controller.rate(state.t, x, y), dtype=float) if x.size else x
+        return Supply(self._total(self.controller.command(state.t, x, y)), x, rate)
+
+    def _total(self, command: Any) -> np.ndarray:
+        u = self.base.copy()
+        u[self._writes] += np.asarray(command, dtype=float).reshape(-1)
+        return u
+
+    def at(self, state: State, before: Supply, h: float) -> Supply:
+        """Return the inputs at the end of a step of length h; the controller's state follows the trapezoidal rule."""
+        if not self.continuous:
+            return before
+        return self._answer(state.t, self.measured(state), before, h)
+
+    def _answer(self, t: float, y: np.ndarray, before: Supply, h: float) -> Supply:
+        c = self.controller
+        assert c is not None
+        if not before.x.size:
+            return Supply(self._total(c.command(t, before.x, y)), before.x, before.x)
+        x = _trapezoidal(c, t, y, before, h)
+        return Supply(self._total(c.command(t, x, y)), x, np.asarray(c.rate(t, x, y), dtype=float))
+
+    def slope(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> sp.csr_matrix:
+        """Return ∂(generalised forces of the inputs)/∂(own motion) through a continuous controller."""
+        n = self.model.n
+        if not self.continuous or not self._reads.size:
+            return sp.csr_matrix((n, n))
+        rates = self.model.rates(state)
+        on_place, on_rates = self.model.signals.slopes(state, rates, self.model.motion.raw)
+        T = self.model.motion.jacobian(state)[: self.model.motion.raw]
+        C = (seeds[0] * on_place + seeds[1] * on_rates)[self._reads] @ T
+        gain = sp.csr_matrix(self._gain(state, supply, h))
+        return (T.T @ self.model.signals.loads @ gain @ C).tocsr()
+
+    def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:
+        """∂u/∂y over a step, by central differences of the controller itself."""
+        y = self.measured(state)
+        gain = np.zeros((len(self.base), len(y)))
+        for i in range(len(y)):
+            d = np.zeros(len(y))
+            d[i] = _SMALL * max(1.0, abs(y[i]))
+            up, down = (self._answer(state.t, y + s * d, supply, h).u for s in (1.0, -1.0))
+            gain[:, i] = (up - down) / (2.0 * d[i])
+        return gain
+
+
+def _trapezoidal(c: Controller, t: float, y: np.ndarray, before: Supply, h: float) -> np.ndarray:
+    """Solve x = x₀ + h/2 (ẋ₀ + f(t, x, y)) by Newton's method."""
+    x = before.x + h * before.rate
+    for _ in range(10):
+        f = np.asarray(c.rate(t, x, y), dtype=float)
+        gap = x - before.x - 0.5 * h * (before.rate + f)
+        J = np.empty((x.size, x.size))
+        for i in range(x.size):
+            d = np.zeros(x.size)
+            d[i] = _SMALL * max(1.0, abs(x[i]))
+            J[:, i] = (np.asarray(c.rate(t, x + d, y), dtype=float) - f) / d[i]
+        step = np.linalg.solve(np.eye(x.size) - 0.5 * h * J, gap)
+        x = x - step
+        if np.abs(step).max() <= 1e-12 * (1.0 + np.abs(x).max()):
+            break
+    return x
+
+
+def feed_of(model: Model, controller: Any, inputs: np.ndarray) -> Feed:
+    """Return the feed of a controller, or of constant inputs if there is none.
+
+    Raises
+    ------
+    ControllerError
+        If the controller's names are not the model's.
+    """
+    if controller is None:
+        return Feed(model, inputs, None)
+    return Feed(model, inputs, as_controller(controller, model.inputs, model.outputs))
