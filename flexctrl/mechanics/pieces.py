@@ -125,6 +125,10 @@ def body_energy(node: NodeMotion, p: dict[str, ca.SX]) -> ca.SX:
 def rotary_motion(node: NodeMotion, base: NodeMotion, source: ca.SX, turns: ca.SX, parameters: ca.SX) -> DriveMotion:
     """Return the motion of a rotary drive.
 
+    The angle is the twist about the axis that is left of the relative rotation when the tilt of the
+    axis, from a as the base carries it to b as the node does, is undone; its rate is
+    (a + b)/(1 + a·b) · (ω − ω_base), which is a · (ω − ω_base) across a hinge.
+
     Parameters
     ----------
     node, base : NodeMotion
@@ -140,12 +144,14 @@ def rotary_motion(node: NodeMotion, base: NodeMotion, source: ca.SX, turns: ca.S
 
     p = named(DRIVE_PARAMETERS, parameters)
     rest = ca.vertcat(p["axis_x"], p["axis_y"], p["axis_z"])
-    axis = base.R @ rest
+    a, b = base.R @ rest, node.R @ rest
     Q = base.R.T @ node.R
     sine = 0.5 * ca.dot(ca.vertcat(Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]), rest)
-    angle = ca.atan2(sine, 0.5 * (Q[0, 0] + Q[1, 1] + Q[2, 2] - 1.0)) + 2.0 * ca.pi * turns
-    gradient = ca.vertcat(ca.SX(3, 1), axis, ca.SX(3, 1), -axis)
-    return DriveMotion(p, angle, ca.dot(axis, node.w - base.w), source[0], source[1], source[2], gradient)
+    tilt = ca.dot(a, b)
+    angle = ca.atan2(sine, 0.5 * (Q[0, 0] + Q[1, 1] + Q[2, 2] - tilt)) + 2.0 * ca.pi * turns
+    along = (a + b) / (1.0 + tilt)
+    gradient = ca.vertcat(ca.SX(3, 1), along, ca.SX(3, 1), -along)
+    return DriveMotion(p, angle, ca.dot(along, node.w - base.w), source[0], source[1], source[2], gradient)
 
 
 def linear_motion(node: NodeMotion, base: NodeMotion, source: ca.SX, parameters: ca.SX) -> DriveMotion:

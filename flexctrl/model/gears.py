@@ -15,7 +15,7 @@ from flexctrl.structure.structure import Structure
 
 @dataclass(frozen=True)
 class Gears:
-    """All drives of a machine; ``a`` is a drive's axis as its base carries it.
+    """All drives of a machine; ``a`` is a drive's axis as its base carries it, ``b`` as its node does.
 
     Attributes
     ----------
@@ -46,13 +46,19 @@ class Gears:
     def _axes(self, R: np.ndarray) -> np.ndarray:
         return np.einsum("kij,kj->ki", R[self.base], self.axis)
 
+    def _mean_axes(self, R: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return a, b and 1 + a·b: the angle's rate is (a + b)/(1 + a·b) · (ω − ω_base)."""
+        a, b = self._axes(R), np.einsum("kij,kj->ki", R[self.node], self.axis)
+        return a, b, 1.0 + np.einsum("ki,ki->k", a, b)[:, None]
+
     def driven(self, pose: Pose) -> np.ndarray:
-        """Driven coordinates: angles between −π and π, travels in m."""
+        """Driven coordinates: angles between −π and π (see `rotary_motion`), travels in m."""
         x, R = pose.x, pose.R
+        tilt = self._mean_axes(R)[2][:, 0] - 1.0
         Q = np.swapaxes(R[self.base], 1, 2) @ R[self.node]
         axial = np.stack([Q[:, 2, 1] - Q[:, 1, 2], Q[:, 0, 2] - Q[:, 2, 0], Q[:, 1, 0] - Q[:, 0, 1]], axis=1)
         sine = 0.5 * np.einsum("ki,ki->k", axial, self.axis)
-        angle = np.arctan2(sine, 0.5 * (np.trace(Q, axis1=1, axis2=2) - 1.0))
+        angle = np.arctan2(sine, 0.5 * (np.trace(Q, axis1=1, axis2=2) - tilt))
         travel = np.einsum("ki,ki->k", self._axes(R), x[self.node] - x[self.base])
         return np.where(self.rotary, angle, travel - np.einsum("ki,ki->k", self.axis, self.arm))
 
@@ -64,9 +70,9 @@ class Gears:
 
     def gradient(self, pose: Pose) -> np.ndarray:
         """∂s/∂(raw motion of node, then of base), shape (drives, 12)."""
-        a = self._axes(pose.R)
-        turning = cross(a, pose.x[self.node] - pose.x[self.base])
-        rotary = np.hstack([0 * a, a, 0 * a, -a])
+        a, b, both = self._mean_axes(pose.R)
+        turning, along = cross(a, pose.x[self.node] - pose.x[self.base]), (a + b) / both
+        rotary = np.hstack([0 * a, along, 0 * a, -along])
         return np.where(self.rotary[:, None], rotary, np.hstack([a, 0 * a, -a, turning]))
 
     def rates(self, pose: Pose, V: np.ndarray) -> np.ndarray:
@@ -76,13 +82,15 @@ class Gears:
 
     def accelerations(self, pose: Pose, A: np.ndarray, V: np.ndarray) -> np.ndarray:
         """Return R s̈."""
-        a, w = self._axes(pose.R), V[self.base, 3:]
-        turning = cross(w, a)
+        (a, b, one), w = self._mean_axes(pose.R), V[self.base, 3:]
+        turning, spin = cross(w, a), V[self.node, 3:] - w
+        closing = np.einsum("ki,ki->k", spin, cross(b, a))[:, None]
+        along = (turning + cross(V[self.node, 3:], b) - (a + b) * closing / one) / one
         arm, moving = pose.x[self.node] - pose.x[self.base], V[self.node, :3] - V[self.base, :3]
         both = np.hstack([A[self.node], A[self.base]])
         extra = np.where(
             self.rotary,
-            np.einsum("ki,ki->k", turning, V[self.node, 3:] - w),
+            np.einsum("ki,ki->k", along, spin),
             np.einsum("ki,ki->k", 2.0 * turning, moving) + np.einsum("ki,ki->k", cross(turning, arm), w),
         )
         return self.ratio * (np.einsum("ki,ki->k", self.gradient(pose), both) + extra)
@@ -100,14 +108,17 @@ class Gears:
         out.add(source_base + k[:, None], columns, (self.ratio[:, None] * self.gradient(pose))[k][:, None, :])
 
     def stiffen(self, pose: Pose, torque: np.ndarray, out: Blocks) -> None:
-        """Add the change of `collect`'s result with the base's turning: δa = δθ × a."""
+        """Add the change of `collect`'s result with the turning of both sides: δa = δθ_base × a, δb = δθ × b."""
         t = (self.ratio * np.where(self.rigid, torque, 0.0))[:, None, None]
-        a = self._axes(pose.R)
+        a, b, one = self._mean_axes(pose.R)
         arm = pose.x[self.node] - pose.x[self.base]
         turn, spin = t * skew_arrays(a), _cells(self.base)[:, 3:]
         r, s = self.rotary[:, None, None], ~self.rotary[:, None, None]
-        out.add(_cells(self.node)[:, 3:], spin, -turn * r)
-        out.add(_cells(self.base)[:, 3:], spin, turn * r)
+        closing = (a + b)[:, :, None] * (cross(b, a) / one)[:, None, :]
+        for side, axis, sign in ((self.node, b, 1.0), (self.base, a, -1.0)):
+            change = t * (-skew_arrays(axis) - sign * closing) / one[:, :, None] * r
+            out.add(_cells(self.node)[:, 3:], _cells(side)[:, 3:], change)
+            out.add(_cells(self.base)[:, 3:], _cells(side)[:, 3:], -change)
         out.add(_cells(self.node)[:, :3], spin, -turn * s)
         out.add(_cells(self.base)[:, :3], spin, turn * s)
         out.add(_cells(self.base)[:, 3:], spin, skew_arrays(arm) @ turn * s)

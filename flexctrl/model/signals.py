@@ -197,20 +197,15 @@ def _rotation(s: Structure, motion: Motion, output: Rotation) -> Measure:
     turning = axis @ (T[6 * at + 3 : 6 * at + 6] - T[6 * base + 3 : 6 * base + 6]).toarray()
     cells = np.concatenate([6 * at + 3 + np.arange(3), 6 * base + 3 + np.arange(3)])
 
-    def twist(state: State) -> tuple[np.ndarray, np.ndarray, float, float]:
-        Q = state.R[base].T @ state.R[at]
-        axial = 0.5 * np.array([Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]])
-        return Q, axial, float(axial @ axis), 0.5 * (float(np.trace(Q)) - 1.0)
-
     def value(state: State, rates: np.ndarray) -> float:
-        _, _, sine, cosine = twist(state)
-        angle = float(np.arctan2(sine, cosine))
+        Q = state.R[base].T @ state.R[at]
+        axial = np.array([Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]])
+        angle = float(np.arctan2(axial @ axis, np.trace(Q) - axis @ Q @ axis))
         return angle + 2.0 * np.pi * float(np.round((turning @ state.q - angle) / (2.0 * np.pi)))
 
     def slope(state: State, rates: np.ndarray) -> tuple:
-        Q, axial, sine, cosine = twist(state)
-        on_sine = 0.5 * (np.trace(Q) * np.eye(3) - Q).T @ axis
-        g = state.R[base] @ ((cosine * on_sine + sine * axial) / (sine**2 + cosine**2))
+        a, b = state.R[base] @ axis, state.R[at] @ axis
+        g = (a + b) / (1.0 + a @ b)
         return (cells, np.concatenate([g, -g]), *_none)
 
     return Measure(value, slope)
