@@ -30,6 +30,28 @@ _HOMES = {
     ),
     "flexctrl.structure.join_table": ("JoinTable",),
     "flexctrl.structure.structure": ("Structure", "planar"),
+    "flexctrl.effects.gravity": ("Gravity",),
+    "flexctrl.effects.flexibility": ("BeamFlexibility", "Flexible", "RopeStretch", "ShaftElasticity"),
+    "flexctrl.effects.large_rotation": ("LargeRotation",),
+    "flexctrl.effects.damping": ("ModalDamping", "RayleighDamping"),
+    "flexctrl.mechanics.kernel": ("CasadiVM", "Compiled"),
+    "flexctrl.model.assemble": ("assemble", "rigid"),
+    "flexctrl.model.model": ("Model",),
+    "flexctrl.model.motion": ("State",),
+    "flexctrl.model.equilibrium": ("Rest", "equilibrium"),
+    "flexctrl.model.linearize": ("linearize",),
+    "flexctrl.model.linear": ("LinearModel",),
+    "flexctrl.model.reduction": (
+        "BalancedTruncation",
+        "CraigBampton",
+        "ModalTruncation",
+        "MomentMatching",
+        "RelativeError",
+    ),
+    "flexctrl.dynamics.alpha": ("AdaptiveAlpha", "GeneralizedAlpha"),
+    "flexctrl.dynamics.run": ("Report", "Run", "Status", "Tolerance"),
+    "flexctrl.dynamics.simulate": ("simulate",),
+    "flexctrl.design": ("Delayed", "Noisy", "OpenLoop", "Quantised", "RateLimited", "Sampled", "Saturated", "Tracking"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -42,7 +64,7 @@ def __getattr__(name: str) -> Any:
         value = getattr(importlib.import_module(_HOME[name]), name)
         globals()[name] = value
         return value
-    if importlib.util.find_spec(f"flexctrl.{name}"):
+    if not name.startswith("_") and importlib.util.find_spec(f"flexctrl.{name}"):
         return importlib.import_module(f"flexctrl.{name}")
     raise AttributeError(f"module 'flexctrl' has no attribute {name!r}")
 

@@ -15,7 +15,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-from flexctrl.model.solve import SingularMatrixError, Solve, factorise
+from flexctrl.model.solve import Plan, SingularMatrixError, Solve, factorise, plan
 
 _TURNED = 0.02
 _POOR = 0.25
@@ -86,6 +86,7 @@ class Stepper:
     tolerance: float
     counts: Counts = field(default_factory=Counts)
     _solve: Solve | None = None
+    _plan: Plan | None = None
     _made_for: float = 0.0
     _made_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
@@ -144,13 +145,12 @@ class Stepper:
         )
         step = h * now.v + h * h * ((0.5 - c.beta) * point.algorithmic + c.beta * algorithmic)
         v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
-        last, contraction = np.inf, 1.0
+        last, contraction = np.inf, 0.0
         for iteration in range(_ITERATIONS):
             state = self.model.advance(now, step, v, now.t + h)
             supply = self.feed.at(state, point.supply, h)
             force = self.model.balance(state, v, rate) + self.model.loads(state, supply.u)
-            refresh = self._stale(state, h) if iteration == 0 else contraction > _POOR
-            if refresh or fresh:
+            if fresh or contraction > _POOR or (iteration == 0 and self._stale(state, h)):
                 self._factor(state, v, rate, (1.0, to_v, to_rate), supply, h)
                 last = np.inf
             assert self._solve is not None
@@ -158,10 +158,10 @@ class Stepper:
             size, worst = self._size(correction)
             self.counts.newton += 1
             step, v, rate = step + correction, v + to_v * correction, rate + to_rate * correction
-            contraction = size / last if np.isfinite(last) else (0.1 if refresh or fresh else 0.5)
-            if size <= self.tolerance or (np.isfinite(last) and size * min(contraction, 1.0) <= 0.5 * self.tolerance):
+            contraction = size / last if np.isfinite(last) else 0.0
+            if size <= self.tolerance or (0.0 < contraction < 1.0 and size * contraction <= 0.5 * self.tolerance):
                 return self._finish(point, h, step, v, rate, worst)
-            if not np.isfinite(size) or (np.isfinite(last) and contraction > 2.0 and iteration > 3):
+            if not np.isfinite(size) or (contraction > 2.0 and iteration > 3):
                 break
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
@@ -190,9 +190,14 @@ class Stepper:
         supply: Supply,
         h: float,
     ) -> None:
-        slope = -self.model.slope(state, v, rate, seeds, supply.u)
+        slope = self.model.slope(state, v, rate, seeds, supply.u)
+        if self.feed.continuous:
+            slope = slope + self.feed.slope(state, supply, h, seeds)
+        if self._plan is None or not self._plan.fits(slope):
+            self._plan = plan(slope)
         try:
-            self._solve = factorise(slope - self.feed.slope(state, supply, h, seeds))
+            solve = factorise(slope, self._plan)
+            self._solve = lambda force: solve(-force)
         except SingularMatrixError as error:
             raise StepError(error.where, "the tangent is singular") from error
         self.counts.factorisations += 1

@@ -83,9 +83,13 @@ class Forces:
 
         Exact where the machine is at rest; in motion the turning of levers of followers is left out of the rates.
         """
-        rows, columns = self._pattern
-        slope = self._projected(state, self._blocks(state, v, a, seeds), rows, columns)
-        if self.motion.plain or seeds[0] == 0.0:
+        blocks = self._blocks(state, v, a, seeds)
+        if self.motion.plain:
+            places, indices, indptr = self._table
+            data = np.bincount(places, weights=blocks, minlength=len(indices) + 1)[:-1]
+            return sp.csr_matrix((data, indices, indptr), shape=(self.motion.n, self.motion.n), copy=False)
+        slope = self._projected(state, blocks, *self._pattern)
+        if seeds[0] == 0.0:
             return slope
         raw = self.raw(state, v, a)
         return slope + seeds[0] * self.motion.stiffening(state, raw if loads is None else raw + loads)
@@ -160,3 +164,15 @@ class Forces:
             rows.append(np.tile(cells, (1, cells.shape[1])).ravel())
             columns.append(np.repeat(cells, cells.shape[1], axis=1).ravel())
         return np.concatenate(rows), np.concatenate(columns)
+
+    @cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where each entry of the tangent blocks goes in the assembled matrix (CSR): the join table at work."""
+        n = self.motion.n
+        rows, columns = (self.motion.cells[cells] for cells in self._pattern)
+        kept = (rows < n) & (columns < n)
+        keys, inverse = np.unique(rows[kept] * n + columns[kept], return_inverse=True)
+        places = np.full(len(rows), len(keys))
+        places[kept] = inverse
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(keys // n, minlength=n))])
+        return places, (keys % n).astype(np.int32), indptr.astype(np.int32)

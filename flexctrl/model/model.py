@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -10,20 +10,18 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.effects.effect import Effect
-from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch, ShaftElasticity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.mechanics.kernel import Backend, best_backend
+from flexctrl.mechanics.kernel import Backend
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.assembly import assembled, mass_blocks, stiffness_blocks
 from flexctrl.model.families import families_of
 from flexctrl.model.forces import Forces
-from flexctrl.model.motion import Motion, State, motion_of
+from flexctrl.model.motion import Motion, State
 from flexctrl.model.signals import Signals, signals_of
 from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Beam, Part, Rope
+from flexctrl.structure.elements import Part
 from flexctrl.structure.structure import Structure
-from flexctrl.structure.ties import Group
 
 
 @dataclass(frozen=True)
@@ -165,7 +163,8 @@ class Model:
         numpy.ndarray, shape (n,)
         """
         if self.large:
-            return self.forces.balance(state, v, a) - self.viscous @ v
+            force = self.forces.balance(state, v, a)
+            return force - self.viscous @ v if self.viscous.nnz else force
         load, damping = self._small
         return load - self._stiffness @ state.q - damping @ v - self._mass @ a
 
@@ -175,7 +174,7 @@ class Model:
         """Return ∂(balance + loads)/∂(own motion) for a motion that adds ``seeds`` × increment to (place, v, a)."""
         if self.large:
             slope = self.forces.slope(state, v, a, seeds, self.signals.loads @ u)
-            return slope - seeds[1] * self.viscous
+            return slope - seeds[1] * self.viscous if self.viscous.nnz else slope
         _, damping = self._small
         return -(seeds[0] * self._stiffness + seeds[1] * damping + seeds[2] * self._mass).tocsr()
 
@@ -266,69 +265,3 @@ class Model:
         Model
         """
         return replace(self, backend=backend)
-
-
-def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend | None = None) -> Model:
-    """Put a structure under some effects.
-
-    Parameters
-    ----------
-    structure : Structure
-    effects : sequence of Effect
-        What the scene asks for, e.g. ``[Gravity(), Flexible(), LargeRotation()]``. What no effect
-        bends is rigid; an effect left out costs nothing.
-    backend : Backend, optional
-        How the kernels run; default: compiled if the extra ``[fast]`` is installed.
-
-    Returns
-    -------
-    Model
-
-    Raises
-    ------
-    StructureError
-        For something that is no effect, an effect given twice, or a loop of rigid parts.
-    """
-    parts = _flat(effects)
-    rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
-    groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
-    elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))
-    motion = motion_of(structure, structure.bodies + groups, elastic)
-    empty = sp.csr_matrix((motion.n, motion.n))
-    return Model(structure, parts, motion, backend or best_backend(), empty)
-
-
-def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, ...]:
-    """Return the rigid twin: the same without the effects that let parts deform.
-
-    Parameters
-    ----------
-    model_or_effects : Model or sequence of Effect
-
-    Returns
-    -------
-    Model or tuple of Effect
-        What was given, with `BeamFlexibility`, `ShaftElasticity` and `RopeStretch` left out.
-
-    Raises
-    ------
-    StructureError
-        If rigid parts form a loop.
-    """
-    if isinstance(model_or_effects, Model):
-        kept = rigid(model_or_effects.effects)
-        assert isinstance(kept, tuple)
-        return assemble(model_or_effects.structure, kept, model_or_effects.backend)
-    flexible = (BeamFlexibility, ShaftElasticity, RopeStretch)
-    return tuple(e for e in _flat(model_or_effects) if not isinstance(e, flexible))
-
-
-def _flat(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    for effect in effects:
-        if not isinstance(effect, Effect):
-            raise StructureError(f"assemble: {effect!r} is no effect; give e.g. flexctrl.Gravity()")
-    parts = tuple(p for e in effects for p in e.parts())
-    twice = [type(p).__name__ for i, p in enumerate(parts) if type(p) in map(type, parts[:i])]
-    if twice:
-        raise StructureError(f"assemble: the effect {twice[0]} is given twice; keep one")
-    return parts

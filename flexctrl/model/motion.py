@@ -122,7 +122,8 @@ class Motion:
         return not self.followers and not self.lines.size and not self.gears.rigid.any()
 
     @cached_property
-    def _cells(self) -> np.ndarray:
+    def cells(self) -> np.ndarray:
+        """Number of each raw freedom's degree of freedom, ``n`` for none, shape (raw,)."""
         return np.append(self.place.ravel(), self.sources)
 
     def _nodes(self, raw: np.ndarray) -> np.ndarray:
@@ -162,7 +163,7 @@ class Motion:
     def rates(self, state: State, v: np.ndarray) -> np.ndarray:
         """Return the raw rates of own rates ``v``."""
         own, pose = np.append(v, 0.0), Pose(state.x, state.R)
-        raw = own[self._cells]
+        raw = own[self.cells]
         V = self._nodes(raw)
         self._turn_out(state.R, V)
         for batch in self.followers:
@@ -174,7 +175,7 @@ class Motion:
     def accelerations(self, state: State, rates: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the raw accelerations, given the raw rates, the own rates and own accelerations."""
         own, rate, pose = np.append(v, 0.0), np.append(a, 0.0), Pose(state.x, state.R)
-        raw = rate[self._cells]
+        raw = rate[self.cells]
         A, V = self._nodes(raw), self._nodes(rates)
         self._turn_out(state.R, A)
         for batch in self.followers:
@@ -194,7 +195,7 @@ class Motion:
             batch.collect(pose, F, own)
         if self.lines.size:
             F[self.lines, 3:] = np.einsum("kji,kj->ki", state.R[self.lines] @ self.line_axes, F[self.lines, 3:])
-        own += np.bincount(self._cells, weights=raw, minlength=self.n + 1)
+        own += np.bincount(self.cells, weights=raw, minlength=self.n + 1)
         return own[:-1]
 
     def jacobian(self, state: State) -> sp.csr_matrix:
@@ -207,9 +208,9 @@ class Motion:
 
     def _jacobian(self, state: State) -> sp.csr_matrix:
         size, pose = self.raw + self.n, Pose(state.x, state.R)
-        own = np.flatnonzero(self._cells < self.n)
+        own = np.flatnonzero(self.cells < self.n)
         rows = np.append(own, self.raw + np.arange(self.n))
-        columns = np.append(self._cells[own], np.arange(self.n))
+        columns = np.append(self.cells[own], np.arange(self.n))
         T = sp.csr_matrix((np.ones(rows.size), (rows, columns)), shape=(size, self.n))
         if self.lines.size:
             T = self._turn_lines(state) @ T

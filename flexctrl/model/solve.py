@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,12 +26,61 @@ class SingularMatrixError(FlexctrlError, ArithmeticError):
         self.where = where
 
 
-def factorise(A: sp.spmatrix) -> Solve:
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """How matrices of one pattern are factorised: worked out once, used for every new set of values.
+
+    Attributes
+    ----------
+    indptr, indices : numpy.ndarray
+        The pattern (CSR).
+    order : numpy.ndarray
+        Reverse Cuthill–McKee.
+    band : int
+        Half bandwidth in that order; 0 where the matrix is dense or its band too wide.
+    places : numpy.ndarray
+        Where each entry stands in LAPACK's band storage.
+    """
+
+    indptr: np.ndarray
+    indices: np.ndarray
+    order: np.ndarray
+    band: int
+    places: np.ndarray
+
+    def fits(self, A: sp.csr_matrix) -> bool:
+        """Tell whether a matrix has the plan's pattern."""
+        return A.indices is self.indices or (
+            A.nnz == len(self.indices)
+            and np.array_equal(A.indptr, self.indptr)
+            and np.array_equal(A.indices, self.indices)
+        )
+
+
+def plan(A: sp.csr_matrix) -> Plan:
+    """Work out how to factorise matrices of the pattern of A."""
+    n = A.shape[0]
+    empty = np.zeros(0, dtype=int)
+    if n <= _DENSE_UP_TO:
+        return Plan(A.indptr, A.indices, empty, 0, empty)
+    order = reverse_cuthill_mckee(A, symmetric_mode=False)
+    back = np.empty(n, dtype=int)
+    back[order] = np.arange(n)
+    rows, columns = back[np.repeat(np.arange(n), np.diff(A.indptr))], back[A.indices]
+    band = int(np.abs(rows - columns).max(initial=0))
+    if band > max(24, n // 6):
+        return Plan(A.indptr, A.indices, empty, 0, empty)
+    return Plan(A.indptr, A.indices, order, band, columns * (3 * band + 1) + 2 * band + rows - columns)
+
+
+def factorise(A: sp.spmatrix, known: Plan | None = None) -> Solve:
     """Factorise a square matrix once and return its solve.
 
     Parameters
     ----------
     A : scipy.sparse matrix, shape (n, n)
+    known : Plan, optional
+        From an earlier matrix of the same pattern; saves finding the order again.
 
     Returns
     -------
@@ -44,13 +94,12 @@ def factorise(A: sp.spmatrix) -> Solve:
     """
     A = A.tocsr()
     if not np.isfinite(A.data).all():
-        raise SingularMatrixError(int(np.flatnonzero(~np.isfinite(A.data))[0]))
+        bad = int(np.flatnonzero(~np.isfinite(A.data))[0])
+        raise SingularMatrixError(int(np.searchsorted(A.indptr, bad, side="right")) - 1)
     if A.shape[0] <= _DENSE_UP_TO:
         return _dense(A.toarray())
-    order = reverse_cuthill_mckee(A, symmetric_mode=False)
-    permuted = A[order][:, order].tocoo()
-    band = int(np.abs(permuted.row - permuted.col).max(initial=0))
-    return _banded(permuted, order, band) if band <= max(16, A.shape[0] // 6) else _sparse(A)
+    known = known if known is not None and known.fits(A) else plan(A)
+    return _banded(A, known) if known.band else _sparse(A)
 
 
 def _dense(A: np.ndarray) -> Solve:
@@ -60,11 +109,10 @@ def _dense(A: np.ndarray) -> Solve:
     return lambda b: lapack.dgetrs(lu, pivots, b)[0]
 
 
-def _banded(A: sp.coo_matrix, order: np.ndarray, band: int) -> Solve:
-    n = A.shape[0]
-    storage = np.zeros((3 * band + 1, n))
-    np.add.at(storage, (2 * band + A.row - A.col, A.col), A.data)
-    lu, pivots, info = lapack.dgbtrf(storage, band, band)
+def _banded(A: sp.csr_matrix, known: Plan) -> Solve:
+    n, band, order = A.shape[0], known.band, known.order
+    storage = np.bincount(known.places, weights=A.data, minlength=n * (3 * band + 1))
+    lu, pivots, info = lapack.dgbtrf(storage.reshape(n, -1).T, band, band, overwrite_ab=True)
     if info:
         raise SingularMatrixError(int(order[info - 1]))
 

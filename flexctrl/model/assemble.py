@@ -1,0 +1,100 @@
+"""Putting a structure under effects, and the rigid twin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.effects.damping import ModalDamping
+from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch, ShaftElasticity
+from flexctrl.errors import StructureError
+from flexctrl.mechanics.kernel import Backend, best_backend
+from flexctrl.model.linearize import linearize
+from flexctrl.model.model import Model
+from flexctrl.model.motion import motion_of
+from flexctrl.structure.elements import Beam, Rope
+from flexctrl.structure.structure import Structure
+from flexctrl.structure.ties import Group
+
+
+def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend | None = None) -> Model:
+    """Put a structure under some effects.
+
+    Parameters
+    ----------
+    structure : Structure
+    effects : sequence of Effect
+        What the scene asks for, e.g. ``[Gravity(), Flexible(), LargeRotation()]``. What no effect
+        bends is rigid; an effect left out costs nothing.
+    backend : Backend, optional
+        How the kernels run; default: compiled if the extra ``[fast]`` is installed.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    StructureError
+        For something that is no effect, an effect given twice, or a loop of rigid parts.
+    """
+    parts = _flat(effects)
+    rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
+    groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
+    elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))
+    motion = motion_of(structure, structure.bodies + groups, elastic)
+    empty = sp.csr_matrix((motion.n, motion.n))
+    model = Model(structure, parts, motion, backend or best_backend(), empty)
+    modal = [p for p in parts if isinstance(p, ModalDamping)]
+    return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
+
+
+def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:
+    """Return M Φ diag(2 ζ ω) Φᵀ M with the flexible modes about the equilibrium under the model's own weight."""
+    linear = linearize(model)
+    modes = linear.modes(None if isinstance(damping.ratios, float) else len(damping.ratios) + linear.modes().rigid)
+    shapes, omega = modes.shapes[:, modes.rigid :], modes.omega[modes.rigid :]
+    ratios = np.full(len(omega), damping.ratios) if isinstance(damping.ratios, float) else np.array(damping.ratios)
+    count = min(len(ratios), len(omega))
+    momenta = linear.M @ shapes[:, :count]
+    return sp.csr_matrix((momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T)
+
+
+def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, ...]:
+    """Return the rigid twin: the same without the effects that let parts deform.
+
+    Parameters
+    ----------
+    model_or_effects : Model or sequence of Effect
+
+    Returns
+    -------
+    Model or tuple of Effect
+        What was given, with `BeamFlexibility`, `ShaftElasticity` and `RopeStretch` left out.
+
+    Raises
+    ------
+    StructureError
+        If rigid parts form a loop.
+    """
+    if isinstance(model_or_effects, Model):
+        kept = rigid(model_or_effects.effects)
+        assert isinstance(kept, tuple)
+        return assemble(model_or_effects.structure, kept, model_or_effects.backend)
+    flexible = (BeamFlexibility, ShaftElasticity, RopeStretch)
+    return tuple(e for e in _flat(model_or_effects) if not isinstance(e, flexible))
+
+
+def _flat(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    for effect in effects:
+        if not isinstance(effect, Effect):
+            raise StructureError(f"assemble: {effect!r} is no effect; give e.g. flexctrl.Gravity()")
+    parts = tuple(p for e in effects for p in e.parts())
+    twice = [type(p).__name__ for i, p in enumerate(parts) if type(p) in map(type, parts[:i])]
+    if twice:
+        raise StructureError(f"assemble: the effect {twice[0]} is given twice; keep one")
+    return parts
