@@ -241,9 +241,7 @@ def _print_times(repeats: int = 7) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--times", action="store_true", help="print run times of coarse meshes, write nothing"
-    )
+    parser.add_argument("--times", action="store_true", help="only print run times of coarse meshes")
     if parser.parse_args().times:
         _print_times()
     else:
