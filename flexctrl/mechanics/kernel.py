@@ -9,8 +9,8 @@ code through LLVM (the extra ``fast``).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -20,6 +20,8 @@ from flexctrl.errors import FlexctrlError, MissingExtraError
 
 if TYPE_CHECKING:
     import casadi as ca
+
+    from flexctrl.mechanics.llvm import CompiledRun
 
 FLOAT = np.dtype(np.float64)
 _INDEX_LIMIT = 2**31
@@ -62,12 +64,23 @@ class Kernel:
             shape = getattr(self, label).shape
             if shape[1] != 1:
                 raise KernelError(f"kernel {self.name!r}: {label} has shape {shape}, expected a column (n, 1)")
-        for label in ("inputs", "params"):
-            if not getattr(self, label).is_valid_input():
-                raise KernelError(f"kernel {self.name!r}: {label} holds expressions, expected casadi symbols only")
+        self._check_symbols()
         free = self.function().get_free()
         if free:
             raise KernelError(f"kernel {self.name!r}: outputs use {', '.join(free)}, neither among inputs nor params")
+
+    def _check_symbols(self) -> None:
+        import casadi as ca
+
+        for label in ("inputs", "params"):
+            if not getattr(self, label).is_valid_input():
+                raise KernelError(f"kernel {self.name!r}: {label} holds expressions, expected casadi symbols only")
+        given, distinct = self.n_in + self.n_par, len(ca.symvar(ca.vertcat(self.inputs, self.params)))
+        if distinct != given:
+            raise KernelError(
+                f"kernel {self.name!r}: {given} inputs and params are {distinct} different symbols; "
+                "each must be a symbol of its own"
+            )
 
     @cached_property
     def _function(self) -> ca.Function:
@@ -103,25 +116,23 @@ class Kernel:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """Checked private copies of the tables of a batch.
+    """Checked private copies of the index tables of a batch.
 
     Attributes
     ----------
     gather : ndarray of int32, (n, n_in)
-    params : ndarray of float64, (n, n_par)
     scatter : ndarray of int32, (n, n_out)
     z_size, r_size : int
         Least lengths of z and r that no index leaves.
     """
 
     gather: np.ndarray
-    params: np.ndarray
     scatter: np.ndarray
     z_size: int
     r_size: int
 
     @classmethod
-    def of(cls, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> Tables:
+    def of(cls, kernel: Kernel, gather: np.ndarray, scatter: np.ndarray) -> Tables:
         """Check tables against a kernel and copy them.
 
         Raises
@@ -132,13 +143,19 @@ class Tables:
         n = len(np.atleast_1d(gather))
         reads = _index_table(kernel, "gather", gather, (n, kernel.n_in))
         writes = _index_table(kernel, "scatter", scatter, (n, kernel.n_out))
-        values = parameter_table(kernel, params, n)
-        return cls(reads, values, writes, int(reads.max(initial=-1)) + 1, int(writes.max(initial=-1)) + 1)
+        return cls(reads, writes, int(reads.max(initial=-1)) + 1, int(writes.max(initial=-1)) + 1)
+
+    def check(self, z: np.ndarray, r: np.ndarray) -> None:
+        """Refuse vectors that are too short, not float64 or not contiguous."""
+        _check_vector(z, self.z_size, "z")
+        _check_vector(r, self.r_size, "r")
+        if not r.flags.writeable:
+            raise KernelError("r is read-only, and results are added into it")
 
 
 def parameter_table(kernel: Kernel, params: np.ndarray, n: int) -> np.ndarray:
-    """Return a C-ordered float64 copy of ``params``, refused unless of shape (n, n_par)."""
-    values = np.array(params, dtype=FLOAT, order="C")
+    """Return ``params`` as float64 in C order, refused unless of shape (n, n_par)."""
+    values = np.ascontiguousarray(params, dtype=FLOAT)
     if values.shape != (n, kernel.n_par):
         raise KernelError(
             f"kernel {kernel.name!r}: params has shape {values.shape}, expected {(n, kernel.n_par)} (items, n_par)"
@@ -165,8 +182,7 @@ def _index_table(kernel: Kernel, label: str, table: np.ndarray, shape: tuple[int
     return np.array(table, dtype=np.int32, order="C")
 
 
-def check_vector(array: np.ndarray, size: int, label: str) -> None:
-    """Refuse anything but a C-contiguous float64 vector of at least ``size`` entries."""
+def _check_vector(array: np.ndarray, size: int, label: str) -> None:
     if array.dtype != FLOAT or not array.flags.c_contiguous:
         raise KernelError(
             f"{label} is {array.dtype}{'' if array.flags.c_contiguous else ', not contiguous'}; "
@@ -174,8 +190,6 @@ def check_vector(array: np.ndarray, size: int, label: str) -> None:
         )
     if array.size < size:
         raise KernelError(f"{label} has {array.size} entries, the index table needs at least {size}")
-    if label == "r" and not array.flags.writeable:
-        raise KernelError("r is read-only, and results are added into it")
 
 
 class Run(Protocol):
@@ -204,66 +218,9 @@ class CasadiVM:
 
     def bind(self, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> Run:
         """Check the tables and return the run over them; raises KernelError."""
-        tables = Tables.of(kernel, gather, params, scatter)
-        return _VMRun(kernel, tables, tables.gather.astype(np.intp), tables.scatter.astype(np.intp).ravel())
+        from flexctrl.mechanics.vm import VMRun
 
-
-@dataclass(frozen=True, eq=False)
-class _VMRun:
-    kernel: Kernel
-    tables: Tables
-    gather: np.ndarray
-    scatter: np.ndarray
-    inputs: np.ndarray = field(init=False)
-    outputs: np.ndarray = field(init=False)
-    buffer: object = field(init=False, default=None)
-    evaluate: Callable[[], Any] = field(init=False)
-
-    def __post_init__(self) -> None:
-        # one item is one column for casadi, so its column-major matrices are our row-major tables
-        n = len(self.gather)
-        object.__setattr__(self, "inputs", np.zeros((n, self.kernel.n_in)))
-        object.__setattr__(self, "outputs", np.zeros(n * self.kernel.n_out))
-        object.__setattr__(self, "evaluate", self._evaluator(n))
-
-    def _evaluator(self, n: int) -> Callable[[], Any]:
-        if n == 0 or self.kernel.n_out == 0:
-            return tuple
-        buffer, evaluate = self.kernel.function().map(n).buffer()
-        for i, array in enumerate((self.inputs, self.tables.params)):
-            if array.size:
-                buffer.set_arg(i, memoryview(array))
-        buffer.set_res(0, memoryview(self.outputs))
-        # casadi's evaluator holds the buffer by address only: somebody has to keep it alive
-        object.__setattr__(self, "buffer", buffer)
-        return evaluate
-
-    def __call__(self, z: np.ndarray, r: np.ndarray) -> None:
-        check_vector(z, self.tables.z_size, "z")
-        check_vector(r, self.tables.r_size, "r")
-        self._add(z.reshape(-1), r.reshape(-1))
-
-    def _add(self, z: np.ndarray, r: np.ndarray) -> None:
-        if self.gather.size:
-            z.take(self.gather, out=self.inputs, mode="clip")  # in range already; "raise" would copy
-        self.evaluate()
-        np.add.at(r, self.scatter, self.outputs)
-
-    def with_params(self, params: np.ndarray) -> _VMRun:
-        params = parameter_table(self.kernel, params, len(self.gather))
-        return replace(self, tables=replace(self.tables, params=params))
-
-    def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
-        check_vector(z, self.tables.z_size, "z")
-        check_vector(r, self.tables.r_size, "r")
-        return partial(self._add, z.reshape(-1), r.reshape(-1))
-
-
-def _host_lanes() -> int:
-    _require_llvmlite()
-    from flexctrl.mechanics import llvm
-
-    return llvm.host_lanes()
+        return VMRun.of(kernel, Tables.of(kernel, gather, scatter), params)
 
 
 def _require_llvmlite() -> None:
@@ -278,7 +235,7 @@ class Compiled:
     Attributes
     ----------
     lanes : int
-        Items computed at once: 1, 2, 4 or 8. By default what suits this processor.
+        Items computed at once: 1, 2, 4 or 8; 0 for what suits the processor and the number of items.
     optimize_up_to : int
         Kernels of more instructions are compiled without optimisation: about six times faster to
         compile, up to twice slower to run.
@@ -289,13 +246,13 @@ class Compiled:
         If llvmlite is not installed.
     """
 
-    lanes: int = field(default_factory=_host_lanes)
+    lanes: int = 0
     optimize_up_to: int = 6000
 
     def __post_init__(self) -> None:
         _require_llvmlite()
-        if self.lanes not in (1, 2, 4, 8):
-            raise KernelError(f"lanes is {self.lanes}, expected 1, 2, 4 or 8")
+        if self.lanes not in (0, 1, 2, 4, 8):
+            raise KernelError(f"lanes is {self.lanes}, expected 1, 2, 4, 8, or 0 to leave the choice")
 
     def bind(self, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> CompiledRun:
         """Check the tables, compile the kernel unless this process has done so, and return the run.
@@ -305,11 +262,12 @@ class Compiled:
         KernelError
             If a table does not fit, or the kernel has an operation that cannot be compiled.
         """
-        from flexctrl.mechanics import llvm
+        from flexctrl.mechanics.llvm import CompiledRun, best_lanes, compile_kernel
 
-        tables = Tables.of(kernel, gather, params, scatter)
+        tables = Tables.of(kernel, gather, scatter)
+        lanes = self.lanes or best_lanes(len(tables.gather))
         level = 2 if kernel.instructions <= self.optimize_up_to else 0
-        return llvm.CompiledRun.of(kernel, llvm.compile_kernel(kernel, self.lanes, level), tables)
+        return CompiledRun.of(kernel, compile_kernel(kernel, lanes, level), tables, params)
 
 
 def best_backend() -> Backend:
@@ -365,6 +323,6 @@ class Batch:
 
     def with_params(self, params: np.ndarray) -> Batch:
         """Return the batch with other parameters, (n, n_par); code and index tables are shared."""
-        other = replace(self, params=params)
+        other = Batch(self.kernel, self.gather, params, self.scatter, self.backend)
         other.__dict__["run"] = self.run.with_params(params)  # seeds the cached property
         return other
