@@ -22,6 +22,7 @@ EPS = float(np.finfo(float).eps)
 RIGID_NOISE = 30.0
 SOFT_NOISE = 1e6
 RIGID_GAP = 1e-8
+UNCLEAR = 1e5 * EPS
 HIDDEN, SINGULAR = -1, -2
 
 
@@ -80,7 +81,7 @@ def stiffness_noise(K: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _Pencil:
+class _Shifted:
     """K − σM, factorised; `below` counts the λ under σ (Sylvester), HIDDEN if the pivoting hides it."""
 
     K: sp.csc_matrix
@@ -110,7 +111,59 @@ class _Pencil:
         return lam[order], phi[:, order]
 
 
-def shifted(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> _Pencil:
+class _Pencil:
+    """K − σM for many σ: both matrices on one sparsity pattern, so that shifting costs one addition."""
+
+    def __init__(self, K: sp.spmatrix, M: sp.spmatrix) -> None:
+        k, m = sp.coo_matrix(K), sp.coo_matrix(M)
+        at = (np.concatenate([k.row, m.row]), np.concatenate([k.col, m.col]))
+        none_k, none_m = np.zeros_like(k.data, dtype=float), np.zeros_like(m.data, dtype=float)
+        self.K = sp.csc_matrix((np.concatenate([k.data, none_m]), at), shape=K.shape)
+        self.M = sp.csc_matrix((np.concatenate([none_k, m.data]), at), shape=K.shape)
+
+    def at(self, sigma: float) -> _Shifted:
+        """Factorise K − σM; raises LinearizationError if it is singular."""
+        A = sp.csc_matrix((self.K.data - sigma * self.M.data, self.K.indices, self.K.indptr), self.K.shape)
+        options = {"SymmetricMode": True}
+        try:
+            lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        except RuntimeError as error:
+            raise LinearizationError(
+                f"K - ({sigma:.3g}) M is singular: a freedom has neither mass nor stiffness; see audit()"
+            ) from error
+        hidden = (lu.perm_r != lu.perm_c).any()
+        below = HIDDEN if hidden else int(np.count_nonzero(lu.U.diagonal() < 0))
+        return _Shifted(self.K, self.M, sigma, lu, below)
+
+    def below(self, sigma: float) -> int:
+        """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell."""
+        try:
+            return self.at(sigma).below
+        except LinearizationError:
+            return SINGULAR
+
+    def below_all(self, sigma: float) -> float:
+        """A shift at or under σ with no λ under it, and far enough from 0 to be seen beside K."""
+        for _ in range(60):
+            if self.below(sigma) in (0, HIDDEN):
+                return sigma
+            sigma *= 4.0
+        raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
+
+    def soft_scale(self) -> float:
+        """The first positive λ within a factor of 10, by Sturm counts; rigid ones look like the lowest decade."""
+        k, m = self.K.diagonal(), self.M.diagonal()
+        both = (k > 0) & (m > 0)
+        high = float((k[both] / m[both]).min()) if both.any() else 1.0
+        decades = [0, 15]
+        none = self.below(1e-15 * high)
+        while decades[1] - decades[0] > 1:
+            middle = sum(decades) // 2
+            decades[int(self.below(10.0**-middle * high) <= none)] = middle
+        return 10.0 ** -decades[0] * high
+
+
+def shifted(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> _Shifted:
     """Factorise K − σM, symmetric pivoting, sparse.
 
     Parameters
@@ -128,16 +181,7 @@ def shifted(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> _Pencil:
     LinearizationError
         If K − σM is singular: a freedom with neither mass nor stiffness, or σ an eigenvalue.
     """
-    options = {"SymmetricMode": True}
-    try:
-        lu = sla.splu(sp.csc_matrix(K - sigma * M), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    except RuntimeError as error:
-        raise LinearizationError(
-            f"K - ({sigma:.3g}) M is singular: a freedom has neither mass nor stiffness; see audit()"
-        ) from error
-    hidden = (lu.perm_r != lu.perm_c).any()
-    below = HIDDEN if hidden else int(np.count_nonzero(lu.U.diagonal() < 0))
-    return _Pencil(sp.csc_matrix(K), sp.csc_matrix(M), sigma, lu, below)
+    return _Pencil(K, M).at(sigma)
 
 
 def complete_pairs(K: sp.csc_matrix, M: sp.csc_matrix) -> Eigenpairs:
@@ -151,22 +195,22 @@ def complete_pairs(K: sp.csc_matrix, M: sp.csc_matrix) -> Eigenpairs:
     -------
     Eigenpairs
     """
-    k, m = K.toarray(), M.toarray()
+    pencil = _Pencil(K, M)
+    k, m = pencil.K.toarray(), pencil.M.toarray()
     lam, phi = _direct(k, m)
     top = np.abs(lam).max(initial=0.0)
     if top == 0.0:
-        return _settled(K, M, lam, phi, 0.0)
-    sigma = _below_all(K, M, -_soft_scale(K, M))
+        return _settled(pencil, lam, phi, 0.0)
+    sigma = pencil.below_all(-pencil.soft_scale())
     for _ in range(4):
         if top <= 1e4 * -sigma:
             break
-        pencil = shifted(K, M, sigma)
-        lam, phi = _low_and_high(pencil, k, m, np.sqrt(top * -sigma))
+        lam, phi = _low_and_high(pencil.at(sigma), k, m, np.sqrt(top * -sigma))
         scale = _first_flexible(K, lam, phi, sigma)
         if scale == 0.0 or 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
             break
-        sigma = _below_all(K, M, -scale)
-    return _settled(K, M, lam, phi, sigma)
+        sigma = pencil.below_all(-scale)
+    return _settled(pencil, lam, phi, sigma)
 
 
 def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
@@ -188,49 +232,19 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
     LinearizationError
         If the Sturm count of K − μM never agrees with the modes found.
     """
-    n = K.shape[0]
-    wanted, sigma = min(count + 8, n - 2), -_soft_scale(K, M)
+    n, pencil = K.shape[0], _Pencil(K, M)
+    wanted, sigma = min(count + 8, n - 2), -pencil.soft_scale()
     for seed in range(20):
-        sigma = _below_all(K, M, sigma)
-        lam, phi = shifted(K, M, sigma).lanczos(wanted, seed)
+        sigma = pencil.below_all(sigma)
+        lam, phi = pencil.at(sigma).lanczos(wanted, seed)
         scale = _first_flexible(K, lam, phi, sigma)
         if scale == 0.0 and 2 * wanted < n - 2:
             wanted *= 2
         elif scale > 0.0 and not 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
             sigma = -scale
-        elif _none_missed(K, M, lam, count):
-            return _settled(K, M, lam, phi, sigma)
+        elif _none_missed(pencil, lam, count):
+            return _settled(pencil, lam, phi, sigma)
     raise LinearizationError("the lowest modes could not be certified by a Sturm count; ask for another count")
-
-
-def _soft_scale(K: sp.csc_matrix, M: sp.csc_matrix) -> float:
-    """The first positive λ within a factor of 10, by Sturm counts; rigid ones look like the lowest decade."""
-    k, m = K.diagonal(), M.diagonal()
-    both = (k > 0) & (m > 0)
-    high = float((k[both] / m[both]).min()) if both.any() else 1.0
-    decades = [0, 15]
-    none = _count_below(K, M, 1e-15 * high)
-    while decades[1] - decades[0] > 1:
-        middle = sum(decades) // 2
-        decades[int(_count_below(K, M, 10.0**-middle * high) <= none)] = middle
-    return 10.0 ** -decades[0] * high
-
-
-def _below_all(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> float:
-    """A shift at or under σ with no λ under it, and far enough from 0 to be seen beside K."""
-    for _ in range(60):
-        if _count_below(K, M, sigma) in (0, HIDDEN):
-            return sigma
-        sigma *= 4.0
-    raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
-
-
-def _count_below(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> int:
-    """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell."""
-    try:
-        return shifted(K, M, sigma).below
-    except LinearizationError:
-        return SINGULAR
 
 
 def _direct(k: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -240,14 +254,14 @@ def _direct(k: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise LinearizationError("the mass matrix is not positive definite on the freedoms kept") from error
 
 
-def _low_and_high(pencil: _Pencil, k: np.ndarray, m: np.ndarray, split: float) -> tuple[np.ndarray, np.ndarray]:
+def _low_and_high(inverted: _Shifted, k: np.ndarray, m: np.ndarray, split: float) -> tuple[np.ndarray, np.ndarray]:
     """Pairs under `split` from the inverted pencil, the rest from the direct one in their complement."""
-    inverse = pencil.solve(np.eye(len(k)))
+    inverse = inverted.solve(np.eye(len(k)))
     theta, y = la.eigh(m @ (0.5 * (inverse + inverse.T)) @ m, m)
-    low = y[:, theta > 1.0 / (split - pencil.sigma)][:, ::-1]
-    after = pencil.iterate(low)
+    low = y[:, theta > 1.0 / (split - inverted.sigma)][:, ::-1]
+    after = inverted.iterate(low)
     theta, z = la.eigh(low.T @ (m @ after), low.T @ (m @ low))
-    low, lam_low = (after @ z)[:, ::-1], pencil.sigma + 1.0 / theta[::-1]
+    low, lam_low = (after @ z)[:, ::-1], inverted.sigma + 1.0 / theta[::-1]
     if low.shape[1] == len(k):
         return lam_low, low
     rest = la.qr(m @ low)[0][:, low.shape[1] :]
@@ -257,28 +271,29 @@ def _low_and_high(pencil: _Pencil, k: np.ndarray, m: np.ndarray, split: float) -
 
 def _first_flexible(K: sp.csc_matrix, lam: np.ndarray, phi: np.ndarray, sigma: float) -> float:
     """Smallest |λ| that stands clear of rounding; 0 if none does."""
-    floor = np.maximum(RIGID_NOISE * stiffness_noise(K, phi), 1e3 * EPS * abs(sigma))
+    floor = np.maximum(RIGID_NOISE * stiffness_noise(K, phi), UNCLEAR * abs(sigma))
     clear = np.abs(lam)[np.abs(lam) > floor]
     return float(clear.min()) if clear.size else 0.0
 
 
-def _none_missed(K: sp.csc_matrix, M: sp.csc_matrix, lam: np.ndarray, count: int) -> bool:
+def _none_missed(pencil: _Pencil, lam: np.ndarray, count: int) -> bool:
     """Whether as many λ lie under some gap beyond `count` as were found there."""
     for i in range(min(count, lam.size - 1), lam.size):
         gap = lam[i] - lam[i - 1] if i else 0.0
         if gap > 1e-6 * abs(lam[i]):
-            return _count_below(K, M, 0.5 * (lam[i] + lam[i - 1])) in (i, HIDDEN)
+            return pencil.below(0.5 * (lam[i] + lam[i - 1])) in (i, HIDDEN)
     return True
 
 
-def _settled(K: sp.csc_matrix, M: sp.csc_matrix, lam: np.ndarray, phi: np.ndarray, sigma: float) -> Eigenpairs:
+def _settled(pencil: _Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) -> Eigenpairs:
     """Orthonormalise, polish the soft vectors, set λ of the rigid ones to 0 and sort."""
-    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * stiffness_noise(K, phi), 1e4 * EPS * abs(sigma))
+    K, M = pencil.K, pencil.M
+    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * stiffness_noise(K, phi), UNCLEAR * abs(sigma))
     flexible = np.abs(lam)[~soft].min(initial=np.inf)
     rigid = np.zeros(lam.size, dtype=bool)
     lam = lam.copy()
     if soft.any():
-        phi, lam[soft] = _polished(K, M, phi, soft, sigma)
+        phi, lam[soft] = _polished(pencil, phi, soft, sigma)
         noise = stiffness_noise(K, phi)
         near = (np.abs(lam) <= RIGID_GAP * flexible) & soft
         rigid = soft & ((np.abs(lam) <= RIGID_NOISE * noise) | near)
@@ -289,16 +304,14 @@ def _settled(K: sp.csc_matrix, M: sp.csc_matrix, lam: np.ndarray, phi: np.ndarra
     return Eigenpairs(lam[order], phi[:, order], np.sort(rigid)[::-1][order])
 
 
-def _polished(
-    K: sp.csc_matrix, M: sp.csc_matrix, phi: np.ndarray, soft: np.ndarray, sigma: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _polished(pencil: _Pencil, phi: np.ndarray, soft: np.ndarray, sigma: float) -> tuple[np.ndarray, np.ndarray]:
     """Inverse iteration on the soft subspace, then Rayleigh–Ritz within it."""
     x = phi[:, soft]
     if sigma != 0.0:
-        pencil = shifted(K, M, sigma)
+        inverted = pencil.at(sigma)
         for _ in range(3):
-            x = _orthonormal(M, pencil.iterate(x))
-    ritz, y = la.eigh(x.T @ (K @ x))
+            x = _orthonormal(pencil.M, inverted.iterate(x))
+    ritz, y = la.eigh(x.T @ (pencil.K @ x))
     polished = phi.copy()
     polished[:, soft] = x @ y
     return polished, ritz

@@ -68,6 +68,8 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
         velocities of others (gyroscopic), which would need the derivative of the inputs.
     """
     null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
+    if not null.shape[1]:
+        return Massless(null, null, null)
     own = _restricted(C, null)
     undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK)
     static, relaxing = null @ undamped, null @ damped

@@ -218,13 +218,18 @@ def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
     finite = n - null.shape[1]
     wanted = min(finite, count or (finite if n <= COMPLETE else DEFAULT_COUNT))
     K, M = _symmetric(base.model.K) + _grounded(base), _symmetric(base.model.M)
-    if n <= DENSE or wanted + 30 > finite // 2:
-        T, _ = static_map(K, null)
-        pairs = complete_pairs(sp.csc_matrix(T.T @ K @ T), sp.csc_matrix(T.T @ M @ T))
-        pairs = Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid)
-    else:
-        pairs = lowest_pairs(K, M, wanted)
+    dense = n <= DENSE or wanted + 30 > finite // 2
+    pairs = _complete(K, M, null) if dense else lowest_pairs(K, M, wanted)
     return _described(linear, base, _settled_basis(base, K, pairs), wanted)
+
+
+def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenpairs:
+    """All pairs, the massless freedoms eliminated first."""
+    if not null.shape[1]:
+        return complete_pairs(K, M)
+    T, _ = static_map(K, null)
+    pairs = complete_pairs(sp.csc_matrix(T.T @ K @ T), sp.csc_matrix(T.T @ M @ T))
+    return Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid)
 
 
 def refuse_unsymmetric(K: sp.spmatrix) -> None:

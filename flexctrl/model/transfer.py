@@ -163,20 +163,32 @@ def residual_transfer(base: Scaled, modes: Modes, fit: tuple[float, float], top:
 
 
 class _ModalSum:
-    """Σ (c0 + s c1) b / (s² + d s + λ), as one matrix product."""
+    """Σ (c0 + s c1) b / (s² + d s + λ), as matrix products."""
 
     def __init__(self, modes: Modes, damping: np.ndarray) -> None:
         self.values, self.damping, self.omega = modes.omega_squared, damping, modes.omega
         self.still = _outer(modes.output_gain, modes.input_gain)
         self.moving = _outer(modes.output_rate_gain, modes.input_gain)
-        self.kinds = modes.kinds
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Shape (N, n_outputs · n_inputs)."""
-        s = s[:, None]
-        # (s - iω)(s + iω) keeps the difference to a near pole that s² + ω² would lose
-        turning = np.where(self.values > 0, (s - 1j * self.omega) * (s + 1j * self.omega), s * s + self.values)
-        return _divided(self.still, self.moving, s[:, 0], turning + self.damping * s, "a mode")
+        if not s.real.any():
+            return self._on_the_axis(s.imag[:, None])
+        turning = s[:, None] ** 2 + self.values + self.damping * s[:, None]
+        return _divided(self.still, self.moving, s, turning, "a mode")
+
+    def _on_the_axis(self, omega: np.ndarray) -> np.ndarray:
+        # (ω_i - ω)(ω_i + ω) keeps the difference to a near pole that ω_i² - ω² would lose
+        real = np.where(self.values > 0, (self.omega - omega) * (self.omega + omega), self.values - omega * omega)
+        imag = self.damping * omega
+        size = real * real + imag * imag
+        if not size.all():
+            return _divided(self.still, self.moving, 1j * omega[:, 0], real + 1j * imag, "a mode")
+        real, imag = real / size, imag / size
+        result = real @ self.still - 1j * (imag @ self.still)
+        if self.moving.any():
+            result += omega * (imag @ self.moving) + 1j * omega * (real @ self.moving)
+        return result
 
 
 def _divided(still: np.ndarray, moving: np.ndarray, s: np.ndarray, below: np.ndarray, who: str) -> np.ndarray:
