@@ -54,7 +54,7 @@ def assembled(motion: Motion, blocks: Iterator[tuple[str, Block]]) -> sp.csc_mat
         rows.append(np.repeat(places, len(places)))
         columns.append(np.tile(places, len(places)))
         values.append(matrix.ravel())
-    size = motion.raw + motion.n
+    size = motion.raw
     raw = sp.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size))
     T = motion.jacobian(motion.rest)
     matrix = (T.T @ raw @ T).tocsc()

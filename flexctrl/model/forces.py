@@ -10,7 +10,6 @@ import scipy.sparse as sp
 
 from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.model.families import Family
-from flexctrl.model.followers import Pose
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.motion import Motion, State
 
@@ -36,27 +35,27 @@ class Forces:
 
     @property
     def _seed_base(self) -> int:
-        return self._drive_base + DRIVE_SLOT * self.motion.gears.count
+        return self._drive_base + DRIVE_SLOT * len(self.motion.drives)
 
     def slots(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the flat vector the kernels read."""
         motion = self.motion
         nodes = len(motion.place)
         rates = motion.rates(state, v)
-        accelerations = motion.accelerations(state, rates, v, a)
+        accelerations = motion.accelerations(state, v, a)
         z = np.empty(self._seed_base)
         slots = z[: self._drive_base].reshape(nodes, NODE_SLOT)
         slots[:, :3] = state.x
         slots[:, 3:12] = state.R.reshape(nodes, 9)
         slots[:, 12:18] = rates[: motion.source_base].reshape(nodes, 6)
         slots[:, 18:24] = accelerations[: motion.source_base].reshape(nodes, 6)
-        if motion.gears.count:
+        if motion.drives:
             drives = z[self._drive_base :].reshape(-1, DRIVE_SLOT)
             own = np.append(state.q, 0.0)[motion.sources]
-            drives[:, 0] = np.where(motion.gears.rigid, motion.gears.ratio * state.driven, own)
+            drives[:, 0] = np.where(motion.rigid, motion.ratios * state.driven, own)
             drives[:, 1] = rates[motion.source_base :]
             drives[:, 2] = accelerations[motion.source_base :]
-            drives[:, 3] = motion.gears.unwind(Pose(state.x, state.R), state.driven)[1]
+            drives[:, 3] = motion.turns(state.driven)
         return z
 
     def raw(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -113,7 +112,7 @@ class Forces:
         return blocks
 
     def _projected(self, state: State, blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> sp.csr_matrix:
-        size = self.motion.raw + self.motion.n
+        size = self.motion.raw
         T = self.motion.jacobian(state)
         return (T.T @ sp.csr_matrix((blocks, (rows, columns)), shape=(size, size)) @ T).tocsr()
 

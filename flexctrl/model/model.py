@@ -184,11 +184,8 @@ class Model:
             return self.motion.advance(state, step, v, t)
         q = state.q + step
         raw = (self.motion.jacobian(self.rest) @ q)[: self.motion.source_base].reshape(-1, 6)
-        gears = self.motion.gears
-        both = np.hstack([raw[gears.node], raw[gears.base]])
-        still = gears.gradient(self.motion.rest)  # type: ignore[arg-type]
-        driven = np.einsum("ki,ki->k", still, both)
-        return State(self.rest.x + raw[:, :3], exponential(raw[:, 3:]), q, v, driven, t)
+        x, R = self.rest.x + raw[:, :3], exponential(raw[:, 3:])
+        return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t)
 
     def rates(self, state: State) -> np.ndarray:
         """Return the raw rates of a state."""

@@ -15,9 +15,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import StructureError
-from flexctrl.mechanics.rotation import exponential, orthonormal, skew_arrays
-from flexctrl.model.followers import Batch, Blocks, Pose, batches
-from flexctrl.model.gears import Gears, gears_of
+from flexctrl.mechanics.rotation import exponential, orthonormal
+from flexctrl.model.linkage import Link, Linkage, renumbered
+from flexctrl.structure.drives import Drive, RotaryDrive
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis
@@ -79,10 +79,13 @@ class Motion:
         Number of each cell's degree of freedom; ``n`` stands for none (held, or computed by a follower).
     sources : numpy.ndarray, shape (drives,)
         Number of each source angle's degree of freedom; ``n`` behind a rigid shaft.
-    gears : Gears
-    lines : numpy.ndarray of int, line_axes : numpy.ndarray, shape (lines, 3, 3)
-        Nodes whose rotation is the direction of a line: they turn about body axes.
-    followers : tuple of Batch
+    drives : tuple of Drive
+    linkage : Linkage
+        The nodes that follow, lead or are driven.
+    nodes : numpy.ndarray of int
+        Their numbers.
+    owns : numpy.ndarray of int
+        Degrees of freedom of its hinges and slides.
     rest : State
     notes : tuple of str
         What was released or held so that rigid loops close.
@@ -93,10 +96,10 @@ class Motion:
     names: tuple[str, ...]
     place: np.ndarray
     sources: np.ndarray
-    gears: Gears
-    lines: np.ndarray
-    line_axes: np.ndarray
-    followers: tuple[Batch, ...]
+    drives: tuple[Drive, ...]
+    linkage: Linkage
+    nodes: np.ndarray
+    owns: np.ndarray
     rest: State
     notes: tuple[str, ...]
     closures: tuple[Closure, ...]
@@ -117,22 +120,42 @@ class Motion:
         return self.place.size + self.sources.size
 
     @cached_property
+    def rigid(self) -> np.ndarray:
+        """Which drives have a rigid shaft."""
+        return self.sources >= self.n
+
+    @cached_property
+    def ratios(self) -> np.ndarray:
+        """Motor angle per driven coordinate of each drive."""
+        return np.array([d.effective_ratio for d in self.drives])
+
+    @cached_property
     def plain(self) -> bool:
         """Whether every raw freedom is own, the same as another, or held."""
-        return not self.followers and not self.lines.size and not self.gears.rigid.any()
+        return not self.linkage.follows and not self.linkage.lines and not self.rigid.any()
 
     @cached_property
     def cells(self) -> np.ndarray:
         """Number of each raw freedom's degree of freedom, ``n`` for none, shape (raw,)."""
         return np.append(self.place.ravel(), self.sources)
 
-    def _nodes(self, raw: np.ndarray) -> np.ndarray:
-        return raw[: self.source_base].reshape(-1, 6)
+    @cached_property
+    def _linked(self) -> np.ndarray:
+        """Raw places of the linkage: its nodes, then source angles behind rigid shafts."""
+        cells = (6 * self.nodes[:, None] + np.arange(6)).ravel()
+        return np.append(cells, self.source_base + np.flatnonzero(self.rigid))
 
-    def _turn_out(self, R: np.ndarray, nodes: np.ndarray) -> None:
-        """Take spins of lines from body axes to space axes."""
-        if self.lines.size:
-            nodes[self.lines, 3:] = np.einsum("kij,kj->ki", R[self.lines] @ self.line_axes, nodes[self.lines, 3:])
+    @cached_property
+    def _bases(self) -> np.ndarray:
+        """Raw places of the linkage's nodes."""
+        return self._linked[: 6 * len(self.nodes)]
+
+    @cached_property
+    def _rotary(self) -> np.ndarray:
+        return np.array([isinstance(d, RotaryDrive) for d in self.drives], dtype=bool)
+
+    def _pose(self, x: np.ndarray, R: np.ndarray) -> np.ndarray:
+        return np.hstack([x[self.nodes], R[self.nodes].reshape(-1, 9)])
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
         """Return the state after a step of the degrees of freedom.
@@ -153,110 +176,79 @@ class Motion:
         """
         padded = np.append(step, 0.0)
         moved = padded[self.place]
-        self._turn_out(state.R, moved)
-        new = Pose(state.x + moved[:, :3], orthonormal(exponential(moved[:, 3:]) @ state.R))
-        for batch in self.followers:
-            batch.place(new, Pose(state.x, state.R), padded)
-        driven = self.gears.unwind(new, state.driven)[0] if self.gears.count else state.driven
-        return State(new.x, new.R, state.q + step, v, driven, t)
+        for node, axes in self.linkage.lines:
+            moved[self.nodes[node], 3:] = state.R[self.nodes[node]] @ axes @ moved[self.nodes[node], 3:]
+        x, R = state.x + moved[:, :3], orthonormal(exponential(moved[:, 3:]) @ state.R)
+        if not self.plain:
+            pose = self.linkage.place(self._pose(state.x, state.R), self._pose(x, R), padded[self.owns])
+            x[self.nodes], R[self.nodes] = pose.reshape(-1, 12)[:, :3], pose.reshape(-1, 4, 3)[:, 1:]
+        return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t)
+
+    def unwound(self, x: np.ndarray, R: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Return the driven coordinates of a pose, with the whole turns that bring them next to those before."""
+        if not self.drives:
+            return before
+        driven = self.linkage.driven(self._pose(x, R))
+        return driven + 2.0 * np.pi * np.where(self._rotary, np.rint((before - driven) / (2.0 * np.pi)), 0.0)
+
+    def turns(self, driven: np.ndarray) -> np.ndarray:
+        """Return the whole turns in driven coordinates."""
+        return np.where(self._rotary, np.rint(driven / (2.0 * np.pi)), 0.0)
 
     def rates(self, state: State, v: np.ndarray) -> np.ndarray:
         """Return the raw rates of own rates ``v``."""
-        own, pose = np.append(v, 0.0), Pose(state.x, state.R)
+        own = np.append(v, 0.0)
         raw = own[self.cells]
-        V = self._nodes(raw)
-        self._turn_out(state.R, V)
-        for batch in self.followers:
-            batch.rates(pose, V, own)
-        if self.gears.rigid.any():
-            raw[self.source_base :] = np.where(self.gears.rigid, self.gears.rates(pose, V), raw[self.source_base :])
+        if not self.plain:
+            raw[self._linked] = self.linkage.rates(self._pose(state.x, state.R), raw[self._bases], own[self.owns])
         return raw
 
-    def accelerations(self, state: State, rates: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Return the raw accelerations, given the raw rates, the own rates and own accelerations."""
-        own, rate, pose = np.append(v, 0.0), np.append(a, 0.0), Pose(state.x, state.R)
+    def accelerations(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the raw accelerations of own rates ``v`` and accelerations ``a``."""
+        rate = np.append(a, 0.0)
         raw = rate[self.cells]
-        A, V = self._nodes(raw), self._nodes(rates)
-        self._turn_out(state.R, A)
-        for batch in self.followers:
-            batch.accelerations(pose, A, V, own, rate)
-        if self.gears.rigid.any():
-            raw[self.source_base :] = np.where(
-                self.gears.rigid, self.gears.accelerations(pose, A, V), raw[self.source_base :]
+        if not self.plain:
+            own = np.append(v, 0.0)
+            base = own[self.cells[self._bases]]
+            raw[self._linked] = self.linkage.accelerations(
+                self._pose(state.x, state.R), base, own[self.owns], raw[self._bases], rate[self.owns]
             )
         return raw
 
     def collect(self, state: State, raw: np.ndarray) -> np.ndarray:
-        """Return Tᵀ F: raw forces on the degrees of freedom (n,). The raw vector is used up."""
-        own, pose, F = np.zeros(self.n + 1), Pose(state.x, state.R), self._nodes(raw)
-        if self.gears.rigid.any():
-            self.gears.collect(pose, F, raw[self.source_base :])
-        for batch in reversed(self.followers):
-            batch.collect(pose, F, own)
-        if self.lines.size:
-            F[self.lines, 3:] = np.einsum("kji,kj->ki", state.R[self.lines] @ self.line_axes, F[self.lines, 3:])
-        own += np.bincount(self.cells, weights=raw, minlength=self.n + 1)
-        return own[:-1]
+        """Return Tᵀ F: raw forces on the degrees of freedom (n,)."""
+        if self.plain:
+            return np.bincount(self.cells, weights=raw, minlength=self.n + 1)[:-1]
+        back = self.linkage.collect(self._pose(state.x, state.R), raw[self._linked])
+        raw = raw.copy()
+        raw[self._bases] = back[: self._bases.size]
+        forces = np.bincount(self.cells, weights=raw, minlength=self.n + 1)
+        np.add.at(forces, self.owns, back[self._bases.size :])
+        return forces[:-1]
 
     def jacobian(self, state: State) -> sp.csr_matrix:
-        """Return T (raw + n × n): raw rates, then the own ones, from own rates."""
-        return self._selection if self.plain else self._jacobian(state)
+        """Return T (raw × n): raw rates from own rates."""
+        if self.plain:
+            return self._selection
+        T = self._selection.tolil()
+        T[self._linked] = self.linkage.matrix_at(self._pose(state.x, state.R)) @ self._lead
+        return T.tocsr()
 
     @cached_property
     def _selection(self) -> sp.csr_matrix:
-        return self._jacobian(self.rest)
+        return _select(self.cells, self.n)
 
-    def _jacobian(self, state: State) -> sp.csr_matrix:
-        size, pose = self.raw + self.n, Pose(state.x, state.R)
-        own = np.flatnonzero(self.cells < self.n)
-        rows = np.append(own, self.raw + np.arange(self.n))
-        columns = np.append(self.cells[own], np.arange(self.n))
-        T = sp.csr_matrix((np.ones(rows.size), (rows, columns)), shape=(size, self.n))
-        if self.lines.size:
-            T = self._turn_lines(state) @ T
-        for batch in self.followers:
-            out = Blocks()
-            batch.rows(pose, self.raw, out)
-            T = T + self._matrix(out) @ T
-        if self.gears.rigid.any():
-            out = Blocks()
-            self.gears.rows(pose, self.source_base, out)
-            T = T + self._matrix(out) @ T
-        return T
-
-    def _turn_lines(self, state: State) -> sp.csr_matrix:
-        size = self.raw + self.n
-        turn = sp.lil_matrix(sp.identity(size))
-        for node, axes in zip(self.lines, self.line_axes, strict=True):
-            block = slice(6 * node + 3, 6 * node + 6)
-            turn[block, block] = state.R[node] @ axes
-        return turn.tocsr()
-
-    def _matrix(self, out: Blocks) -> sp.csr_matrix:
-        """Return collected blocks as a matrix; the number n, for no own freedom, is dropped."""
-        size = self.raw + self.n
-        rows, columns, values = (np.concatenate(part) for part in (out.rows, out.columns, out.values))
-        kept = (rows < size) & (columns < size)
-        return sp.csr_matrix((values[kept], (rows[kept], columns[kept])), shape=(size, size))
+    @cached_property
+    def _lead(self) -> sp.csr_matrix:
+        """Base and own rates of the linkage from own rates."""
+        return _select(np.append(self.cells[self._bases], self.owns), self.n)
 
     def stiffening(self, state: State, raw: np.ndarray) -> sp.csr_matrix:
         """Return ∂(Tᵀ F)/∂(own freedoms) under constant raw forces F, shape (n, n): the levers turn."""
-        out, pose, raw = Blocks(), Pose(state.x, state.R), raw.copy()
-        F, own = self._nodes(raw), np.zeros(self.n + 1)
-        if self.gears.rigid.any():
-            self.gears.stiffen(pose, raw[self.source_base :], out)
-            self.gears.collect(pose, F, raw[self.source_base :])
-        for batch in reversed(self.followers):
-            batch.stiffen(pose, F, self.raw, out)
-            batch.collect(pose, F, own)
-        if self.lines.size:
-            # a moment on body axes that turn with the line: δ(Eᵀ Rᵀ M) = Eᵀ Rᵀ (M × δθ)
-            cells = 6 * self.lines[:, None] + 3 + np.arange(3)
-            out.add(cells, cells, skew_arrays(F[self.lines, 3:]))
-        if not out.rows:
-            return sp.csr_matrix((self.n, self.n))
-        T = self.jacobian(state)
-        return (T.T @ self._matrix(out) @ T).tocsr()
+        pose = self._pose(state.x, state.R)
+        lead = self._lead
+        motion = self.linkage.matrix_at(pose)[: self._bases.size] @ lead
+        return (lead.T @ self.linkage.stiffening_at(pose, raw[self._linked]) @ motion).tocsr()
 
     def closure_error(self, state: State) -> float:
         """Return how far the conditions that close rigid loops are violated [m or rad]."""
@@ -324,22 +316,52 @@ def _motion(
     zero = np.zeros(len(kept))
     after = {name: ties.free + i for i, name in enumerate(elastic)}
     sources = number[np.array([after.get(d.name, len(names)) for d in structure.drives], dtype=int)]
-    followers = tuple(
-        replace(b, own=number[b.own]) if hasattr(b, "own") else b  # type: ignore[type-var]
-        for b in batches(ties.follows, x, len(names))
-    )
+    linkage, nodes, owns = _linkage(structure, ties, elastic, x, number)
     return Motion(
         names=tuple(names[i] for i in kept),
         place=place,
         sources=sources,
-        gears=gears_of(structure, elastic),
-        lines=np.array([node for node, _ in ties.lines], dtype=int),
-        line_axes=np.array([_line_axes(along) for _, along in ties.lines]).reshape(-1, 3, 3),
-        followers=followers,
+        drives=structure.drives,
+        linkage=linkage,
+        nodes=nodes,
+        owns=owns,
         rest=State(x, R, zero, zero, np.zeros(len(structure.drives))),
         notes=notes,
         closures=ties.closures,
     )
+
+
+def _linkage(
+    s: Structure, ties: Ties, elastic: tuple[str, ...], x: np.ndarray, number: np.ndarray
+) -> tuple[Linkage, np.ndarray, np.ndarray]:
+    """Return the linkage of a structure, the numbers of its nodes and of its own freedoms."""
+    ground = len(s.nodes)
+    sides = [(s.number(d.node), ground if d.against is None else s.number(d.against)) for d in s.drives]
+    used = {n for f in ties.follows for n in (f.node, f.master)} | {n for n, _ in ties.lines}
+    nodes = sorted(used | {n for pair in sides for n in pair})
+    local = {n: i for i, n in enumerate(nodes)}
+    free = len(number) and int(number[-1])
+    follows = [f.own for f in ties.follows if not isinstance(f, Copy) and f.own and number[f.own - 1] < free]
+    own = {o: i for i, o in enumerate(follows, 1)}
+    links = tuple(
+        Link(d, local[a], local[b], tuple((x[a] - x[b]).tolist()), d.name not in elastic)
+        for d, (a, b) in zip(s.drives, sides, strict=True)
+    )
+    linkage = Linkage(
+        count=len(nodes),
+        rest=x[nodes],
+        follows=tuple(renumbered(f, local, own) for f in ties.follows),
+        lines=tuple((local[n], _line_axes(along)) for n, along in ties.lines),
+        links=links,
+        owns=len(follows),
+    )
+    return linkage, np.array(nodes, dtype=int), number[np.array(follows, dtype=int) - 1]
+
+
+def _select(numbers: np.ndarray, n: int) -> sp.csr_matrix:
+    """Return the matrix that picks entries by number; ``n`` picks nothing."""
+    rows = np.flatnonzero(numbers < n)
+    return sp.csr_matrix((np.ones(rows.size), (rows, numbers[rows])), shape=(numbers.size, n))
 
 
 def _line_axes(along: Vector) -> np.ndarray:
@@ -373,30 +395,33 @@ def _close(
 ) -> tuple[frozenset[int], tuple[str, ...]]:
     """Find which degrees of freedom rigid loops hold; conditions that others already meet are dropped with a note."""
     T = motion.jacobian(motion.rest)
+    rows = T[[6 * c.node + c.freedom for c in closures]].toarray()
+    for row, c in zip(rows, closures, strict=True):
+        row -= T[6 * c.other + c.freedom].toarray().ravel() if c.other >= 0 else 0.0
+    rows[np.abs(rows) < 1e-9 * max(1.0, structure.size)] = 0.0
+    tied = np.flatnonzero(rows.any(axis=0))
+    loose = tied[_undecided(rows[:, tied])]
     labels = [_label(structure, c) for c in closures]
-    rows = []
-    for c in closures:
-        row = T[6 * c.node + c.freedom].toarray().ravel()
-        rows.append(row - T[6 * c.other + c.freedom].toarray().ravel() if c.other >= 0 else row)
-    held: dict[int, str] = {}
-    notes = []
-    scale = 1e-9 * max(1.0, structure.size)
-    for row, label in sorted(
-        zip(rows, labels, strict=True), key=lambda item: np.count_nonzero(np.abs(item[0]) > scale)
-    ):
-        left = [int(i) for i in np.flatnonzero(np.abs(row) > scale) if i not in held]
-        if not left:
-            notes.append(f"{label} is held by rigid parts already; it is left free to second order")
-        elif len(left) == 1:
-            held[left[0]] = label
-            notes.append(f"{motion.names[left[0]]} is held, because {label} is")
-        else:
-            names = ", ".join(motion.names[i] for i in left)
-            raise StructureError(
-                f"rigid parts form a loop: {label} ties {names} together. Loops of rigid parts are not "
-                "eliminated; keep one of the parts in the loop flexible"
-            )
-    return frozenset(held), tuple(notes)
+    if loose.size:
+        worst = int(np.argmax(rows[:, loose].any(axis=1)))
+        names = ", ".join(motion.names[i] for i in loose if rows[worst, i])
+        raise StructureError(
+            f"rigid parts form a loop: {labels[worst]} ties {names} together. Loops of rigid parts are not "
+            "eliminated; keep one of the parts in the loop flexible"
+        )
+    why = {i: ", ".join(label for row, label in zip(rows, labels, strict=True) if row[i]) for i in tied.tolist()}
+    idle = [label for row, label in zip(rows, labels, strict=True) if not row.any()]
+    notes = [f"{label} is held by rigid parts already; it is left free to second order" for label in idle]
+    return frozenset(why), (*notes, *(f"{motion.names[i]} is held, because of {reason}" for i, reason in why.items()))
+
+
+def _undecided(rows: np.ndarray) -> np.ndarray:
+    """Tell which unknowns of rows @ q = 0 are not zero in every solution."""
+    if not rows.size:
+        return np.zeros(rows.shape[1], dtype=bool)
+    _, values, right = np.linalg.svd(rows / np.abs(rows).max(axis=0))
+    rank = int(np.count_nonzero(values > 1e-9 * values[0]))
+    return np.abs(right[rank:]).max(axis=0, initial=0.0) > 1e-7
 
 
 def _label(structure: Structure, c: Closure) -> str:

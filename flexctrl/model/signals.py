@@ -131,9 +131,9 @@ def _linear(s: Structure, output: Position | Velocity | AngularVelocity) -> Meas
 
 
 def _drive_angle(motion: Motion, drive: int) -> Measure:
-    number, ratio = int(motion.sources[drive]), float(motion.gears.ratio[drive])
+    number, ratio = int(motion.sources[drive]), float(motion.ratios[drive])
     cell = motion.source_base + drive
-    if motion.gears.rigid[drive]:
+    if motion.rigid[drive]:
         return Measure(
             lambda state, rates: ratio * float(state.driven[drive]), lambda state, rates: (*_one(cell), *_none)
         )
