@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 
 FLOAT = np.dtype(np.float64)
 _INDEX_LIMIT = 2**31
+_OLDEST_LLVMLITE = (0, 45)
 
 
 class KernelError(FlexctrlError, ValueError):
@@ -223,9 +223,12 @@ class CasadiVM:
         return VMRun.of(kernel, Tables.of(kernel, gather, scatter), params)
 
 
-def _require_llvmlite() -> None:
-    if find_spec("llvmlite") is None:
-        raise MissingExtraError("compiled kernels need llvmlite: pip install flexctrl[fast], or use CasadiVM()")
+def _has_llvmlite() -> bool:
+    try:
+        import llvmlite
+    except ImportError:
+        return False
+    return tuple(map(int, llvmlite.__version__.split(".")[:2])) >= _OLDEST_LLVMLITE
 
 
 @dataclass(frozen=True)
@@ -237,8 +240,8 @@ class Compiled:
     lanes : int
         Items computed at once: 1, 2, 4 or 8; 0 for what suits the processor and the number of items.
     optimize_up_to : int
-        Kernels of more instructions are compiled without optimisation: about six times faster to
-        compile, up to twice slower to run.
+        Kernels of more instructions are compiled without optimisation: five times faster to compile,
+        up to 1.8 times slower to run.
 
     Raises
     ------
@@ -250,7 +253,11 @@ class Compiled:
     optimize_up_to: int = 6000
 
     def __post_init__(self) -> None:
-        _require_llvmlite()
+        if not _has_llvmlite():
+            oldest = ".".join(map(str, _OLDEST_LLVMLITE))
+            raise MissingExtraError(
+                f"compiled kernels need llvmlite {oldest} or later: pip install flexctrl[fast], or use CasadiVM()"
+            )
         if self.lanes not in (0, 1, 2, 4, 8):
             raise KernelError(f"lanes is {self.lanes}, expected 1, 2, 4, 8, or 0 to leave the choice")
 
@@ -272,7 +279,7 @@ class Compiled:
 
 def best_backend() -> Backend:
     """Return `Compiled` if llvmlite is installed, else `CasadiVM`."""
-    return CasadiVM() if find_spec("llvmlite") is None else Compiled()
+    return Compiled() if _has_llvmlite() else CasadiVM()
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from ctypes import addressof
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
-from typing import Any
+from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
 import llvmlite
@@ -182,6 +182,7 @@ class CompiledRun:
     order: np.ndarray
     blocks: np.ndarray
     block: np.ndarray
+    _last: ClassVar[tuple[Any, Any, int, int]] = (None, None, 0, 0)
 
     @classmethod
     def of(cls, kernel: Kernel, code: Code, tables: Tables, params: np.ndarray) -> CompiledRun:
@@ -203,19 +204,26 @@ class CompiledRun:
         return self.block.ctypes.data
 
     @cached_property
-    def _call(self) -> tuple[Callable[..., None], int, int]:
-        return partial(self.code.run, ctypes.c_void_p(self.arguments)), self.tables.z_size, self.tables.r_size
+    def _run(self) -> Callable[[int, int], None]:
+        return partial(self.code.run, ctypes.c_void_p(self.arguments))
 
     def __call__(self, z: np.ndarray, r: np.ndarray) -> None:
-        """Add the outputs of all items into r."""
-        run, z_size, r_size = self._call
-        if z.dtype == r.dtype == FLOAT and z.size >= z_size and r.size >= r_size:
+        """Add the outputs of all items into r. The last z and r are kept, so that they are checked once."""
+        last_z, last_r, z_address, r_address = self._last
+        if z is not last_z or r is not last_r:
+            z_address, r_address = self._addresses(z, r)
+            self.__dict__["_last"] = z, r, z_address, r_address
+        self._run(z_address, r_address)
+
+    def _addresses(self, z: np.ndarray, r: np.ndarray) -> tuple[int, int]:
+        tables = self.tables
+        if z.dtype == r.dtype == FLOAT and z.size >= tables.z_size and r.size >= tables.r_size:
             try:  # three times quicker than array.ctypes
-                return run(addressof(_start(z)), addressof(_start(r)))
+                return addressof(_start(z)), addressof(_start(r))
             except (TypeError, ValueError):  # not contiguous; or z read-only or empty, which is fine
                 pass
-        self.tables.check(z, r)
-        return run(z.ctypes.data, r.ctypes.data)
+        tables.check(z, r)
+        return z.ctypes.data, r.ctypes.data
 
     def with_params(self, params: np.ndarray) -> CompiledRun:
         """Return the same run with other parameters, (n, n_par)."""
@@ -226,8 +234,7 @@ class CompiledRun:
 
     def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
         """Return the run on these two arrays, checked once; it keeps them alive."""
-        self.tables.check(z, r)
-        frame = np.array([self.arguments, z.ctypes.data, r.ctypes.data], dtype=np.int64)
+        frame = np.array([self.arguments, *self._addresses(z, r)], dtype=np.int64)
         fixed = _Fixed(self.code.call, ctypes.c_void_p(frame.ctypes.data))
         fixed.owners = (self, frame, z, r)
         return fixed
