@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.model.families import Family
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.motion import DENSE_UP_TO, Motion, State
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,18 @@ class Forces:
             places, indices, indptr = self._table
             data = np.bincount(places, weights=blocks, minlength=len(indices) + 1)[:-1]
             return sp.csr_matrix((data, indices, indptr), shape=(self.motion.n, self.motion.n), copy=False)
-        slope = self._projected(state, blocks, *self._pattern)
-        if seeds[0] == 0.0:
-            return slope
-        raw = self.raw(state, v, a)
-        return slope + seeds[0] * self.motion.stiffening(state, raw if loads is None else raw + loads)
+        small = self.motion.n <= DENSE_UP_TO
+        slope = self._dense(state, blocks) if small else self._projected(state, blocks, *self._pattern)
+        if seeds[0] != 0.0:
+            raw = self.raw(state, v, a)
+            slope = slope + seeds[0] * self.motion.stiffening(state, raw if loads is None else raw + loads)
+        return sp.csr_matrix(slope)
+
+    def _dense(self, state: State, blocks: np.ndarray) -> np.ndarray:
+        size, (rows, columns) = self.motion.raw, self._pattern
+        T = self.motion.dense_jacobian(state)
+        raw = np.bincount(rows * size + columns, weights=blocks, minlength=size * size).reshape(size, size)
+        return T.T @ raw @ T
 
     def slope_by_part(
         self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]

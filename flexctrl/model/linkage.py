@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, linear_motion, rotary_motion
@@ -125,13 +124,13 @@ class Linkage:
         values = [self._drive_motion(link, self._pose, still).driven for link in self.links]
         return _callable("driven", [self._pose], ca.vertcat(*values, ca.SX(0, 1)))
 
-    def matrix_at(self, pose: np.ndarray) -> sp.csr_matrix:
+    def matrix_at(self, pose: np.ndarray) -> np.ndarray:
         """Return T at a pose."""
-        return sp.csr_matrix(self.matrix(pose).reshape(6 * self.count + self.owns, -1).T)
+        return self.matrix(pose).reshape(6 * self.count + self.owns, -1).T
 
-    def stiffening_at(self, pose: np.ndarray, force: np.ndarray) -> sp.csr_matrix:
+    def stiffening_at(self, pose: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return ∂collected/∂(raw motion) at a pose under constant raw forces."""
-        return sp.csr_matrix(self.stiffening(pose, force).reshape(6 * self.count, -1).T)
+        return self.stiffening(pose, force).reshape(6 * self.count, -1).T
 
     @cached_property
     def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -285,9 +284,9 @@ def _callable(name: str, arguments: list[ca.SX], result: ca.SX) -> Callable[...,
     buffer, evaluate = function.buffer()
     for i, array in enumerate(inputs):
         if array.size:
-            buffer.set_arg(i, array.data)
+            buffer.set_arg(i, array.data)  # type: ignore[call-arg]
     if output.size:
-        buffer.set_res(0, output.data)
+        buffer.set_res(0, output.data)  # type: ignore[call-arg]
 
     def call(*arrays: np.ndarray, keep: object = buffer) -> np.ndarray:
         for own, given in zip(inputs, arrays, strict=True):

@@ -230,9 +230,20 @@ class Motion:
         """Return T (raw × n): raw rates from own rates."""
         if self.plain:
             return self._selection
-        T = self._selection.tolil()
-        T[self._linked] = self.linkage.matrix_at(self._pose(state.x, state.R)) @ self._lead
-        return T.tocsr()
+        linked = self.linkage.matrix_at(self._pose(state.x, state.R)) @ self._lead
+        return self._unlinked + self._spread @ sp.csr_matrix(linked)
+
+    @cached_property
+    def _unlinked(self) -> sp.csr_matrix:
+        kept = np.ones(self.raw)
+        kept[self._linked] = 0.0
+        return sp.diags(kept) @ self._selection
+
+    @cached_property
+    def _spread(self) -> sp.csr_matrix:
+        """Puts the rows of the linkage in their places of a raw vector."""
+        count = self._linked.size
+        return sp.csr_matrix((np.ones(count), (self._linked, np.arange(count))), shape=(self.raw, count))
 
     @cached_property
     def _selection(self) -> sp.csr_matrix:
@@ -243,12 +254,26 @@ class Motion:
         """Base and own rates of the linkage from own rates."""
         return _select(np.append(self.cells[self._bases], self.owns), self.n)
 
-    def stiffening(self, state: State, raw: np.ndarray) -> sp.csr_matrix:
+    def dense_jacobian(self, state: State) -> np.ndarray:
+        """Return T (raw × n) as an array: quicker while it is small."""
+        T = self._dense_selection.copy()
+        if not self.plain:
+            T[self._linked] = self.linkage.matrix_at(self._pose(state.x, state.R)) @ self._dense_lead
+        return T
+
+    @cached_property
+    def _dense_selection(self) -> np.ndarray:
+        return self._selection.toarray()
+
+    @cached_property
+    def _dense_lead(self) -> np.ndarray:
+        return self._lead.toarray()
+
+    def stiffening(self, state: State, raw: np.ndarray) -> np.ndarray:
         """Return ∂(Tᵀ F)/∂(own freedoms) under constant raw forces F, shape (n, n): the levers turn."""
-        pose = self._pose(state.x, state.R)
-        lead = self._lead
+        pose, lead = self._pose(state.x, state.R), self._lead if self.n > DENSE_UP_TO else self._dense_lead
         motion = self.linkage.matrix_at(pose)[: self._bases.size] @ lead
-        return (lead.T @ self.linkage.stiffening_at(pose, raw[self._linked]) @ motion).tocsr()
+        return lead.T @ (self.linkage.stiffening_at(pose, raw[self._linked]) @ motion)
 
     def closure_error(self, state: State) -> float:
         """Return how far the conditions that close rigid loops are violated [m or rad]."""
@@ -260,6 +285,10 @@ class Motion:
                     gap -= state.x[c.other, c.freedom] - self.rest.x[c.other, c.freedom]
                 worst = max(worst, abs(float(gap)))
         return worst
+
+
+DENSE_UP_TO = 60
+"""Degrees of freedom up to which matrices are worked as plain arrays."""
 
 
 def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...]) -> Motion:
