@@ -218,7 +218,7 @@ class Spline(_Profile):
 class TimeOptimalPendulum(_Profile):
     """Quickest path of a trolley, rest to rest, that leaves the pendulum under it at rest too.
 
-    With |ẍ| ≤ A the acceleration switches +A, −A, +A, −A at t₁, T, 2T − t₁ and ends at 2T, where
+    With ``|ẍ| ≤ A`` the acceleration switches +A, −A, +A, −A at t₁, T, 2T − t₁ and ends at 2T, where
     s = T − t₁ solves cos ω s = cos²(ω T/2) and T² = d/A + 2 s². Exact for the linear pendulum
     θ̈ + ω² θ = −ẍ/ℓ (small angles).
 
