@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from flexctrl.model.discrete import Hold
     from flexctrl.model.modal import ModalSystem
     from flexctrl.model.modes import Modes
+    from flexctrl.model.reduction import Method, Reduced, RelativeError
     from flexctrl.model.response import FrequencyResponse
     from flexctrl.model.statespace import Form
 
@@ -202,6 +203,20 @@ class LinearModel:
         from flexctrl.model.response import frequency_response
 
         return frequency_response(self, omega, span)
+
+    def reduce(self, to: Method | RelativeError, using: Callable[[int], Method] | None = None) -> Reduced:
+        """Fewer coordinates, same signals; see :func:`flexctrl.model.reduction.reduce`.
+
+        Parameters
+        ----------
+        to : Method or RelativeError
+            ``ModalTruncation``, ``CraigBampton``, ``BalancedTruncation``, ``MomentMatching``, or an error.
+        using : callable, optional
+            For an error: the method as a function of its order; ``ModalTruncation`` if left out.
+        """
+        from flexctrl.model.reduction import ModalTruncation, reduce
+
+        return reduce(self, to, using or ModalTruncation)
 
     # -- export
 

@@ -1,0 +1,191 @@
+"""What a reduction returns: the reduced model, where it came from, and its measured error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.reduction.low_frequency import low_frequency
+from flexctrl.model.transfer import Transfer, transfer
+
+if TYPE_CHECKING:
+    import control
+
+    from flexctrl.model.modes import Modes
+    from flexctrl.model.reduction.error import ErrorReport
+    from flexctrl.model.response import FrequencyResponse
+
+__all__ = ["Method", "Reduced", "ReducedModel", "corrected", "galerkin"]
+
+
+class Method(Protocol):
+    """A way to reduce, as a frozen value."""
+
+    def apply(self, full: LinearModel) -> Reduced:
+        """Reduce a model without massless freedoms."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A reduced model with its origin.
+
+    Attributes
+    ----------
+    full : LinearModel
+        The model reduced (massless freedoms condensed).
+    method : Method
+        How it was reduced.
+    """
+
+    full: LinearModel
+    method: Method
+
+    def transfer(self, top: float) -> Transfer:
+        """Evaluator of G_r(s), good up to |s| = top (rad/s)."""
+        raise NotImplementedError
+
+    def damped_poles(self) -> np.ndarray:
+        """Poles of the reduced model, smallest modulus first, rad/s."""
+        raise NotImplementedError
+
+    @cached_property
+    def error(self) -> ErrorReport:
+        """Measured error over all frequencies of the full model (see :func:`error_report`)."""
+        from flexctrl.model.reduction.error import error_report
+
+        return error_report(self)
+
+    def error_up_to(self, hz: float) -> ErrorReport:
+        """Measured error from 0 up to a frequency.
+
+        Parameters
+        ----------
+        hz : float
+            End of the band, Hz.
+
+        Returns
+        -------
+        ErrorReport
+        """
+        from flexctrl.model.reduction.error import error_report
+
+        return error_report(self, 2 * np.pi * hz)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedModel(Reduced):
+    """A reduced model that is still second order, with the signal names of the full one.
+
+    Attributes
+    ----------
+    linear : LinearModel
+        The reduced model.
+    basis : numpy.ndarray, shape (n, r)
+        q ≈ basis · q_reduced, in the coordinates of ``full``.
+    rigid : int
+        Rigid-body modes, kept exactly.
+    bound : numpy.ndarray, shape (n_outputs, n_inputs)
+        What |G − G_r| cannot exceed at any frequency, known beforehand; infinite where no bound is known.
+    """
+
+    linear: LinearModel
+    basis: np.ndarray
+    rigid: int
+    bound: np.ndarray
+
+    @property
+    def order(self) -> int:
+        """Number of coordinates."""
+        return len(self.linear.coordinates)
+
+    def modes(self, count: int | None = None) -> Modes:
+        """Modes of the reduced model; as :meth:`LinearModel.modes`."""
+        return self.linear.modes(count)
+
+    def transfer(self, top: float) -> Transfer:
+        """Evaluator of G_r(s), good up to |s| = top (rad/s)."""
+        return transfer(self.linear, top)
+
+    def damped_poles(self) -> np.ndarray:
+        """Poles of the reduced model; as :meth:`LinearModel.damped_poles`."""
+        return self.linear.damped_poles()
+
+    def frequency_response(
+        self, omega: np.ndarray | Sequence[float] | None = None, span: tuple[float, float] | None = None
+    ) -> FrequencyResponse:
+        """Response of the reduced model; as :meth:`LinearModel.frequency_response`."""
+        return self.linear.frequency_response(omega, span)
+
+    def to_ss(self) -> control.StateSpace:
+        """First-order form of the reduced model; as :meth:`LinearModel.to_ss`."""
+        return self.linear.to_ss()
+
+
+def galerkin(
+    full: LinearModel,
+    method: Method,
+    basis: np.ndarray,
+    names: Sequence[str],
+    rigid_coordinates: np.ndarray,
+    static_correction: bool = False,
+) -> ReducedModel:
+    """Project a model, keeping its rigid-body motion exact.
+
+    Parameters
+    ----------
+    full : LinearModel
+    method : Method
+        Kept with the result.
+    basis : numpy.ndarray, shape (n, r)
+    names : sequence of r str
+    rigid_coordinates : numpy.ndarray, shape (r, n_rigid)
+        The rigid-body modes in reduced coordinates, M-orthonormal: basis @ rigid_coordinates.
+    static_correction : bool
+        Add the feedthrough that makes the DC gain exact.
+
+    Returns
+    -------
+    ReducedModel
+    """
+    reduced = full.projected(basis, names)
+    if rigid_coordinates.shape[1]:
+        reduced = _with_exact_rigid_motion(full, reduced, basis, rigid_coordinates)
+    if static_correction:
+        reduced = corrected(full, reduced, basis @ rigid_coordinates, rigid_coordinates)
+    unknown = np.full(full.D.shape, np.inf)
+    return ReducedModel(full, method, reduced, basis, rigid_coordinates.shape[1], unknown)
+
+
+def corrected(full: LinearModel, reduced: LinearModel, rigid: np.ndarray, rigid_reduced: np.ndarray) -> LinearModel:
+    """Add the feedthrough by which the expansions of both models at s = 0 agree in the constant term.
+
+    Parameters
+    ----------
+    full, reduced : LinearModel
+    rigid, rigid_reduced : numpy.ndarray
+        Rigid-body modes of either, M-orthonormal.
+
+    Returns
+    -------
+    LinearModel
+    """
+    missing = low_frequency(full, rigid).constant - low_frequency(reduced, rigid_reduced).constant
+    return replace(reduced, D=reduced.D + missing)
+
+
+def _with_exact_rigid_motion(
+    full: LinearModel, reduced: LinearModel, basis: np.ndarray, rigid: np.ndarray
+) -> LinearModel:
+    """Take the round-off of the projection out of K R = 0, zeros exact."""
+    rest = np.eye(len(rigid)) - rigid @ (reduced.M @ rigid).T
+    K = rest.T @ (reduced.K @ rest)
+    rounding = np.finfo(float).eps * (abs(basis).T @ (abs(full.K) @ abs(basis)))
+    K = np.where(abs(K) > 1e-3 * rounding, 0.5 * (K + K.T), 0.0)
+    return replace(reduced, K=sp.csc_matrix(K))

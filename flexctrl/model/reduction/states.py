@@ -1,0 +1,102 @@
+"""A reduced model that is first order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.linalg import eigvals
+
+from flexctrl.model.grid import peak_grid, refined
+from flexctrl.model.reduction.result import Reduced
+from flexctrl.model.response import MOST_POINTS, FrequencyResponse, response_span
+from flexctrl.model.transfer import Transfer
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["ReducedStates", "Triple"]
+
+
+class Triple(NamedTuple):
+    """ẋ = A x + B u, y = C x."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedStates(Reduced):
+    """A reduced model in first-order form, with the signal names of the full one.
+
+    Attributes
+    ----------
+    system : Triple
+        A, B, C; the states kept exactly come first.
+    D : numpy.ndarray, shape (n_outputs, n_inputs)
+        Feedthrough.
+    exact : int
+        States that were not approximated (integrators, unstable and undamped modes).
+    hankel : numpy.ndarray
+        Hankel singular values of the balanced part, decreasing.
+    bound : numpy.ndarray, shape (n_outputs, n_inputs)
+        2 Σ of the Hankel singular values left out, which |G − G_r| cannot exceed at any frequency; infinite
+        for a model cut to its lowest modes beforehand.
+    """
+
+    system: Triple
+    D: np.ndarray
+    exact: int
+    hankel: np.ndarray
+    bound: np.ndarray
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.system.A)
+
+    def transfer(self, top: float) -> Transfer:
+        """Evaluator of G_r(s), any s."""
+        A, B, C = self.system
+        unit = np.eye(len(A))
+
+        def evaluate(s: np.ndarray) -> np.ndarray:
+            x = np.linalg.solve(np.asarray(s, complex)[:, None, None] * unit - A, B.astype(complex))
+            return np.moveaxis(C @ x + self.D, 0, -1)
+
+        return evaluate
+
+    def frequency_response(
+        self, omega: np.ndarray | Sequence[float] | None = None, span: tuple[float, float] | None = None
+    ) -> FrequencyResponse:
+        """Response of the reduced model; as :meth:`LinearModel.frequency_response`."""
+        evaluate, poles = self.transfer(np.inf), self.damped_poles()
+        if omega is None:
+            points, values = refined(evaluate, peak_grid(poles, span or response_span(poles)), MOST_POINTS)
+        else:
+            points = np.asarray(omega, float)
+            values = evaluate(1j * points)
+        return FrequencyResponse(points, values, self.full.inputs, self.full.outputs, self.full.name)
+
+    def damped_poles(self) -> np.ndarray:
+        """Poles, smallest modulus first."""
+        poles = eigvals(self.system.A) if self.order else np.zeros(0)
+        return poles[np.argsort(abs(poles), kind="stable")]
+
+    def to_ss(self) -> control.StateSpace:
+        """The reduced model for python-control."""
+        import control
+
+        exact = [f"exact{i + 1}" for i in range(self.exact)]
+        rest = [f"balanced{i + 1}" for i in range(self.order - self.exact)]
+        return control.ss(
+            *self.system,
+            self.D,
+            inputs=list(self.full.inputs),
+            outputs=list(self.full.outputs),
+            states=exact + rest,
+            name=self.full.name,
+        )
