@@ -12,18 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-import scipy.sparse.linalg as sla
 
 from flexctrl.errors import LinearizationError
+from flexctrl.model.pencil import EPS, HIDDEN, Pencil, ShiftedPencil
 
-__all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "shifted", "stiffness_noise"]
+__all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
 
-EPS = float(np.finfo(float).eps)
 RIGID_NOISE = 30.0
 SOFT_NOISE = 1e6
 RIGID_GAP = 1e-8
 UNCLEAR = 1e5 * EPS
-HIDDEN, SINGULAR = -1, -2
 
 
 @dataclass(frozen=True)
@@ -80,110 +78,6 @@ def stiffness_noise(K: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
     return EPS * np.sqrt(np.einsum("ij,ij->j", squares, abs(K).power(2) @ squares))
 
 
-@dataclass(frozen=True)
-class _Shifted:
-    """K − σM, factorised; `below` counts the λ under σ (Sylvester), HIDDEN if the pivoting hides it."""
-
-    K: sp.csc_matrix
-    M: sp.csc_matrix
-    sigma: float
-    lu: sla.SuperLU
-    below: int
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """(K − σM)⁻¹ rhs with one step of refinement."""
-        x = self.lu.solve(rhs)
-        return x + self.lu.solve(rhs - self.K @ x + self.sigma * (self.M @ x))
-
-    def iterate(self, x: np.ndarray) -> np.ndarray:
-        """One step of inverse iteration."""
-        return self.solve(self.M @ x)
-
-    def lanczos(self, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        """The `count` pairs nearest to σ, ascending."""
-        n = self.K.shape[0]
-        inverse = sla.LinearOperator((n, n), matvec=self.solve, dtype=float)
-        start = self.iterate(np.random.default_rng(seed).standard_normal(n))
-        lam, phi = sla.eigsh(
-            self.K, count, M=self.M, sigma=self.sigma, OPinv=inverse, v0=start, ncv=min(n, 2 * count + 20)
-        )
-        order = np.argsort(lam)
-        return lam[order], phi[:, order]
-
-
-class _Pencil:
-    """K − σM for many σ: both matrices on one sparsity pattern, so that shifting costs one addition."""
-
-    def __init__(self, K: sp.spmatrix, M: sp.spmatrix) -> None:
-        k, m = sp.coo_matrix(K), sp.coo_matrix(M)
-        at = (np.concatenate([k.row, m.row]), np.concatenate([k.col, m.col]))
-        none_k, none_m = np.zeros_like(k.data, dtype=float), np.zeros_like(m.data, dtype=float)
-        self.K = sp.csc_matrix((np.concatenate([k.data, none_m]), at), shape=K.shape)
-        self.M = sp.csc_matrix((np.concatenate([none_k, m.data]), at), shape=K.shape)
-
-    def at(self, sigma: float) -> _Shifted:
-        """Factorise K − σM; raises LinearizationError if it is singular."""
-        A = sp.csc_matrix((self.K.data - sigma * self.M.data, self.K.indices, self.K.indptr), self.K.shape)
-        options = {"SymmetricMode": True}
-        try:
-            lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-        except RuntimeError as error:
-            raise LinearizationError(
-                f"K - ({sigma:.3g}) M is singular: a freedom has neither mass nor stiffness; see audit()"
-            ) from error
-        hidden = (lu.perm_r != lu.perm_c).any()
-        below = HIDDEN if hidden else int(np.count_nonzero(lu.U.diagonal() < 0))
-        return _Shifted(self.K, self.M, sigma, lu, below)
-
-    def below(self, sigma: float) -> int:
-        """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell."""
-        try:
-            return self.at(sigma).below
-        except LinearizationError:
-            return SINGULAR
-
-    def below_all(self, sigma: float) -> float:
-        """A shift at or under σ with no λ under it, and far enough from 0 to be seen beside K."""
-        for _ in range(60):
-            if self.below(sigma) in (0, HIDDEN):
-                return sigma
-            sigma *= 4.0
-        raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
-
-    def soft_scale(self) -> float:
-        """The first positive λ within a factor of 10, by Sturm counts; rigid ones look like the lowest decade."""
-        k, m = self.K.diagonal(), self.M.diagonal()
-        both = (k > 0) & (m > 0)
-        high = float((k[both] / m[both]).min()) if both.any() else 1.0
-        decades = [0, 15]
-        none = self.below(1e-15 * high)
-        while decades[1] - decades[0] > 1:
-            middle = sum(decades) // 2
-            decades[int(self.below(10.0**-middle * high) <= none)] = middle
-        return 10.0 ** -decades[0] * high
-
-
-def shifted(K: sp.csc_matrix, M: sp.csc_matrix, sigma: float) -> _Shifted:
-    """Factorise K − σM, symmetric pivoting, sparse.
-
-    Parameters
-    ----------
-    K, M : sparse matrices, shape (n, n)
-    sigma : float
-        Shift, (rad/s)².
-
-    Returns
-    -------
-    object with ``solve``, ``iterate``, ``lanczos`` and ``below``
-
-    Raises
-    ------
-    LinearizationError
-        If K − σM is singular: a freedom with neither mass nor stiffness, or σ an eigenvalue.
-    """
-    return _Pencil(K, M).at(sigma)
-
-
 def complete_pairs(K: sp.csc_matrix, M: sp.csc_matrix) -> Eigenpairs:
     """All eigenpairs, dense; M positive definite.
 
@@ -195,7 +89,7 @@ def complete_pairs(K: sp.csc_matrix, M: sp.csc_matrix) -> Eigenpairs:
     -------
     Eigenpairs
     """
-    pencil = _Pencil(K, M)
+    pencil = Pencil(K, M)
     k, m = pencil.K.toarray(), pencil.M.toarray()
     lam, phi = _direct(k, m)
     top = np.abs(lam).max(initial=0.0)
@@ -232,7 +126,7 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
     LinearizationError
         If the Sturm count of K − μM never agrees with the modes found.
     """
-    n, pencil = K.shape[0], _Pencil(K, M)
+    n, (pencil, order) = K.shape[0], Pencil(K, M).reordered()
     wanted, sigma = min(count + 8, n - 2), -pencil.soft_scale()
     for seed in range(20):
         sigma = pencil.below_all(sigma)
@@ -243,7 +137,8 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
         elif scale > 0.0 and not 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
             sigma = -scale
         elif _none_missed(pencil, lam, count):
-            return _settled(pencil, lam, phi, sigma)
+            pairs = _settled(pencil, lam, phi, sigma)
+            return Eigenpairs(pairs.values, pairs.shapes[np.argsort(order)], pairs.rigid)
     raise LinearizationError("the lowest modes could not be certified by a Sturm count; ask for another count")
 
 
@@ -254,14 +149,12 @@ def _direct(k: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise LinearizationError("the mass matrix is not positive definite on the freedoms kept") from error
 
 
-def _low_and_high(inverted: _Shifted, k: np.ndarray, m: np.ndarray, split: float) -> tuple[np.ndarray, np.ndarray]:
+def _low_and_high(inverted: ShiftedPencil, k: np.ndarray, m: np.ndarray, split: float) -> tuple[np.ndarray, np.ndarray]:
     """Pairs under `split` from the inverted pencil, the rest from the direct one in their complement."""
     inverse = inverted.solve(np.eye(len(k)))
     theta, y = la.eigh(m @ (0.5 * (inverse + inverse.T)) @ m, m)
     low = y[:, theta > 1.0 / (split - inverted.sigma)][:, ::-1]
-    after = inverted.iterate(low)
-    theta, z = la.eigh(low.T @ (m @ after), low.T @ (m @ low))
-    low, lam_low = (after @ z)[:, ::-1], inverted.sigma + 1.0 / theta[::-1]
+    lam_low, low = inverted.ritz(low)
     if low.shape[1] == len(k):
         return lam_low, low
     rest = la.qr(m @ low)[0][:, low.shape[1] :]
@@ -276,7 +169,7 @@ def _first_flexible(K: sp.csc_matrix, lam: np.ndarray, phi: np.ndarray, sigma: f
     return float(clear.min()) if clear.size else 0.0
 
 
-def _none_missed(pencil: _Pencil, lam: np.ndarray, count: int) -> bool:
+def _none_missed(pencil: Pencil, lam: np.ndarray, count: int) -> bool:
     """Whether as many λ lie under some gap beyond `count` as were found there."""
     for i in range(min(count, lam.size - 1), lam.size):
         gap = lam[i] - lam[i - 1] if i else 0.0
@@ -285,11 +178,11 @@ def _none_missed(pencil: _Pencil, lam: np.ndarray, count: int) -> bool:
     return True
 
 
-def _settled(pencil: _Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) -> Eigenpairs:
+def _settled(pencil: Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) -> Eigenpairs:
     """Orthonormalise, polish the soft vectors, set λ of the rigid ones to 0 and sort."""
     K, M = pencil.K, pencil.M
     soft = np.abs(lam) <= np.maximum(SOFT_NOISE * stiffness_noise(K, phi), UNCLEAR * abs(sigma))
-    flexible = np.abs(lam)[~soft].min(initial=np.inf)
+    flexible = np.abs(lam)[~soft].min() if not soft.all() else 0.0
     rigid = np.zeros(lam.size, dtype=bool)
     lam = lam.copy()
     if soft.any():
@@ -304,7 +197,7 @@ def _settled(pencil: _Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) ->
     return Eigenpairs(lam[order], phi[:, order], np.sort(rigid)[::-1][order])
 
 
-def _polished(pencil: _Pencil, phi: np.ndarray, soft: np.ndarray, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+def _polished(pencil: Pencil, phi: np.ndarray, soft: np.ndarray, sigma: float) -> tuple[np.ndarray, np.ndarray]:
     """Inverse iteration on the soft subspace, then Rayleigh–Ritz within it."""
     x = phi[:, soft]
     if sigma != 0.0:

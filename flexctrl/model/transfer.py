@@ -10,10 +10,10 @@ import scipy.sparse.linalg as sla
 
 from flexctrl.errors import LinearizationError
 from flexctrl.model.condense import Scaled, scaled
-from flexctrl.model.eigen import shifted
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.modal import ModalSystem, rayleigh
 from flexctrl.model.modes import COMPLETE, Modes, modes_of
+from flexctrl.model.pencil import Pencil
 
 __all__ = ["Transfer", "direct_transfer", "modal_transfer", "residual_transfer", "transfer"]
 
@@ -21,6 +21,7 @@ Transfer = Callable[[np.ndarray], np.ndarray]
 """s, shape (N,), 1/s ↦ H, shape (n_outputs, n_inputs, N)."""
 
 MOST_MODES = 400
+CACHED = 8192
 
 
 def transfer(linear: LinearModel, top: float) -> Transfer:
@@ -139,7 +140,7 @@ def residual_transfer(base: Scaled, modes: Modes, fit: tuple[float, float], top:
     model, phi = base.model, modes.shapes / base.scales[:, None]
     series = _ModalSum(modes, alpha + beta * modes.omega_squared)
     sigma = -max(0.01 * top**2, 1e-3 * float(np.abs(modes.omega_squared).max(initial=1.0)))
-    pencil = shifted(model.K, model.M, sigma)
+    pencil = Pencil(model.K, model.M).at(sigma)
     MPhi = model.M @ phi
     x = pencil.solve(model.B - MPhi @ (phi.T @ model.B))
     still, moving = [], []
@@ -167,27 +168,35 @@ class _ModalSum:
 
     def __init__(self, modes: Modes, damping: np.ndarray) -> None:
         self.values, self.damping, self.omega = modes.omega_squared, damping, modes.omega
+        self.growth_squared = modes.growth**2
         self.still = _outer(modes.output_gain, modes.input_gain)
         self.moving = _outer(modes.output_rate_gain, modes.input_gain)
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Shape (N, n_outputs · n_inputs)."""
-        if not s.real.any():
-            return self._on_the_axis(s.imag[:, None])
-        turning = s[:, None] ** 2 + self.values + self.damping * s[:, None]
-        return _divided(self.still, self.moving, s, turning, "a mode")
+        if s.real.any():
+            turning = s[:, None] ** 2 + self.values + self.damping * s[:, None]
+            return _divided(self.still, self.moving, s, turning, "a mode")
+        # pieces that stay in the cache: three times faster than all at once
+        step = max(1, CACHED // max(1, self.values.size))
+        pieces = [self._on_the_axis(s.imag[i : i + step, None]) for i in range(0, s.size, step)]
+        return np.concatenate(pieces) if pieces else np.zeros((0, self.still.shape[1]), dtype=complex)
 
     def _on_the_axis(self, omega: np.ndarray) -> np.ndarray:
         # (ω_i - ω)(ω_i + ω) keeps the difference to a near pole that ω_i² - ω² would lose
-        real = np.where(self.values > 0, (self.omega - omega) * (self.omega + omega), self.values - omega * omega)
+        real = self.omega - omega
+        real *= self.omega + omega
+        real -= self.growth_squared
         imag = self.damping * omega
-        size = real * real + imag * imag
+        size = real * real
+        size += imag * imag
         if not size.all():
             return _divided(self.still, self.moving, 1j * omega[:, 0], real + 1j * imag, "a mode")
-        real, imag = real / size, imag / size
+        real /= size
+        imag /= size
         result = real @ self.still - 1j * (imag @ self.still)
         if self.moving.any():
-            result += omega * (imag @ self.moving) + 1j * omega * (real @ self.moving)
+            result += omega * (imag @ self.moving + 1j * (real @ self.moving))
         return result
 
 
@@ -225,7 +234,7 @@ def _terms(top: float, sigma: float, modes: Modes) -> int:
 
 def _modes_below(base: Scaled, value: float) -> int:
     """Sturm count of λ < value; a large number where the factors do not tell."""
-    below = shifted(base.model.K, base.model.M, value).below
+    below = Pencil(base.model.K, base.model.M).below(value)
     return MOST_MODES + 1 if below < 0 else below
 
 

@@ -75,6 +75,32 @@ def modes_ratio() -> dict[str, float]:
     return {"freedoms": len(linear.coordinates), "dense_s": dense, "ours_s": ours, "ratio": dense / ours}
 
 
+def exudyn_ratio() -> dict[str, float]:
+    """10 modes of the same matrices through Exudyn's ComputeODE2Eigenvalues, dense (its faster way here)."""
+    import exudyn
+    from exudyn.itemInterface import NodeGenericODE2, ObjectGenericODE2
+
+    linear = s.grid_frame(11, 28)
+    n = len(linear.coordinates)
+    system = exudyn.SystemContainer().AddSystem()
+    zero = [0.0] * n
+    node = system.AddNode(
+        NodeGenericODE2(
+            referenceCoordinates=zero,
+            initialCoordinates=zero,
+            initialCoordinates_t=zero,
+            numberOfODE2Coordinates=n,
+        )
+    )
+    system.AddObject(
+        ObjectGenericODE2(nodeNumbers=[node], massMatrix=linear.M.toarray(), stiffnessMatrix=linear.K.toarray())
+    )
+    system.Assemble()
+    theirs = best_of(2, lambda: system.ComputeODE2Eigenvalues(numberOfEigenvalues=10))
+    ours = best_of(5, lambda: fresh(linear).modes(10))
+    return {"freedoms": n, "exudyn_s": theirs, "ours_s": ours, "ratio": theirs / ours}
+
+
 def large(bays: int, storeys: int) -> dict[str, float]:
     """20 modes and a 1000-point response of a Rayleigh-damped frame."""
     linear = s.grid_frame(bays, storeys, alpha=0.01, beta=1e-5)
@@ -91,7 +117,8 @@ def main() -> None:
     """Print every comparison."""
     print("response, control with slycot   ", response_ratio(slycot=True))
     print("response, control without slycot", response_ratio(slycot=False))
-    print("modes                           ", modes_ratio())
+    print("modes, dense scipy              ", modes_ratio())
+    print("modes, Exudyn                   ", exudyn_ratio())
     for storeys in (50, 100, 200):
         print("large                           ", large(9, storeys))
 
