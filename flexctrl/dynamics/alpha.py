@@ -38,15 +38,23 @@ class Coefficients:
         gamma = 0.5 + alpha_f - alpha_m
         return cls(alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma)
 
+    def blend(self, rate: np.ndarray, before: np.ndarray, algorithmic: np.ndarray) -> np.ndarray:
+        """Return the method's own acceleration after a step, from the true ones at both ends and its own before."""
+        return ((1.0 - self.alpha_f) * rate + self.alpha_f * before - self.alpha_m * algorithmic) / (1.0 - self.alpha_m)
+
 
 @dataclass(frozen=True)
 class Point:
-    """A state with its accelerations: the true ones and the method's own; and what feeds it."""
+    """A state with its accelerations: the true ones and the method's own; what feeds it; and how they grow.
+
+    ``trend`` is the change of the true accelerations over the last step, zero where it predicts worse than none.
+    """
 
     state: State
     rate: np.ndarray
     algorithmic: np.ndarray
     supply: Supply
+    trend: np.ndarray
 
 
 @dataclass
@@ -107,7 +115,7 @@ class Stepper:
         zero = np.zeros(self.model.n)
         force = self.model.balance(state, state.v, zero) + self.model.loads(state, supply.u)
         rate = self._mass(state, supply, step)(force)
-        return Point(state, rate, rate, supply)
+        return Point(state, rate, rate, supply, zero)
 
     def _mass(self, state: State, supply: Supply, step: float) -> Solve:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
@@ -139,10 +147,8 @@ class Stepper:
         c, now = self.coefficients, point.state
         to_v = c.gamma / (h * c.beta)
         to_rate = (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
-        rate = point.rate
-        algorithmic = ((1.0 - c.alpha_f) * rate + c.alpha_f * point.rate - c.alpha_m * point.algorithmic) / (
-            1.0 - c.alpha_m
-        )
+        rate = point.rate + point.trend
+        algorithmic = c.blend(rate, point.rate, point.algorithmic)
         step = h * now.v + h * h * ((0.5 - c.beta) * point.algorithmic + c.beta * algorithmic)
         v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
         last, contraction = np.inf, 0.0
@@ -170,10 +176,8 @@ class Stepper:
         c = self.coefficients
         self.counts.worst = worst
         state = self.model.advance(point.state, step, v, point.state.t + h)
-        algorithmic = ((1.0 - c.alpha_f) * rate + c.alpha_f * point.rate - c.alpha_m * point.algorithmic) / (
-            1.0 - c.alpha_m
-        )
-        return Point(state, rate, algorithmic, self.feed.at(state, point.supply, h))
+        algorithmic = c.blend(rate, point.rate, point.algorithmic)
+        return Point(state, rate, algorithmic, self.feed.at(state, point.supply, h), _trend(point, rate))
 
     def _stale(self, state: State, h: float) -> bool:
         if self._solve is None or abs(h - self._made_for) > 1e-6 * h:
@@ -217,6 +221,14 @@ class Stepper:
         local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self._weight
         allowed = absolute + relative * float((moved * self._weight).max(initial=0.0))
         return float(local.max(initial=0.0)) / allowed
+
+
+def _trend(before: Point, rate: np.ndarray) -> np.ndarray:
+    """Return the change of the accelerations, if going on with the last change was the better guess."""
+    change = rate - before.rate
+    still, onward = np.abs(change).sum(), np.abs(change - before.trend).sum()
+    guessed_well = onward < still if before.trend.any() else still > 0.0
+    return change if guessed_well else np.zeros_like(change)
 
 
 @dataclass(frozen=True)

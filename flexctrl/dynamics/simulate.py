@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -178,7 +178,7 @@ class _Journey:
         state = self.point.state
         fresh = self.feed.restart(state, before) if self.feed.continuous else self.feed.sample(state, before)
         if np.array_equal(fresh.u, before.u):
-            self.point = Point(state, self.point.rate, self.point.algorithmic, fresh)
+            self.point = replace(self.point, supply=fresh)
         else:
             self.point = self.stepper.start(state, fresh, self.size)
 
