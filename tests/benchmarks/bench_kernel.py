@@ -45,13 +45,13 @@ def bound(kernel: Kernel, backend: CasadiVM | Compiled, n: int) -> tuple[Run, np
     return run, rng.standard_normal(gather.max() + 1), np.zeros(scatter.max() + 1)
 
 
-def seconds(action: Callable[[], object], enough: float = 0.05) -> float:
-    """Return the best of several timings of an action."""
+def seconds(action: Callable[[], object], window: float = 0.002) -> float:
+    """Return the best of many short timings of an action: other work on the machine disturbs some of them."""
     start = time.perf_counter()
     action()
-    repeats = max(1, int(enough / 5 / max(time.perf_counter() - start, 1e-7)))
+    repeats = max(1, int(window / max(time.perf_counter() - start, 1e-7)))
     best = float("inf")
-    for _ in range(9):
+    for _ in range(60):
         start = time.perf_counter()
         for _ in range(repeats):
             action()

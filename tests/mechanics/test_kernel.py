@@ -204,20 +204,24 @@ def test_special_values(backend):
     """Zeros with their signs, infinities, NaN and numbers at both ends of the range, against numpy."""
     special = np.array([0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 1e308, -1.7e308, 1e-320, -1e-320, 1e22])
     a, b = (m.ravel() for m in np.meshgrid(special, special))
-    names = ("sin", "cos", "tan", "sqrt", "fabs", "sign", "arctan", "arctan2", "fmin", "fmax", "divide")
+    one = {"sin": "sin", "cos": "cos", "tan": "tan", "sqrt": "sqrt", "fabs": "fabs", "sign": "sign", "atan": "arctan"}
+    two = {"atan2": "arctan2", "fmin": "fmin", "fmax": "fmax", "rdivide": "divide"}
+    two |= {"lt": "less", "le": "less_equal", "eq": "equal", "ne": "not_equal", "logic_and": "logical_and"}
+    two |= {"logic_or": "logical_or", "if_else_zero": "where"}
     kernel = kernel_of(
         lambda x, p: ca.vertcat(
-            *(getattr(ca, name)(x[0]) for name in ("sin", "cos", "tan", "sqrt", "fabs", "sign", "atan")),
-            *(getattr(ca, name)(x[0], x[1]) for name in ("atan2", "fmin", "fmax")),
-            x[0] / x[1],
+            *(getattr(ca, name)(x[0]) for name in one),
+            *(getattr(ca, name)(x[0], x[1]) for name in two if name != "if_else_zero"),
+            ca.if_else(x[0], x[1], 0),
         ),
         n_par=0,
     )
     found = columns(kernel, backend, np.column_stack([a, b]), np.zeros((a.size, 0)))
     with np.errstate(all="ignore"):
-        for k, name in enumerate(names):
-            expected = getattr(np, name)(*((a,) if k < 7 else (a, b)))
-            np.testing.assert_allclose(found[:, k], expected, rtol=3 * EPS, err_msg=name)
+        expected = [getattr(np, name)(a) for name in one.values()]
+        expected += [getattr(np, name)(a, b) for name in two.values() if name != "where"] + [np.where(a != 0, b, 0)]
+    for name, ours, theirs in zip([*one, *two], found.T, expected, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=3 * EPS, err_msg=name)
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).eps == EPS, reason="needs a longer float as reference")
