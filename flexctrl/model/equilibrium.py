@@ -85,9 +85,9 @@ def equilibrium(
     u = model.input_vector(inputs or {})
     held = {model.coordinate(name): value for name, value in (hold or {}).items()}
     state = _place(model, start or model.rest, held)
-    search = _Search(model, u, np.array(sorted(set(range(model.n)) - set(held)), dtype=int))
+    search = Search(model, u, np.array(sorted(set(range(model.n)) - set(held)), dtype=int))
     best, residual, iterations = search.run(state)
-    if not residual <= tolerance:
+    if not residual <= tolerance + search.noise(best):
         raise EquilibriumError(search.complaint(best, residual), best, residual)
     outputs = dict(zip(model.outputs, model.measure(best).tolist(), strict=True))
     return Rest(best, residual, outputs, u, iterations, tuple(hold or ()))
@@ -100,7 +100,7 @@ def _place(model: Model, start: State, held: Mapping[int, float]) -> State:
     return model.advance(start, step, np.zeros(model.n), 0.0)
 
 
-class _Search:
+class Search:
     """The search for one equilibrium: residuals scaled to the forces at work."""
 
     def __init__(self, model: Model, u: np.ndarray, free: np.ndarray) -> None:
@@ -123,6 +123,13 @@ class _Search:
         weights = np.abs(self.model.balance(self.model.rest, self.zero, self.zero) / self.lever).sum()
         return float(max(loads, weights, np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0), 1e-300))
 
+    def noise(self, state: State) -> float:
+        """The relative residual that round-off of the positions alone makes: |K| times their last digits."""
+        slope = abs(self.model.slope(state, self.zero, self.zero, (1.0, 0.0, 0.0), self.u))
+        reach = np.where(self.turning, 1.0, max(self.size, float(np.abs(state.x).max(initial=0.0))))
+        force = (slope @ (reach * np.finfo(float).eps)) / self.lever
+        return 4.0 * float(force[self.free].max(initial=0.0)) / self.scale(state)
+
     def relative(self, force: np.ndarray, scale: float) -> float:
         worst = np.abs(force / self.lever[self.free]).max(initial=0.0) / scale
         return float(worst) if np.isfinite(worst) else np.inf
@@ -144,7 +151,7 @@ class _Search:
         floor, here = 1e-7 * shift, self.relative(force, scale)
         best, least, stalled = state, here, 0
         for iteration in range(_ITERATIONS):
-            if here <= _TARGET or (stalled > 8 and least <= 1e-9):
+            if here <= _TARGET or (stalled > 8 and least <= max(1e-9, self.noise(best))):
                 return best, least, iteration
             try:
                 trial = self.model.advance(state, self.step(state, force, shift), self.zero, 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError
-from flexctrl.model.equilibrium import Rest, equilibrium
+from flexctrl.model.equilibrium import Rest, Search, equilibrium
 from flexctrl.model.linear import LinearModel, PartMatrices
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
@@ -71,15 +71,12 @@ def _free(model: Model, rest: Rest | State) -> np.ndarray:
 
 
 def _check_balance(model: Model, state: State, u: np.ndarray, free: np.ndarray) -> None:
-    zero = np.zeros(model.n)
     if np.abs(state.v).max(initial=0.0) > 0.0:
         raise LinearizationError("linearize: the state moves; give one at rest, e.g. from equilibrium(model)")
-    force = (model.balance(state, zero, zero) + model.loads(state, u))[free]
-    scale = np.abs(model.balance(model.rest, zero, zero)).max(initial=0.0) + np.abs(model.loads(state, u)).max(
-        initial=0.0
-    )
-    worst = int(np.argmax(np.abs(force))) if force.size else 0
-    if force.size and abs(force[worst]) > _BALANCED * max(scale, 1e-300):
+    search = Search(model, u, free)
+    force, scale = search.force(state), search.scale(state)
+    if search.relative(force, scale) > _BALANCED + search.noise(state):
+        worst = int(np.argmax(np.abs(force)))
         raise LinearizationError(
             f"linearize: not an equilibrium: {model.coordinates[free[worst]]} is pushed by {force[worst]:.4g} "
             f"(forces at work: {scale:.3g}); linearise about equilibrium(model), or name the inputs that balance it"
