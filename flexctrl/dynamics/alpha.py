@@ -101,8 +101,7 @@ class Stepper:
     def __post_init__(self) -> None:
         names = self.model.coordinates
         self._turning = np.array([not n.endswith(("_u", "_v", "_w", "_slide", "_source")) for n in names], dtype=bool)
-        sources = np.array([n.endswith("_source") for n in names], dtype=bool)
-        self._weight = np.where(self._turning | sources, 1.0, 1.0 / self.model.structure.size)
+        self._weight = 1.0 / _yardsticks(self.model, self._turning)
 
     def start(self, state: State, supply: Supply, step: float) -> Point:
         """Return a state with the accelerations it has under its inputs.
@@ -229,6 +228,14 @@ def _trend(before: Point, rate: np.ndarray) -> np.ndarray:
     still, onward = np.abs(change).sum(), np.abs(change - before.trend).sum()
     guessed_well = onward < still if before.trend.any() else still > 0.0
     return change if guessed_well else np.zeros_like(change)
+
+
+def _yardsticks(model: Model, turning: np.ndarray) -> np.ndarray:
+    """What an error of 1 is in each coordinate; a source angle counts as the motion it drives, or a motor's many
+    turns would excuse any error of the machine."""
+    size = model.structure.size
+    gears = {f"{d.name}_source": abs(d.effective_ratio) * (1.0, size)[d.column == 0] for d in model.structure.drives}
+    return np.array([gears.get(n, 1.0 if t else size) for n, t in zip(model.coordinates, turning, strict=True)])
 
 
 @dataclass(frozen=True)
