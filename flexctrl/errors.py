@@ -79,7 +79,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
         A phrase to append to an error message; empty if nothing is known.
     """
     names = [str(k) for k in known]
-    close = difflib.get_close_matches(name, names, n=1)
+    close = difflib.get_close_matches(str(name), names, n=1)
     if close:
         return f"; did you mean {close[0]!r}?"
     return f"; known: {', '.join(names)}" if names else ""

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, drag, viscous_force
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion, space_inertia
-from flexctrl.structure.freedoms import check_finite
+from flexctrl.structure.freedoms import check_finite, listed
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -40,8 +42,8 @@ class RayleighDamping(Effect):
     beta: float = 0.0
 
     def __post_init__(self) -> None:
-        check_finite(self.alpha, "alpha", "RayleighDamping", least=0.0)
-        check_finite(self.beta, "beta", "RayleighDamping", least=0.0)
+        for name in ("alpha", "beta"):
+            object.__setattr__(self, name, check_finite(getattr(self, name), name, "RayleighDamping", least=0.0))
 
     @classmethod
     def through(cls, zeta: float, omega1: float, omega2: float) -> RayleighDamping:
@@ -58,6 +60,10 @@ class RayleighDamping(Effect):
         -------
         RayleighDamping
         """
+        owner = "RayleighDamping.through"
+        zeta = check_finite(zeta, "zeta", owner, least=0.0)
+        omega1 = check_finite(omega1, "omega1", owner, above=0.0)
+        omega2 = check_finite(omega2, "omega2", owner, above=0.0)
         return cls(2.0 * zeta * omega1 * omega2 / (omega1 + omega2), 2.0 * zeta / (omega1 + omega2))
 
     def beam(self, m: BeamMotion) -> BeamForce:
@@ -105,8 +111,13 @@ class ModalDamping(Effect):
     ratios: tuple[float, ...] | float
 
     def __init__(self, ratios: float | Sequence[float]) -> None:
-        values = ratios if isinstance(ratios, Sequence) else (ratios,)
-        checked = tuple(check_finite(z, "ratio", "ModalDamping", least=0.0) for z in values)
-        if not checked:
-            raise StructureError("ModalDamping: no ratios given; give one number or one per mode")
-        object.__setattr__(self, "ratios", checked if isinstance(ratios, Sequence) else checked[0])
+        def checked(ratio: float) -> float:
+            return check_finite(ratio, "ratio", "ModalDamping", least=0.0)
+
+        if isinstance(ratios, Sequence | np.ndarray):
+            several = tuple(checked(z) for z in listed(ratios, "ModalDamping: ratios"))
+            if not several:
+                raise StructureError("ModalDamping: no ratios given; give one number or one per mode")
+            object.__setattr__(self, "ratios", several)
+        else:
+            object.__setattr__(self, "ratios", checked(ratios))

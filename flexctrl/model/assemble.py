@@ -17,6 +17,7 @@ from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.motion import motion_of
 from flexctrl.structure.elements import Beam, Rope
+from flexctrl.structure.freedoms import listed
 from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import Group
 
@@ -42,6 +43,8 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     StructureError
         For something that is no effect, an effect given twice, or a loop of rigid parts.
     """
+    if not isinstance(structure, Structure):
+        raise StructureError(f"assemble: {structure!r} is no Structure")
     parts = _flat(effects)
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
     groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
@@ -90,10 +93,11 @@ def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, .
 
 
 def _flat(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    for effect in effects:
+    given = listed(effects, "assemble: effects")
+    for effect in given:
         if not isinstance(effect, Effect):
             raise StructureError(f"assemble: {effect!r} is no effect; give e.g. flexctrl.Gravity()")
-    parts = tuple(p for e in effects for p in e.parts())
+    parts = tuple(p for e in given for p in e.parts())
     twice = [type(p).__name__ for i, p in enumerate(parts) if type(p) in map(type, parts[:i])]
     if twice:
         raise StructureError(f"assemble: the effect {twice[0]} is given twice; keep one")

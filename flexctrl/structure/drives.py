@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Node
+from flexctrl.structure.elements import Node, check_node
 from flexctrl.structure.freedoms import Vector, check_finite, check_name, parse_direction
 
 
@@ -163,17 +163,17 @@ def _set_drive(
     owner: str,
 ) -> None:
     for side in (node,) if against is None else (node, against):
-        if not isinstance(side, Node):
-            raise StructureError(f"{owner}: {side!r} is no node; give e.g. beam.end")
-        if not any(drive.column + i in side.freedoms for i in range(3)):
+        check_node(side, owner)
+        if drive.column not in side.freedoms:
             raise StructureError(f"{owner}: {side} has no rotations to drive; drive a beam or a rigid body")
-    if check_finite(ratio, "ratio", owner) == 0.0:
+    ratio = check_finite(ratio, "ratio", owner)
+    if ratio == 0.0:
         raise StructureError(f"{owner}: ratio = 0; a reduction ratio is not zero (1 for a direct drive)")
     object.__setattr__(drive, "name", name)
     object.__setattr__(drive, "node", node)
     object.__setattr__(drive, "against", against)
     object.__setattr__(drive, "stiffness", check_finite(stiffness, "stiffness", owner, above=0.0))
-    object.__setattr__(drive, "ratio", float(ratio))
+    object.__setattr__(drive, "ratio", ratio)
     object.__setattr__(drive, "inertia", check_finite(inertia, "inertia", owner, least=0.0))
     object.__setattr__(drive, "damping", check_finite(damping, "damping", owner, least=0.0))
 

@@ -12,10 +12,13 @@ import numpy as np
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.freedoms import (
     ALL,
+    HUGE,
     TRANSLATIONS,
     Vector,
     check_finite,
     check_name,
+    check_whole,
+    numbers,
     parse_direction,
     parse_point,
 )
@@ -45,6 +48,13 @@ class Node:
 
     def __str__(self) -> str:
         return f"node {self.index} of {self.part}"
+
+
+def check_node(node: Node, owner: str) -> Node:
+    """Return ``node`` if it is one."""
+    if not isinstance(node, Node):
+        raise StructureError(f"{owner}: {node!r} is no node; give e.g. beam.start, beam.node(2) or body.point('hook')")
+    return node
 
 
 def _position(at: Node | Sequence[float], owner: str) -> Vector:
@@ -99,23 +109,21 @@ class Beam:
         owner = f"Beam {check_name(name, 'Beam')!r}"
         if not isinstance(section, Section):
             raise StructureError(f"{owner}: section = {section!r}; expected a flexctrl.Section")
-        if not isinstance(elements, (int, np.integer)) or elements < 1:
-            raise StructureError(f"{owner}: elements = {elements!r}; expected a whole number ≥ 1")
+        count = check_whole(elements, "elements", owner, least=1, most=10**6)
         a, b = _position(start, owner), _position(end, owner)
         _check_length(a, b, owner)
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "section", section)
-        object.__setattr__(self, "elements", int(elements))
+        object.__setattr__(self, "elements", count)
         object.__setattr__(self, "up", None if up is None else parse_direction(up, owner))
         object.__setattr__(self, "start", Node(name, 0, a))
-        object.__setattr__(self, "end", Node(name, int(elements), b))
+        object.__setattr__(self, "end", Node(name, count, b))
         if np.linalg.norm(np.cross(self._axis, self._up)) < 1e-6:
             raise StructureError(f"{owner}: up = {up!r} points along the beam; choose a direction across it")
 
     @property
     def _axis(self) -> np.ndarray:
-        d = np.subtract(self.end.position, self.start.position)
-        return d / np.linalg.norm(d)
+        return np.subtract(self.end.position, self.start.position) / self.length
 
     @property
     def _up(self) -> np.ndarray:
@@ -158,9 +166,9 @@ class Beam:
             If the beam has no such node.
         """
         count = self.elements + 1
-        if not -count <= index < count:
-            raise StructureError(f"Beam {self.name!r} has nodes 0…{count - 1}; there is no node {index}")
-        index %= count
+        if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or not -count <= index < count:
+            raise StructureError(f"Beam {self.name!r} has nodes 0…{count - 1}; there is no node {index!r}")
+        index = int(index) % count
         if index in (0, self.elements):
             return self.start if index == 0 else self.end
         a, b = np.array(self.start.position), np.array(self.end.position)
@@ -378,6 +386,8 @@ class RigidBody:
         object.__setattr__(self, "at", _position(at, owner))
         object.__setattr__(self, "mass", check_finite(mass, "mass", owner, least=0.0))
         object.__setattr__(self, "inertia", _check_inertia(inertia, owner))
+        if not isinstance(points, Mapping | None):
+            raise StructureError(f"{owner}: points = {points!r}; expected a mapping of names to places (x, y, z)")
         named = {check_name(k, f"{owner}, point"): parse_point(p, owner) for k, p in (points or {}).items()}
         object.__setattr__(self, "points", named)
 
@@ -407,15 +417,17 @@ class RigidBody:
         StructureError
             If the body has no point of that name.
         """
-        if name not in self.points:
+        if not isinstance(name, str) or name not in self.points:
             raise StructureError(f"RigidBody {self.name!r} has no point {name!r}{did_you_mean(name, self.points)}")
         return Node(self.name, 1 + list(self.points).index(name), self.points[name])
 
 
 def _check_inertia(inertia: object, owner: str) -> tuple[Vector, Vector, Vector]:
-    tensor = np.asarray(inertia, dtype=float)
-    tensor = np.diag(tensor) if tensor.shape == (3,) else tensor
-    if tensor.shape != (3, 3) or not np.isfinite(tensor).all() or not np.allclose(tensor, tensor.T, rtol=1e-9):
+    flat = numbers(inertia)
+    rows = [numbers(row) for row in inertia] if flat else []  # type: ignore[attr-defined]
+    full = np.array(rows) if [len(row) for row in rows] == [3, 3, 3] else np.full((3, 3), np.nan)
+    tensor = np.diag(flat) if len(flat) == 3 and np.isfinite(flat).all() else full
+    if not np.abs(tensor - tensor.T).max() <= 1e-9 * np.abs(tensor).max() < HUGE:
         raise StructureError(f"{owner}: inertia = {inertia!r}; expected 3 moments or a symmetric 3 × 3 tensor [kg m²]")
     moments = np.linalg.eigvalsh(tensor)
     if moments[0] < -1e-9 * abs(moments[2]) or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
@@ -423,8 +435,8 @@ def _check_inertia(inertia: object, owner: str) -> tuple[Vector, Vector, Vector]
             f"{owner}: principal moments {moments.tolist()} kg m² belong to no body: none may be negative "
             "or larger than the sum of the other two"
         )
-    a, b, c = (tuple(row) for row in tensor.tolist())
-    return (a, b, c)
+    a, b, c = tensor.tolist()
+    return (tuple(a), tuple(b), tuple(c))
 
 
 Part: TypeAlias = Beam | Rope | Spring | PointMass | RigidBody

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
+from numbers import Integral, Real
 from typing import TypeAlias
+
+import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
 
@@ -21,6 +24,9 @@ _INDEX = {name: i for i, name in enumerate(FREEDOMS)} | {name: i for i, name in 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
+HUGE = 1e50
+"""Numbers from here on are refused: powers of them would overflow."""
+
 ALL = frozenset(range(6))
 TRANSLATIONS = frozenset(range(3))
 ROTATIONS = frozenset(range(3, 6))
@@ -28,10 +34,10 @@ ROTATIONS = frozenset(range(3, 6))
 
 def parse_freedoms(text: str | Iterable[str], owner: str) -> frozenset[int]:
     """Read freedoms such as ``"v w"``, ``"all"`` or ``["u", "rz"]`` into their indices 0…5."""
-    words = text.replace(",", " ").split() if isinstance(text, str) else list(text)
+    words = text.replace(",", " ").split() if isinstance(text, str) else listed(text, f"{owner}: held")
     if words == ["all"]:
         return ALL
-    unknown = [w for w in words if w not in _INDEX]
+    unknown = [w for w in words if not isinstance(w, str) or w not in _INDEX]
     if unknown:
         known = (*FREEDOMS, *IDENTIFIERS[3:], "all")
         raise StructureError(f"{owner}: no freedom {unknown[0]!r}{did_you_mean(unknown[0], known)}")
@@ -44,7 +50,7 @@ def parse_direction(direction: str | Sequence[float], owner: str) -> Vector:
     """Read a direction, ``"x"``, ``"-z"`` or three numbers, into a unit vector."""
     if isinstance(direction, str):
         sign = -1.0 if direction.startswith("-") else 1.0
-        axis = _AXES.get(direction.lstrip("+-"))
+        axis = _AXES.get(direction[1:] if direction[:1] in ("+", "-") else direction)
         if axis is None:
             raise StructureError(f"{owner}: no direction {direction!r}; give x, y, z, -x, -y, -z or three numbers")
         return (sign * axis[0] + 0.0, sign * axis[1] + 0.0, sign * axis[2] + 0.0)
@@ -57,11 +63,8 @@ def parse_direction(direction: str | Sequence[float], owner: str) -> Vector:
 
 def parse_point(point: Sequence[float], owner: str) -> Vector:
     """Read three finite numbers."""
-    try:
-        values = tuple(float(p) for p in point)
-    except (TypeError, ValueError):
-        values = ()
-    if len(values) != 3 or not all(math.isfinite(p) for p in values):
+    values = numbers(point)
+    if len(values) != 3 or not all(abs(p) < HUGE for p in values):
         raise StructureError(f"{owner}: expected three finite numbers (x, y, z) in m, got {point!r}")
     return (values[0], values[1], values[2])
 
@@ -76,12 +79,33 @@ def check_name(name: str, kind: str) -> str:
     return name
 
 
+def listed(items: Iterable, owner: str) -> list:
+    """Return the items of a list."""
+    try:
+        return list(items)
+    except TypeError:
+        raise StructureError(f"{owner} = {items!r}; expected a list") from None
+
+
+def numbers(values: object) -> tuple[float, ...]:
+    """Return a sequence's numbers, NaN for what is none; nothing for what is no sequence."""
+    several = values.ndim > 0 if isinstance(values, np.ndarray) else isinstance(values, Sequence)
+    return tuple(map(_number, values)) if several else ()  # type: ignore[call-overload]
+
+
+def _number(value: object) -> float:
+    """Return a real number as a float; NaN for what is none, strings and truth values among it."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
 def check_number(value: float, what: str, owner: str, *, least: float = -math.inf, above: float = -math.inf) -> float:
     """Return ``value`` as a float if it is a number ≥ ``least`` and > ``above``."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
+    number = _number(value)
     if math.isnan(number) or number < least or number <= above:
         bound = f" > {above:g}" if above > -math.inf else f" ≥ {least:g}" if least > -math.inf else ""
         raise StructureError(f"{owner}: {what} = {value!r}; expected a number{bound}")
@@ -91,6 +115,13 @@ def check_number(value: float, what: str, owner: str, *, least: float = -math.in
 def check_finite(value: float, what: str, owner: str, *, least: float = -math.inf, above: float = -math.inf) -> float:
     """Return ``value`` as a finite float within the bounds."""
     number = check_number(value, what, owner, least=least, above=above)
-    if math.isinf(number):
-        raise StructureError(f"{owner}: {what} = {value!r}; expected a finite number")
+    if abs(number) >= HUGE:
+        raise StructureError(f"{owner}: {what} = {value!r}; expected a finite number below {HUGE:g}")
     return number
+
+
+def check_whole(value: int, what: str, owner: str, *, least: int, most: int = 2**31) -> int:
+    """Return ``value`` as an int if it is a whole number from ``least`` to ``most``."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= value <= most:
+        raise StructureError(f"{owner}: {what} = {value!r}; expected a whole number from {least} to {most}")
+    return int(value)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from flexctrl.errors import StructureError
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Node
-from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
+from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector, check_whole, listed, numbers
 from flexctrl.structure.joints import Joint, main_axis
 from flexctrl.structure.ties import Copy, Follow, Group, Ride, Turn, tie
 
@@ -54,16 +54,21 @@ class JoinTable:
     relative: frozenset[tuple[int, int]] = field(default_factory=frozenset)
 
     def __post_init__(self) -> None:
+        for i, row in enumerate((*self.rows, *self.drives), 1):
+            _check_row(row, 6, i)
         numbers = sorted({n for row in (*self.rows, *self.drives) for n in row} - {0})
         if numbers != list(range(1, len(numbers) + 1)):
             missing = next(i for i, n in enumerate(numbers, 1) if i != n)
             raise StructureError(
                 f"JoinTable: degrees of freedom are numbered 1…{len(numbers)} without gaps; {missing} is missing"
             )
-        own = {n for row in self.rows for n in row}
-        for label, row in zip(self.drive_labels, self.drives, strict=False):
-            if sum(map(bool, row)) != 1 or own & (set(row) - {0}):
-                raise StructureError(f"JoinTable: the source angle of drive {label!r} needs one number of its own")
+        own = max((n for row in self.rows for n in row), default=0)
+        for i, row in enumerate(self.drives, 1):
+            if sorted(row)[-2:] != [0, own + i]:
+                raise StructureError(
+                    f"JoinTable: the source angle of drive {i} has the row {row}; expected one number of its own, "
+                    f"{own + i}: source angles come last, in the order of the drives"
+                )
 
     @classmethod
     def from_rows(
@@ -95,16 +100,16 @@ class JoinTable:
         places = _columns(columns)
 
         def widen(row: Sequence[int], i: int) -> Row:
-            if len(row) != len(places) or any(int(n) != n or n < 0 for n in row):
-                raise StructureError(f"JoinTable: row {i} is {tuple(row)}; expected {len(places)} whole numbers ≥ 0")
+            _check_row(row, len(places), i)
             full = [0] * 6
             for place, number in zip(places, row, strict=True):
                 full[place] = int(number)
             return tuple(full)  # type: ignore[return-value]
 
+        nodes = listed(rows, "JoinTable: rows")
         return cls(
-            rows=tuple(widen(r, i) for i, r in enumerate(rows, 1)),
-            drives=tuple(widen(r, i) for i, r in enumerate(drives, len(rows) + 1)),
+            rows=tuple(widen(r, i) for i, r in enumerate(nodes, 1)),
+            drives=tuple(widen(r, i) for i, r in enumerate(listed(drives, "JoinTable: drives"), len(nodes) + 1)),
         )
 
     @property
@@ -145,12 +150,23 @@ class JoinTable:
         return "\n".join(line.rstrip() for line in lines)
 
 
+def _check_row(row: Sequence[int], width: int, number: int) -> None:
+    owner = f"JoinTable: row {number}"
+    if len(numbers(row)) != width:
+        raise StructureError(f"{owner} is {row!r}; expected {width} whole numbers ≥ 0")
+    for n in row:
+        check_whole(n, "number", owner, least=0)
+
+
 def _columns(columns: str) -> list[int]:
-    names = columns.split()
+    names = columns.split() if isinstance(columns, str) else [columns]
     known = {n: i for i, n in enumerate(FREEDOMS)} | {n: i for i, n in enumerate(IDENTIFIERS)}
-    unknown = [n for n in names if n not in known]
-    if unknown:
-        raise StructureError(f"JoinTable: no freedom {unknown[0]!r}; columns are some of {' '.join(FREEDOMS)}")
+    unknown = [n for n in names if not isinstance(n, str) or n not in known]
+    if unknown or not names:
+        given = f"no freedom {unknown[0]!r}" if unknown else "no columns given"
+        raise StructureError(f"JoinTable: {given}; columns are some of {' '.join(FREEDOMS)}")
+    if len({known[n] for n in names}) < len(names):
+        raise StructureError(f"JoinTable: columns {columns!r} name a freedom twice")
     return [known[n] for n in names]
 
 
@@ -184,7 +200,7 @@ def join(nodes: Sequence[Node], joints: Sequence[Joint], drives: Sequence[Drive]
             rows[follow.node][columns[0] + main_axis(axis)] = follow.own
     return JoinTable(
         rows=tuple(tuple(row) for row in rows),  # type: ignore[misc]
-        drives=tuple(_drive_row(d, ties.free + k) for k, d in enumerate(drives, 1)),
+        drives=tuple(drive_row(d, ties.free + k) for k, d in enumerate(drives, 1)),
         labels=tuple(f"{n.part} {n.index}" for n in nodes),
         drive_labels=tuple(d.name for d in drives),
         relative=frozenset(relative),
@@ -213,7 +229,8 @@ def _skew(follow: Follow, nodes: Sequence[Node]) -> bool:
     return math.dist(nodes[follow.node].position, nodes[follow.master].position) > 0.0
 
 
-def _drive_row(drive: Drive, number: int) -> Row:
+def drive_row(drive: Drive, number: int) -> Row:
+    """Return a source angle's row: its number in the column nearest to the driven freedom."""
     row = [0] * 6
     row[drive.column + main_axis(drive.direction)] = number
     return tuple(row)  # type: ignore[return-value]

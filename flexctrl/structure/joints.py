@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Node
+from flexctrl.structure.elements import Node, check_node
 from flexctrl.structure.freedoms import (
     ALL,
     FREEDOMS,
@@ -21,10 +21,7 @@ from flexctrl.structure.freedoms import (
 
 def _check_nodes(kind: str, *nodes: Node) -> None:
     for node in nodes:
-        if not isinstance(node, Node):
-            raise StructureError(
-                f"{kind}: {node!r} is no node; give e.g. beam.start, beam.node(2) or body.point('hook')"
-            )
+        check_node(node, kind)
     if len(nodes) == 2 and (nodes[0].part, nodes[0].index) == (nodes[1].part, nodes[1].index):
         raise StructureError(f"{kind}: ties {nodes[0]} to itself; give two nodes of different parts")
 
@@ -51,7 +48,7 @@ class Support:
     def __init__(self, node: Node, held: str | Sequence[str] = "all") -> None:
         _check_nodes("Support", node)
         freedoms = parse_freedoms(held, f"Support of {node}")
-        if held == "all":
+        if freedoms == ALL:
             freedoms &= node.freedoms
         if freedoms - node.freedoms:
             names = " ".join(FREEDOMS[i] for i in sorted(freedoms - node.freedoms))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flexctrl.errors import StructureError
 from flexctrl.structure.freedoms import check_finite, check_number
 
 
@@ -32,9 +33,9 @@ class Material:
     nu: float = 0.3
 
     def __post_init__(self) -> None:
-        check_finite(self.E, "E", "Material", above=0.0)
-        check_finite(self.rho, "rho", "Material", least=0.0)
-        check_finite(self.nu, "nu", "Material", above=-1.0)
+        object.__setattr__(self, "E", check_finite(self.E, "E", "Material", above=0.0))
+        object.__setattr__(self, "rho", check_finite(self.rho, "rho", "Material", least=0.0))
+        object.__setattr__(self, "nu", check_finite(self.nu, "nu", "Material", above=-1.0))
         check_finite(0.5 - self.nu, "0.5 - nu", "Material", least=0.0)
 
     @property
@@ -88,12 +89,12 @@ class Section:
     GA_z: float = math.inf
 
     def __post_init__(self) -> None:
-        for stiffness in ("EA", "EI_y", "EI_z", "GJ"):
-            check_finite(getattr(self, stiffness), stiffness, "Section", above=0.0)
-        for inertia in ("rhoA", "rhoJ", "rhoI_y", "rhoI_z"):
-            check_finite(getattr(self, inertia), inertia, "Section", least=0.0)
-        for shear in ("GA_y", "GA_z"):
-            check_number(getattr(self, shear), shear, "Section", above=0.0)
+        for name in ("EA", "EI_y", "EI_z", "GJ"):
+            object.__setattr__(self, name, check_finite(getattr(self, name), name, "Section", above=0.0))
+        for name in ("rhoA", "rhoJ", "rhoI_y", "rhoI_z"):
+            object.__setattr__(self, name, check_finite(getattr(self, name), name, "Section", least=0.0))
+        for name in ("GA_y", "GA_z"):
+            object.__setattr__(self, name, check_number(getattr(self, name), name, "Section", above=0.0))
 
     @classmethod
     def circular(cls, material: Material, radius: float) -> Section:
@@ -109,7 +110,7 @@ class Section:
         -------
         Section
         """
-        check_finite(radius, "radius", "Section.circular", above=0.0)
+        radius = check_finite(radius, "radius", "Section.circular", above=0.0)
         second = math.pi * radius**4 / 4.0
         return _from_moments(material, math.pi * radius**2, second, second, 2.0 * second)
 
@@ -129,7 +130,8 @@ class Section:
         -------
         Section
         """
-        check_finite(thickness, "thickness", "Section.tube", above=0.0)
+        radius = check_finite(radius, "radius", "Section.tube", above=0.0)
+        thickness = check_finite(thickness, "thickness", "Section.tube", above=0.0)
         inner = check_finite(radius - thickness, "radius - thickness", "Section.tube", least=0.0)
         second = math.pi * (radius**4 - inner**4) / 4.0
         return _from_moments(material, math.pi * (radius**2 - inner**2), second, second, 2.0 * second)
@@ -150,8 +152,8 @@ class Section:
         -------
         Section
         """
-        check_finite(width, "width", "Section.rectangle", above=0.0)
-        check_finite(height, "height", "Section.rectangle", above=0.0)
+        width = check_finite(width, "width", "Section.rectangle", above=0.0)
+        height = check_finite(height, "height", "Section.rectangle", above=0.0)
         long, short = max(width, height), min(width, height)
         series = sum(math.tanh(k * math.pi * long / (2.0 * short)) / k**5 for k in range(1, 40, 2))
         torsion = long * short**3 / 3.0 * (1.0 - 192.0 * short / (math.pi**5 * long) * series)
@@ -173,8 +175,10 @@ class Section:
         -------
         Section
         """
-        check_finite(web, "web", "Section.box", above=0.0)
-        check_finite(flange, "flange", "Section.box", above=0.0)
+        width = check_finite(width, "width", "Section.box", above=0.0)
+        height = check_finite(height, "height", "Section.box", above=0.0)
+        web = check_finite(web, "web", "Section.box", above=0.0)
+        flange = check_finite(flange, "flange", "Section.box", above=0.0)
         b = check_finite(width - 2 * web, "width - 2 web", "Section.box", least=0.0)
         h = check_finite(height - 2 * flange, "height - 2 flange", "Section.box", least=0.0)
         around_y = (width * height**3 - b * h**3) / 12.0
@@ -185,6 +189,8 @@ class Section:
 
 
 def _from_moments(m: Material, area: float, I_y: float, I_z: float, J: float) -> Section:
+    if not isinstance(m, Material):
+        raise StructureError(f"Section: material = {m!r}; expected a flexctrl.Material, e.g. flexctrl.STEEL")
     return Section(
         EA=m.E * area,
         EI_y=m.E * I_y,

@@ -7,26 +7,34 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Node, Rope, Spring
+from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
+from flexctrl.structure.elements import Node, Rope, Spring, check_node
 from flexctrl.structure.freedoms import ROTATIONS, Vector, check_name, parse_direction
+
+_DRIVES = (RotaryDrive, LinearDrive)
+
+
+def _node(node: Node, owner: str, rotations: bool) -> Node:
+    if rotations and not check_node(node, owner).freedoms >= ROTATIONS:
+        raise StructureError(f"{owner}: {node} has no rotations; take a node of a beam or rigid body")
+    return check_node(node, owner)
 
 
 def _nodes(at: Node | Sequence[Node], owner: str, rotations: bool) -> tuple[Node, ...]:
-    nodes = (at,) if isinstance(at, Node) else tuple(at)
-    for node in nodes:
-        if not isinstance(node, Node):
-            raise StructureError(f"{owner}: {node!r} is no node; give e.g. beam.end")
-        if rotations and not node.freedoms >= ROTATIONS:
-            raise StructureError(f"{owner}: {node} has no rotations; take a node of a beam or rigid body")
+    nodes = tuple(at) if isinstance(at, list | tuple) else (at,)
     if not nodes:
-        raise StructureError(f"{owner}: names no node")
-    return nodes
+        raise StructureError(f"{owner}: names no node; give e.g. beam.end")
+    twice = [node for i, node in enumerate(nodes) if node in nodes[:i]]
+    if twice:
+        raise StructureError(f"{owner}: {twice[0]} is given twice; a load acts once on each node")
+    return tuple(_node(node, owner, rotations) for node in nodes)
 
 
-def _name_of(part: object, owner: str) -> str:
-    name = getattr(part, "name", part)
-    return check_name(name, owner) if isinstance(name, str) else check_name(str(name), owner)
+def _name_of(part: object, kinds: tuple[type, ...], owner: str) -> str:
+    if not isinstance(part, (str, *kinds)):
+        names = " or ".join(k.__name__ for k in kinds)
+        raise StructureError(f"{owner} = {part!r}; expected a {names}, or the name of one")
+    return part if isinstance(part, str) else part.name  # type: ignore[attr-defined]
 
 
 @dataclass(frozen=True)
@@ -90,7 +98,7 @@ class MotorTorque:
 
     def __init__(self, name: str, drive: Drive | str) -> None:
         object.__setattr__(self, "name", check_name(name, "MotorTorque"))
-        object.__setattr__(self, "drive", _name_of(drive, f"MotorTorque {name!r}, drive"))
+        object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"MotorTorque {name!r}: drive"))
 
 
 def _set_measure(
@@ -102,9 +110,9 @@ def _set_measure(
     rotations: bool,
 ) -> None:
     owner = f"{type(signal).__name__} {check_name(name, type(signal).__name__)!r}"
-    _nodes(at, owner, rotations)
-    if minus is not None:
-        _nodes(minus, owner, rotations)
+    _node(at, owner, rotations)
+    if minus is not None and _node(minus, owner, rotations) == at:
+        raise StructureError(f"{owner}: {at} less itself is always zero; give another node as minus")
     object.__setattr__(signal, "name", name)
     object.__setattr__(signal, "at", at)
     object.__setattr__(signal, "direction", parse_direction(direction, owner))
@@ -214,7 +222,7 @@ class DriveAngle:
 
     def __init__(self, name: str, drive: Drive | str) -> None:
         object.__setattr__(self, "name", check_name(name, "DriveAngle"))
-        object.__setattr__(self, "drive", _name_of(drive, f"DriveAngle {name!r}, drive"))
+        object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"DriveAngle {name!r}: drive"))
 
 
 @dataclass(frozen=True)
@@ -232,7 +240,7 @@ class DriveSpeed:
 
     def __init__(self, name: str, drive: Drive | str) -> None:
         object.__setattr__(self, "name", check_name(name, "DriveSpeed"))
-        object.__setattr__(self, "drive", _name_of(drive, f"DriveSpeed {name!r}, drive"))
+        object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"DriveSpeed {name!r}: drive"))
 
 
 @dataclass(frozen=True)
@@ -267,12 +275,15 @@ class SwayAngle:
         down: str | Sequence[float] = "-z",
     ) -> None:
         owner = f"SwayAngle {check_name(name, 'SwayAngle')!r}"
-        _nodes((top, load), owner, rotations=False)
+        if check_node(top, owner) == check_node(load, owner):
+            raise StructureError(f"{owner}: top and load are both {top}; give the suspension point and the load")
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "top", top)
         object.__setattr__(self, "load", load)
         object.__setattr__(self, "direction", parse_direction(direction, owner))
         object.__setattr__(self, "down", parse_direction(down, owner))
+        if abs(sum(a * b for a, b in zip(self.direction, self.down, strict=True))) > 1e-6:
+            raise StructureError(f"{owner}: direction {direction!r} is not square to down {down!r}; give a level one")
 
 
 @dataclass(frozen=True)
@@ -291,7 +302,7 @@ class Tension:
 
     def __init__(self, name: str, line: Rope | Spring | str) -> None:
         object.__setattr__(self, "name", check_name(name, "Tension"))
-        object.__setattr__(self, "line", _name_of(line, f"Tension {name!r}, line"))
+        object.__setattr__(self, "line", _name_of(line, (Rope, Spring), f"Tension {name!r}: line"))
 
 
 Input: TypeAlias = Force | Torque | MotorTorque

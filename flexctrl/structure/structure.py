@@ -10,10 +10,10 @@ from functools import cached_property
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.drives import Drive, RotaryDrive
-from flexctrl.structure.elements import Node, Part, RigidBody, Rope, Spring
-from flexctrl.structure.freedoms import FREEDOMS, check_name, parse_direction
-from flexctrl.structure.join_table import JoinTable, join
-from flexctrl.structure.joints import Joint, Slide, Support, Weld, main_axis
+from flexctrl.structure.elements import Node, Part, RigidBody, Rope, Spring, check_node
+from flexctrl.structure.freedoms import FREEDOMS, check_name, listed, parse_direction
+from flexctrl.structure.join_table import JoinTable, Row, drive_row, join
+from flexctrl.structure.joints import Hinge, Joint, Slide, Support, Weld, main_axis
 from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
@@ -83,6 +83,7 @@ class Structure:
             raise StructureError("Structure: has no elements; give at least one Beam, PointMass or RigidBody")
         _check_names(self)
         _check_nodes(self)
+        _check_table(self)
         _check_coincidence(self)
         _check_drives(self)
         _check_pieces(self)
@@ -125,10 +126,18 @@ class Structure:
         StructureError
             If no part of the structure has the node.
         """
+        check_node(node, f"structure {self.name!r}")
         place = self._places.get((node.part, node.index))
-        if place is None or math.dist(self.nodes[place].position, node.position) > _COINCIDE * self.size:
+        mine = None if place is None else self.nodes[place]
+        if (
+            place is None
+            or mine is None
+            or mine.freedoms != node.freedoms
+            or math.dist(mine.position, node.position) > _COINCIDE * self.size
+        ):
             known = {n.part for n in self.nodes}
-            hint = did_you_mean(node.part, known) if node.part not in known else "; the part was changed meanwhile"
+            hint = "; take the node from the part of that name that the structure has"
+            hint = hint if node.part in known else did_you_mean(node.part, known)
             raise StructureError(f"{node} at {node.position} is not in structure {self.name!r}{hint}")
         return place
 
@@ -149,7 +158,7 @@ class Structure:
             If there is none.
         """
         parts = {p.name: p for p in (*self.elements, *self.drives)}
-        if name not in parts:
+        if not isinstance(name, str) or name not in parts:
             raise StructureError(f"structure {self.name!r} has no part {name!r}{did_you_mean(name, parts)}")
         return parts[name]
 
@@ -213,7 +222,12 @@ def planar(structure: Structure, normal: str = "z") -> Structure:
     StructureError
         If ``normal`` is no axis, or the joints are given as a table.
     """
-    axis = main_axis(parse_direction(normal, "planar"))
+    if not isinstance(structure, Structure):
+        raise StructureError(f"planar: {structure!r} is no Structure")
+    direction = parse_direction(normal, "planar")
+    axis = main_axis(direction)
+    if abs(direction[axis]) < 1.0 - 1e-12:
+        raise StructureError(f"planar: the normal {normal!r} is no global axis; give 'x', 'y' or 'z'")
     if isinstance(structure.joints, JoinTable):
         raise StructureError("planar: the joints are a JoinTable; give its rows with columns='u v θz' instead")
     kept = {(axis + 1) % 3, (axis + 2) % 3, 3 + axis}
@@ -222,9 +236,7 @@ def planar(structure: Structure, normal: str = "z") -> Structure:
 
 
 def _typed(items: Iterable, kinds: object, what: str) -> tuple:
-    if isinstance(items, (str, bytes)) or not isinstance(items, Iterable):
-        raise StructureError(f"Structure: {what} = {items!r}; expected a list")
-    found = tuple(items)
+    found = tuple(listed(items, f"Structure: {what}"))
     allowed = kinds.__args__  # type: ignore[attr-defined]
     for item in found:
         if not isinstance(item, allowed):
@@ -246,11 +258,6 @@ def _check_nodes(s: Structure) -> None:
     used: list[tuple[object, Node | None]] = []
     if not isinstance(s.joints, JoinTable):
         used += [(j, n) for j in s.joints for n in j.nodes]
-    elif len(s.joints.rows) != len(s.nodes) or len(s.joints.drives) != len(s.drives):
-        raise StructureError(
-            f"Structure {s.name!r}: the join table has {len(s.joints.rows)} nodes and {len(s.joints.drives)} drives, "
-            f"the parts have {len(s.nodes)} and {len(s.drives)}"
-        )
     used += [(f"drive {d.name!r}", n) for d in s.drives for n in (d.node, d.against)]
     for signal in (*s.inputs, *s.outputs):
         label = f"{type(signal).__name__} {signal.name!r}"
@@ -283,12 +290,42 @@ def _check_part(s: Structure, signal: Input | Output, who: str) -> None:
         raise StructureError(f"{who}: there is no {wanted!r}{did_you_mean(wanted, known)}")
 
 
+def _check_table(s: Structure) -> None:
+    """A table in place of joints must fit the parts and drives."""
+    if not isinstance(s.joints, JoinTable):
+        return
+    rows, drives = s.joints.rows, s.joints.drives
+    if len(rows) != len(s.nodes) or len(drives) != len(s.drives):
+        raise StructureError(
+            f"Structure {s.name!r}: the join table has {len(rows)} nodes and {len(drives)} drives, "
+            f"the parts have {len(s.nodes)} and {len(s.drives)}"
+        )
+    for i, (node, row) in enumerate(zip(s.nodes, rows, strict=True), 1):
+        lacking = [FREEDOMS[f] for f in range(6) if row[f] and f not in node.freedoms]
+        if lacking:
+            raise StructureError(
+                f"Structure {s.name!r}: row {i} of the join table numbers {lacking[0]} of {node}, "
+                "which has displacements only; put 0 there"
+            )
+    for drive, row in zip(s.drives, drives, strict=True):
+        if row != drive_row(drive, max(row)):
+            raise StructureError(
+                f"drive {drive.name!r}: the join table has its source angle in {row}; expected "
+                f"{drive_row(drive, max(row))}, the column of the driven freedom"
+            )
+
+
 def _check_coincidence(s: Structure) -> None:
     joints = () if isinstance(s.joints, JoinTable) else s.joints
+    tied: set[frozenset[int]] = set()
     for joint in joints:
         if isinstance(joint, Support):
             continue
         a, b = joint.nodes
+        pair = frozenset((s.number(a), s.number(b)))
+        if pair in tied:
+            raise StructureError(f"{joint}: the two are joined already; keep one of the joints")
+        tied.add(pair)
         gap = math.dist(a.position, b.position)
         if gap > _COINCIDE * s.size:
             raise StructureError(
@@ -301,21 +338,30 @@ def _check_coincidence(s: Structure) -> None:
 
 
 def _check_drives(s: Structure) -> None:
-    table = s.join_table
     for drive in s.drives:
-        columns = [drive.column + i for i in range(3) if abs(drive.direction[i]) > 1e-9]
-        mine = [table.rows[s.number(drive.node)][c] for c in columns]
-        other = (
-            [0] * len(columns) if drive.against is None else [table.rows[s.number(drive.against)][c] for c in columns]
-        )
-        if mine == other:
-            kind = "rotation" if isinstance(drive, RotaryDrive) else "displacement"
+        if _held(s, drive):
+            rotary = isinstance(drive, RotaryDrive)
             against = "the ground" if drive.against is None else str(drive.against)
-            remedy = "Hinge" if isinstance(drive, RotaryDrive) else "Slide"
             raise StructureError(
-                f"drive {drive.name!r}: its joint holds the {kind} along {drive.direction} between {drive.node} and "
-                f"{against}, so nothing can turn; free it with a {remedy} along that axis, or correct the axis"
+                f"drive {drive.name!r}: its joint holds the {'rotation' if rotary else 'displacement'} along "
+                f"{drive.direction}, or part of it, between {drive.node} and {against}; free it with a "
+                f"{'Hinge' if rotary else 'Slide'} along that axis, or correct the axis"
             )
+
+
+def _held(s: Structure, drive: Drive) -> bool:
+    """Tell whether the two sides of a drive cannot move against each other along its whole axis."""
+    ground: Row = (0, 0, 0, 0, 0, 0)
+    table, columns = s.join_table, range(drive.column, drive.column + 3)
+    mine = table.rows[s.number(drive.node)]
+    other = ground if drive.against is None else table.rows[s.number(drive.against)]
+    for joint in () if isinstance(s.joints, JoinTable) else s.joints:
+        if isinstance(joint, Hinge if drive.column else Slide):
+            sides = [tuple(table.rows[s.number(n)][c] for c in columns) for n in joint.nodes]
+            if sorted(sides) == sorted(tuple(row[c] for c in columns) for row in (mine, other)):
+                axis = joint.axis if isinstance(joint, Hinge) else joint.along
+                return abs(sum(a * b for a, b in zip(axis, drive.direction, strict=True))) < 1.0 - 1e-9
+    return any(mine[c] == other[c] for c, d in zip(columns, drive.direction, strict=True) if abs(d) > 1e-9)
 
 
 def _check_pieces(s: Structure) -> None:
@@ -343,10 +389,10 @@ def _check_pieces(s: Structure) -> None:
         link([drive.node.part, ground if drive.against is None else drive.against.part])
     pieces = _pieces(linked)
     if len(pieces) > 1:
-        loose = min(pieces[1:], key=len)
+        loose, kept = sorted(pieces, key=lambda p: (ground in p, len(p)))[:: len(pieces) - 1]
         raise StructureError(
             f"structure {s.name!r} is in {len(pieces)} separate pieces: {', '.join(sorted(loose))} "
-            f"{'is' if len(loose) == 1 else 'are'} not joined to {sorted(pieces[0] - {ground})[0]}; "
+            f"{'is' if len(loose) == 1 else 'are'} not joined to {min(kept - {ground})}; "
             "add a Weld, Pin, Hinge, Slide or Support"
         )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
@@ -137,12 +137,13 @@ class _Tying:
         self.follows: list[Follow] = []
         self.closures: list[Closure] = []
         self.lines: list[tuple[int, Vector]] = []
-        self.depth = self._depths(joints)
+        self.unit = {i: g.nodes[0] for g in groups for i in g.nodes}
         self.grouped = {i for g in groups for i in g.nodes}
         self.moving = self._unite(joints)
-        self.at_cell: dict[int, set[str]] = {}
+        self.depth = self._depths(joints)
+        self.at_cell: dict[int, set[int]] = {}
         for i, node in enumerate(nodes):
-            self.at_cell.setdefault(self.cell(i, 0), set()).add(node.part)
+            self.at_cell.setdefault(self.cell(i, 0), set()).add(self._unit(node))
 
     def cell(self, node: int, freedom: int) -> int:
         return self.same.root(6 * node + freedom)
@@ -150,17 +151,24 @@ class _Tying:
     def held(self, node: int, freedom: int) -> bool:
         return self.cell(node, freedom) == self.same.root(self.ground)
 
-    def _depths(self, joints: Sequence[Joint]) -> dict[str, int]:
-        """Steps from the ground, part by part; a free machine hangs on its first part."""
-        links: dict[str, set[str]] = {n.part: set() for n in self.nodes}
-        level = {n.part for j in joints if isinstance(j, Support) and j.held for n in j.nodes}
-        for a, b in (j.nodes for j in joints if not isinstance(j, Support)):
-            links[a.part].add(b.part)
-            links[b.part].add(a.part)
-        depth: dict[str, int] = {}
-        while len(depth) < len(links):
-            level = level or {next(p for p in links if p not in depth)}
-            step = 0
+    def _unit(self, node: Node) -> int:
+        """What moves as one with a node: its rigid part, by that part's first node, or only the node itself."""
+        place = self.place[node.part, node.index]
+        return self.unit.get(place, place)
+
+    def _depths(self, joints: Sequence[Joint]) -> dict[int, int]:
+        """Steps, joint by joint, from where most is held; what does not reach that hangs on its own best held node."""
+        links: dict[int, set[int]] = {self._unit(n): set() for n in self.nodes}
+        held = dict.fromkeys(links, 0)
+        for place, node in enumerate(self.nodes):
+            held[self._unit(node)] = max(held[self._unit(node)], sum(self.held(place, f) for f in range(6)))
+        for a, b in ([self._unit(n) for n in j.nodes] for j in joints if not isinstance(j, Support)):
+            links[a].add(b)
+            links[b].add(a)
+        depth: dict[int, int] = {}
+        while left := [u for u in links if u not in depth]:
+            most = max(held[u] for u in left)
+            level, step = {u for u in left if held[u] == most} if most else {left[0]}, 0
             while level:
                 depth |= dict.fromkeys(level, step)
                 level = {q for p in level for q in links[p] if q not in depth}
@@ -212,8 +220,8 @@ class _Tying:
     def _ordered(self) -> list[Hinge | Slide | Group]:
         def key(item: Hinge | Slide | Group) -> tuple[int, int]:
             if isinstance(item, Group):
-                return (self.depth[item.part], 1)
-            return (max(self.depth[n.part] for n in item.nodes), 0)
+                return (self.depth[item.nodes[0]], 1)
+            return (max(self.depth[self._unit(n)] for n in item.nodes), 0)
 
         return sorted([*self.moving, *self.groups], key=key)
 
@@ -241,24 +249,27 @@ class _Tying:
 
     def _rank(self, node: int) -> tuple[int, int]:
         """The best root is the node nearest to the ground: most of its place is already known."""
-        known = sum(self.held(node, f) or self.cell(node, f) in self.anchored | set(self.definer) for f in range(3))
-        towards = min((self.depth[p] for p in self._neighbours(node)), default=self.depth[self.nodes[node].part] + 1)
-        return (-known, towards)
+        mine = self._unit(self.nodes[node])
+        towards = min((self.depth[u] for u in self.at_cell[self.cell(node, 0)] - {mine}), default=self.depth[mine] + 1)
+        return (-self._known(node, range(3)), towards)
 
-    def _neighbours(self, node: int) -> set[str]:
-        return self.at_cell[self.cell(node, 0)] - {self.nodes[node].part}
+    def _known(self, node: int, freedoms: range) -> int:
+        """How many of the freedoms are held or have a value already."""
+        cells = [self.cell(node, f) for f in freedoms]
+        return sum(c == self.same.root(self.ground) or c in self.anchored or c in self.definer for c in cells)
 
     def _axis(self, joint: Hinge | Slide) -> None:
-        first, second = joint.nodes
-        if self.depth[second.part] < self.depth[first.part]:
-            first, second = second, first
-        master, node = self.place[first.part, first.index], self.place[second.part, second.index]
+        freedoms = range(3, 6) if isinstance(joint, Hinge) else range(3)
+
+        def rank(n: Node) -> tuple[int, int]:
+            return (-self._known(self.place[n.part, n.index], freedoms), self.depth[self._unit(n)])
+
+        master, node = (self.place[n.part, n.index] for n in sorted(joint.nodes, key=rank))
         if isinstance(joint, Hinge):
             self.follows.append(Turn(node, master, joint.axis))
-            self._define(node, range(3, 6))
         else:
             self.follows.append(Ride(node, master, along=joint.along))
-            self._define(node, range(3))
+        self._define(node, freedoms)
 
     def _define(self, node: int, freedoms: range) -> None:
         for f in freedoms:
@@ -278,7 +289,7 @@ class _Tying:
         computed = {(f.node, k): f for f in self.follows for k in (range(3, 6) if isinstance(f, Turn) else range(3))}
         lines = dict(self.lines)
         numbers = {self.same.root(self.ground): 0}
-        owns: dict[int, int] = {}
+        owns: dict[tuple[int, bool], int] = {}
         free = 0
         cells, copies = [], []
         for i, node in enumerate(self.nodes):
@@ -289,7 +300,7 @@ class _Tying:
                 if follow is not None:
                     if f == _own_column(follow):
                         free += 1
-                        owns[i] = free
+                        owns[_write(follow)] = free
                     row.append(-1)
                 elif cell in self.definer:
                     copies.append(Copy(i, min(f, 3), self.definer[cell]))
@@ -307,12 +318,8 @@ class _Tying:
         follows = [self._numbered(f, owns) for f in self.follows] + list(dict.fromkeys(copies))
         return Ties(tuple(cells), _sorted(follows), tuple(self.closures), tuple(self.lines), free)
 
-    def _numbered(self, follow: Follow, owns: dict[int, int]) -> Follow:
-        if isinstance(follow, Turn):
-            return Turn(follow.node, follow.master, follow.axis, owns[follow.node])
-        if isinstance(follow, Ride) and follow.along:
-            return Ride(follow.node, follow.master, follow.along, owns[follow.node])
-        return follow
+    def _numbered(self, follow: Follow, owns: dict[tuple[int, bool], int]) -> Follow:
+        return follow if isinstance(follow, Copy) else replace(follow, own=owns.get(_write(follow), 0))
 
 
 def _own_column(follow: Follow) -> int:
