@@ -1,0 +1,204 @@
+"""Root locus from eigenvalues, with every branch followed by name; critical gains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import brentq, linear_sum_assignment
+
+from flexctrl.errors import StructureError
+from flexctrl.study.frequency import loop_grid
+from flexctrl.study.loop import Loop
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["CriticalGain", "critical_gains", "root_locus"]
+
+MOST_GAINS = 400
+START = 50
+TURN = 0.35
+SHORT = 0.02
+CLOSEST = 1e-4
+
+
+@dataclass(frozen=True)
+class CriticalGain:
+    """A gain at which a closed-loop pole crosses the stability boundary.
+
+    Attributes
+    ----------
+    gain : float
+        Factor on the loop.
+    omega : float
+        Where on the boundary, rad/s.
+    unstable_above : bool
+        Whether the pole leaves the stable region as the gain grows.
+    """
+
+    gain: float
+    omega: float
+    unstable_above: bool
+
+
+def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) -> control.pzmap.PoleZeroData:
+    """Closed-loop poles eig(A − k B (1 + kD)⁻¹ C) over the gain, one column a branch.
+
+    The states are in scaled modal form, so eigenvalues stay right where polynomial coefficients overflow
+    their digits (from about 60 states). Consecutive gains are matched by the cheapest assignment to linearly
+    extrapolated branches; gains are inserted until the assignment is unambiguous and the branches smooth.
+
+    Parameters
+    ----------
+    loop : Loop
+        From :func:`open_loop`; closed by negative feedback.
+    gains : array_like, optional
+        Positive gains that must be among those computed; chosen from the size of L if left out.
+
+    Returns
+    -------
+    control.PoleZeroData
+        With ``.gains`` (N,), ``.loci`` (N, n), ``.poles``, ``.zeros`` and ``.plot()``.
+
+    Raises
+    ------
+    StructureError
+        For gains that are not ascending positive numbers.
+    """
+    from control.pzmap import PoleZeroData
+
+    wanted = _gain_range(loop) if gains is None else _checked(gains)
+    used, loci = _followed(loop.closed_poles, np.concatenate([[0.0], wanted[wanted > 0]]))
+    return PoleZeroData(loop.poles, loop.zeros, used, loci, dt=loop.dt, sysname=loop.name, sort_loci=False)
+
+
+def critical_gains(loop: Loop, locus: control.pzmap.PoleZeroData | None = None) -> tuple[CriticalGain, ...]:
+    """Gains at which a branch of the root locus crosses the stability boundary, ascending.
+
+    Bracketed by the branches, bisected on the eigenvalue, and finished on 1 + k L(iω) = 0 itself.
+
+    Parameters
+    ----------
+    loop : Loop
+    locus : control.PoleZeroData, optional
+        From :func:`root_locus`, if already computed.
+
+    Returns
+    -------
+    tuple of CriticalGain
+        One for each conjugate pair or real pole that crosses.
+    """
+    locus = root_locus(loop) if locus is None else locus
+    outside = _depth(locus.loci, loop.dt)
+    found = []
+    for i, j in np.argwhere(np.sign(outside[1:-1]) * np.sign(outside[2:]) < 0):
+        here, there = locus.loci[i + 1, j], locus.loci[i + 2, j]
+        if here.imag + there.imag >= 0:
+            gain, pole = _crossing(loop, (locus.gains[i + 1], locus.gains[i + 2]), (here, there))
+            omega = abs(np.angle(pole)) / loop.dt if loop.dt else abs(pole.imag)
+            found.append(CriticalGain(gain, omega, bool(outside[i + 2, j] > 0)))
+    return tuple(sorted((_finished(loop, c) for c in found), key=lambda c: c.gain))
+
+
+def _checked(gains: Sequence[float] | np.ndarray) -> np.ndarray:
+    k = np.asarray(gains, float)
+    if k.ndim != 1 or not np.isfinite(k).all() or (k < 0).any() or (np.diff(k) <= 0).any():
+        raise StructureError("gains must be ascending, finite and not negative")
+    return k
+
+
+def _gain_range(loop: Loop) -> np.ndarray:
+    """From where the highest peak begins to move its pole to where the poles have reached the zeros."""
+    size = abs(loop_grid(loop)[1])
+    size = size[size > 0]
+    if not size.size:
+        raise StructureError("the loop's response is zero: its input does not reach its output")
+    return np.geomspace(0.01 / size.max(), 10.0 / np.quantile(size, 0.25), START)
+
+
+def _followed(poles_at: Callable[[float], np.ndarray], gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Branches over the gains, with gains inserted where a step is ambiguous or bends too much."""
+    used, rows = [gains[0]], [poles_at(gains[0])]
+    ahead = list(gains[:0:-1])
+    known: dict[float, np.ndarray] = {}
+    while ahead:
+        gain = ahead[-1]
+        if gain not in known:
+            known[gain] = poles_at(gain)
+        row = _matched(used, rows, gain, known[gain])
+        between = float(np.sqrt(used[-1] * gain)) or 0.1 * gain
+        fine = gain <= used[-1] * (1 + CLOSEST) or gain < 1e-6 * gains[1] or len(used) + len(ahead) >= MOST_GAINS
+        if fine or not (_ambiguous(used, rows, gain, row) or _bent(rows, row)):
+            used.append(ahead.pop())
+            rows.append(row)
+        else:
+            ahead.append(between)
+    return np.array(used), np.array(rows)
+
+
+def _predicted(used: list[float], rows: list[np.ndarray], gain: float) -> np.ndarray:
+    if len(used) < 2:
+        return rows[-1]
+    step = (gain - used[-1]) / (used[-1] - used[-2])
+    return np.asarray(rows[-1] + min(step, 3.0) * (rows[-1] - rows[-2]))
+
+
+def _matched(used: list[float], rows: list[np.ndarray], gain: float, poles: np.ndarray) -> np.ndarray:
+    cost = abs(_predicted(used, rows, gain)[:, None] - poles)
+    return np.asarray(poles[linear_sum_assignment(cost)[1]])
+
+
+def _ambiguous(used: list[float], rows: list[np.ndarray], gain: float, row: np.ndarray) -> bool:
+    """Whether a branch lies farther from its prediction than a third of the way to its neighbour."""
+    miss = abs(_predicted(used, rows, gain) - row)
+    apart = abs(row[:, None] - row)
+    np.fill_diagonal(apart, np.inf)
+    visible = miss > 1e-3 * abs(row)
+    return bool((visible & (miss > 0.3 * apart.min(axis=1, initial=np.inf))).any())
+
+
+def _bent(rows: list[np.ndarray], row: np.ndarray) -> bool:
+    """Whether a branch turns by more than 20 degrees in a step long enough to be seen."""
+    if len(rows) < 2:
+        return False
+    before, after = rows[-1] - rows[-2], row - rows[-1]
+    size = SHORT * abs(row)
+    long = (abs(before) > size) & (abs(after) > size)
+    return bool((abs(np.angle(after[long] / before[long])) > TURN).any())
+
+
+def _depth(poles: np.ndarray, dt: float) -> np.ndarray:
+    """How far outside the stable region, signed."""
+    return np.asarray(abs(poles) - 1.0 if dt else poles.real)
+
+
+def _crossing(loop: Loop, gains: tuple[float, float], poles: tuple[complex, complex]) -> tuple[float, complex]:
+    """Bisect one branch between two gains."""
+
+    def nearest(gain: float) -> complex:
+        share = (gain - gains[0]) / (gains[1] - gains[0])
+        guess = poles[0] + share * (poles[1] - poles[0])
+        found = loop.closed_poles(gain)
+        return complex(found[abs(found - guess).argmin()])
+
+    gain = float(brentq(lambda k: float(_depth(np.array(nearest(k)), loop.dt)), *gains, rtol=1e-12))
+    return gain, nearest(gain)
+
+
+def _finished(loop: Loop, rough: CriticalGain) -> CriticalGain:
+    """Secant steps on Im L(iω) = 0, where k = −1/L; a real crossing at ω = 0 stays as it is."""
+    w = rough.omega
+    if w <= 1e-9 * abs(loop.poles).max():
+        return rough
+    ends = np.array([w * (1 - 1e-6), w * (1 + 1e-6)])
+    for _ in range(8):
+        value = loop.at(ends).imag
+        if value[0] == value[1]:
+            break
+        ends = np.array([ends[1], ends[1] - value[1] * (ends[1] - ends[0]) / (value[1] - value[0])])
+    gain = -1.0 / loop.at(ends[1:]).real[0]
+    good = abs(gain - rough.gain) < 1e-4 * rough.gain
+    return CriticalGain(float(gain), float(ends[1]), rough.unstable_above) if good else rough

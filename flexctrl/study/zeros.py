@@ -1,0 +1,236 @@
+"""Transmission zeros and what they say about a choice of sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eig, eigvals, qr, svd
+
+from flexctrl.model.linear import LinearModel
+
+__all__ = ["SensorChoice", "Zeros", "deflated_zeros", "sensor_choices", "zeros"]
+
+Quadruple = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Zeros:
+    """Transmission zeros.
+
+    Attributes
+    ----------
+    finite : numpy.ndarray of complex
+        Finite zeros in rad/s, by magnitude.
+    uncertainty : numpy.ndarray
+        Relative change of each zero when the entries of the model change in their last digit
+        (condition number × eps): zeros far from the mode band and multiple ones are uncertain by nature.
+    infinite : int
+        Number of zeros at infinity (for one channel: the excess of poles over zeros).
+    """
+
+    finite: np.ndarray
+    uncertainty: np.ndarray
+    infinite: int
+
+    @property
+    def nonminimum_phase(self) -> np.ndarray:
+        """Zeros in the open right half-plane, beyond their uncertainty."""
+        return self.finite[self.finite.real > 10 * self.uncertainty * abs(self.finite)]
+
+
+def zeros(linear: LinearModel, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Zeros:
+    """Transmission zeros of the channels between inputs and outputs.
+
+    Zeros are the s at which the Rosenbrock matrix [s²M + sC + K, −B; Cq + s Cv, D] loses rank. Those at
+    infinity are deflated in scaled modal coordinates (A. Emami-Naeini, P. Van Dooren, Automatica 18
+    (1982) 415–430); the finite ones are then polished on the second-order Rosenbrock matrix itself, in
+    physical coordinates, where they keep the accuracy of the entries of M, C and K.
+
+    Parameters
+    ----------
+    linear : LinearModel
+    inputs, outputs : sequence of str, optional
+        Signals; all of them if left out.
+
+    Returns
+    -------
+    Zeros
+    """
+    channel = linear.select(inputs, outputs).condense()
+    system = channel.to_ss()
+    rough = deflated_zeros(system.A, system.B, system.C, system.D)
+    upper = rough[rough.imag >= 0]
+    found = np.array([_polished(channel, complex(s)) for s in upper]).reshape(-1, 2)
+    finite, doubt = _without_twins(upper, found[:, 0], found[:, 1].real)
+    mirrored = upper.imag > 0
+    finite = np.concatenate([finite, finite[mirrored].conj()])
+    doubt = np.concatenate([doubt, doubt[mirrored]])
+    order = np.lexsort([finite.imag, abs(finite)])
+    return Zeros(finite[order], doubt[order], system.A.shape[0] - len(finite))
+
+
+def _unit_gains(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> Quadruple:
+    """Time and signals scaled so that the rank decisions of the deflation are between numbers near 1."""
+    speed = float(np.linalg.norm(A, 2)) or 1.0
+    by = np.linalg.norm(B, axis=0, keepdims=True)
+    by[by == 0] = 1.0
+    cy = np.linalg.norm(C, axis=1, keepdims=True)
+    cy[cy == 0] = 1.0
+    return A, B / by * speed, C / cy * speed, D / by / cy * speed**2
+
+
+def deflated_zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Finite invariant zeros of a state-space model (not polished).
+
+    Parameters
+    ----------
+    A, B, C, D : numpy.ndarray
+        Balanced states, so that every block of A has the size of its poles.
+
+    Returns
+    -------
+    numpy.ndarray of complex
+    """
+    if not len(A):
+        return np.zeros(0, complex)
+    A, B, C, D = _unit_gains(A, B, C, D)
+    tol = 1e-12 * float(np.linalg.norm(np.block([[A, B], [C, D]]), 2))
+    A, B, C, D = _deflated(A, B, C, D, tol)
+    At, Ct, Bt, Dt = _deflated(A.T, C.T, B.T, D.T, tol)
+    A, B, C, D = At.T, Bt.T, Ct.T, Dt.T
+    n = len(A)
+    if n == 0 or D.size == 0:
+        return np.asarray(eigvals(A)) if n else np.zeros(0, complex)
+    kernel = qr(np.hstack([C, D]).T)[0][:, len(D) :]
+    alpha, beta = eig(np.hstack([A, B]) @ kernel, kernel[:n], right=False, homogeneous_eigvals=True)
+    finite = abs(beta) > 1e-13 * abs(alpha) / np.linalg.norm(A, 2)
+    return np.asarray(alpha[finite] / beta[finite])
+
+
+def _deflated(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, tol: float) -> Quadruple:
+    """Remove the states that outputs without feedthrough force to zero, until D has full row rank."""
+    while len(A):
+        u, sigma, _ = svd(D) if D.size else (np.eye(len(D)), np.zeros(0), D)
+        rank = int(np.count_nonzero(sigma > tol))
+        C, D = u.T @ C, u.T @ D
+        if rank == len(D):
+            break
+        _, sigma, vh = svd(C[rank:])
+        forced = int(np.count_nonzero(sigma > tol))
+        if forced == 0:
+            return A, B, C[:rank], D[:rank]
+        stay, gone = vh[forced:].T, vh[:forced]
+        C, D = np.vstack([C[:rank] @ stay, gone @ A @ stay]), np.vstack([D[:rank], gone @ B])
+        A, B = stay.T @ A @ stay, stay.T @ B
+    return A, B, C, D
+
+
+def _polished(channel: LinearModel, s: complex) -> tuple[complex, float]:
+    """Newton on the smallest singular triplet of the scaled Rosenbrock matrix; the zero and its doubt."""
+    start = s
+    for _ in range(12):
+        matrix, slope = _rosenbrock(channel, s)
+        u, sigma, vh = svd(matrix)
+        left, right = u[:, -1].conj(), vh[-1].conj()
+        change = left @ slope @ right
+        doubt = EPS * sigma[0] / max(abs(change) * abs(s), EPS * sigma[0])
+        step = (left @ matrix @ right) / change if abs(change) > 0 else 0.0
+        s = s - step
+        if abs(step) <= 4 * EPS * abs(s):
+            break
+    return (s, doubt) if abs(s - start) <= 0.3 * abs(start) else (start, 1.0)
+
+
+def _without_twins(start: np.ndarray, found: np.ndarray, doubt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two different starts that ended on one zero: the farther one goes back, fully in doubt."""
+    found, doubt = found.copy(), doubt.copy()
+    for i, j in np.argwhere(np.triu(abs(found[:, None] - found) <= 1e-10 * abs(found), 1)):
+        if abs(start[i] - start[j]) > 1e-4 * abs(start[i]):
+            far = i if abs(start[i] - found[i]) > abs(start[j] - found[j]) else j
+            found[far], doubt[far] = start[far], 1.0
+    return found, doubt
+
+
+def _rosenbrock(channel: LinearModel, s: complex) -> tuple[np.ndarray, np.ndarray]:
+    """The Rosenbrock matrix and its derivative in s, rows and columns scaled to unit size."""
+    M, C, K = (A.toarray() for A in (channel.M, channel.C, channel.K))
+    n, m, p = len(M), channel.B.shape[1], channel.Cq.shape[0]
+    full = np.zeros((n + p, n + m), complex)
+    slope = np.zeros_like(full)
+    full[:n, :n], slope[:n, :n] = K + s * C + s * s * M, C + 2 * s * M
+    full[:n, n:], full[n:, n:] = -channel.B, channel.D
+    full[n:, :n], slope[n:, :n] = channel.Cq + s * channel.Cv, channel.Cv
+    mass, drag, spring = (abs(A.diagonal()) for A in (M, C, K))
+    slow = 1e-3 * float(np.sqrt((spring[mass > 0] / mass[mass > 0]).max(initial=0.0))) or 1.0
+    size = np.sqrt(spring + max(abs(s), slow) * drag + max(abs(s), slow) ** 2 * mass)
+    rows, cols = np.concatenate([size, np.ones(p)]), np.concatenate([size, np.ones(m)])
+    full, slope = full / rows[:, None] / cols, slope / rows[:, None] / cols
+    rows = np.concatenate([np.ones(n), np.linalg.norm(full[n:], axis=1)])
+    cols = np.concatenate([np.ones(n), np.linalg.norm(full[:, n:], axis=0)])
+    rows[rows == 0], cols[cols == 0] = 1.0, 1.0
+    return full / rows[:, None] / cols, slope / rows[:, None] / cols
+
+
+@dataclass(frozen=True)
+class SensorChoice:
+    """How one output sees one input, mode by mode.
+
+    Attributes
+    ----------
+    input, output : str
+        The channel.
+    collocated : bool
+        The output measures the motion its input works on (its row is a multiple of the input's
+        column), or its velocity: poles and zeros alternate and no phase is lost.
+    in_phase : bool
+        Every mode looked at has a residue of the sign of the first: minimum phase so far.
+    first_flip : float
+        Angular frequency (rad/s) of the first mode of opposite sign, where the phase falls behind;
+        infinite if there is none.
+    """
+
+    input: str
+    output: str
+    collocated: bool
+    in_phase: bool
+    first_flip: float
+
+
+def sensor_choices(linear: LinearModel, below: float = np.inf) -> tuple[SensorChoice, ...]:
+    """Label every input–output pair collocated, in phase, or not.
+
+    Parameters
+    ----------
+    linear : LinearModel
+    below : float
+        Look at modes below this angular frequency, rad/s.
+
+    Returns
+    -------
+    tuple of SensorChoice
+        Outputs run fastest.
+    """
+    modes = linear.condense().modes()
+    seen = modes.omega <= below
+    shapes, omega = modes.shapes[:, seen], modes.omega[seen]
+    condensed = linear.condense()
+    return tuple(
+        _label(condensed, shapes, omega, i, j) for i in range(len(linear.inputs)) for j in range(len(linear.outputs))
+    )
+
+
+def _label(linear: LinearModel, shapes: np.ndarray, omega: np.ndarray, i: int, j: int) -> SensorChoice:
+    column = linear.B[:, i]
+    row = linear.Cq[j] if linear.Cq[j].any() else linear.Cv[j]
+    share = (row @ shapes) * (column @ shapes)
+    size = np.linalg.norm(row @ shapes) * np.linalg.norm(column @ shapes)
+    visible = abs(share) > 1e-9 * size
+    signs, at = np.sign(share[visible]), omega[visible]
+    flipped = np.flatnonzero(signs != signs[0]) if len(signs) else np.zeros(0, int)
+    parallel = abs(row @ column) >= (1 - 1e-12) * np.linalg.norm(row) * np.linalg.norm(column) > 0
+    mixed = linear.Cq[j].any() and linear.Cv[j].any()
+    first = float(at[flipped[0]]) if len(flipped) else np.inf
+    return SensorChoice(linear.inputs[i], linear.outputs[j], bool(parallel and not mixed), not len(flipped), first)

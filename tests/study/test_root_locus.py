@@ -1,0 +1,130 @@
+"""Root locus: closed forms, exact branches, and accuracy where polynomials fail."""
+
+from __future__ import annotations
+
+import control as ct
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from plants import cantilever, chain, plant
+
+from flexctrl.errors import StructureError
+from flexctrl.study.frequency import margins
+from flexctrl.study.loop import open_loop
+from flexctrl.study.root_locus import critical_gains, root_locus
+
+mpl.use("Agg")
+
+
+def damped_feedback(linear, output: str):
+    """Lead of a rate feedback with two roll-off poles at 300 rad/s."""
+    return open_loop(linear, ct.tf([1, 0], [1 / 300**2, 2 / 300, 1]), "force", output)
+
+
+def test_second_order_branches_in_closed_form():
+    """s² + 2s + k: two real poles meet at k = 1 and part at right angles."""
+    locus = root_locus(open_loop(ct.ss(ct.tf([1.0], [1, 2, 0]))))
+    for k, row in zip(locus.gains, locus.loci, strict=True):
+        exact = np.roots([1, 2, k])
+        np.testing.assert_allclose(np.sort_complex(row), np.sort_complex(exact), atol=1e-7)
+
+
+def test_critical_gain_in_closed_form():
+    """k/(s (s+1) (s+2)): k = 6 at sqrt 2 rad/s."""
+    found = critical_gains(open_loop(ct.ss(ct.tf([1.0], [1, 3, 2, 0]))))
+    assert len(found) == 1
+    np.testing.assert_allclose([found[0].gain, found[0].omega], [6.0, np.sqrt(2)], rtol=1e-10)
+    assert found[0].unstable_above
+
+
+def test_a_loop_that_must_have_gain_to_be_stable():
+    """k (s + 3)/(s − 1)²: stable above k = 2, leaving through ±i sqrt(1 + 3k) = ±i sqrt 7."""
+    found = critical_gains(open_loop(ct.ss(ct.tf([1.0, 3.0], [1, -2, 1]))))
+    assert len(found) == 1
+    np.testing.assert_allclose([found[0].gain, found[0].omega], [2.0, np.sqrt(7)], rtol=1e-9)
+    assert not found[0].unstable_above
+
+
+def test_collocated_rate_feedback_never_destabilises():
+    linear = cantilever(10, beta=1e-5)
+    locus = root_locus(open_loop(linear, ct.tf([1, 0], [1]), "force", "tip"))
+    assert (locus.loci.real < 1e-9 * abs(locus.loci)).all()
+
+
+def test_branches_are_continuous_and_end_at_the_zeros():
+    linear = chain(6, beta=0.02)
+    loop = open_loop(linear, 1.0, "force", "x1")
+    locus = root_locus(loop)
+    np.testing.assert_allclose(np.sort_complex(locus.loci[0]), np.sort_complex(loop.poles))
+    far = np.array([abs(locus.loci[-1] - z).min() for z in loop.zeros])
+    assert (far < 0.05 * abs(loop.zeros)).all()
+    # every step of every branch is the nearest continuation: no swap shortens the total path
+    for a, b in zip(locus.loci, locus.loci[1:], strict=False):
+        own = abs(b - a)
+        for i in range(len(a)):
+            for j in range(i):
+                swapped = abs(b[i] - a[j]) + abs(b[j] - a[i])
+                assert own[i] + own[j] <= swapped * (1 + 1e-6) + 1e-9
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_sixty_states_agree_with_python_control_and_a_hundred_and_thirty_do_not():
+    """At 62 states polynomials still give eight digits; at 130 they raise or lie (design fact)."""
+    small = damped_feedback(cantilever(15, beta=2e-5), "tip")
+    gains = np.array([0.5, 2.0, 8.0])
+    mine = root_locus(small, gains)
+    theirs = ct.root_locus_map(ct.ss(small.A, small.B, small.C, small.D), gains=gains)
+    low = [row[abs(row) < 500] for row in mine.loci[[np.flatnonzero(mine.gains == k)[0] for k in gains]]]
+    for row, other in zip(low, theirs.loci, strict=True):
+        assert max(abs(other - pole).min() / abs(pole) for pole in row) < 1e-5
+    large = damped_feedback(cantilever(32, beta=1e-5), "tip")
+    mine = root_locus(large, np.array([1.0, 3.0]))
+    assert len(large.A) == 130
+    residual = [abs(1 + mine.gains[-1] * large.curve(mine.loci[-1][abs(mine.loci[-1]) < 1e3]))]
+    assert np.max(residual) < 1e-5
+    with pytest.raises((np.linalg.LinAlgError, ValueError)):
+        ct.root_locus_map(ct.ss(large.A, large.B, large.C, large.D), gains=[1.0, 3.0])
+
+
+@pytest.mark.slow
+def test_critical_gains_of_a_flexible_loop_are_its_gain_margins():
+    """Two independent routes: eigenvalues over the gain, and crossings of the frequency response."""
+    for output in ("tip", "middle"):
+        loop = damped_feedback(cantilever(15, beta=2e-5), output)
+        locus = root_locus(loop)
+        by_eigenvalues = list(critical_gains(loop, locus))
+        crossings = sorted(c.margin for c in margins(loop).phase_crossings if c.margin < locus.gains[-1])
+        assert len(by_eigenvalues) > 2
+        for critical in by_eigenvalues:
+            assert min(abs(critical.gain / k - 1) for k in crossings) < 1e-6
+
+
+def test_python_control_draws_the_result():
+    locus = root_locus(open_loop(chain(4, beta=0.02), 1.0, "force", "x1"))
+    assert type(locus).__name__ == "PoleZeroData"
+    lines = locus.plot().lines
+    assert len(lines[0, 2]) == 8
+    plt.close("all")
+
+
+def test_sampled_loop_crosses_the_unit_circle():
+    """Integrator with d samples of delay: K h = 2 sin(π/(2(2d + 1))), period 2(2d + 1) samples (case C11)."""
+    h = 0.1
+    for d, limit in enumerate([2.0, 1.0, 0.6180339887, 0.4450418679]):
+        A = np.diag(np.ones(d), 1) if d else np.zeros((1, 1))
+        A[0, 0] = 1.0
+        if d:
+            A[0, 1] = h
+        B = np.eye(d + 1)[:, [-1]] * (1.0 if d else h)
+        loop = open_loop(ct.ss(A, B, np.eye(1, d + 1), [[0.0]], h))
+        first = critical_gains(loop)[0]
+        np.testing.assert_allclose(first.gain * h, limit, rtol=1e-8)
+        np.testing.assert_allclose(first.omega * h, 2 * np.pi / (2 * (2 * d + 1)), rtol=1e-8)
+
+
+def test_gains_are_checked():
+    loop = open_loop(plant([[1.0]], [[1.0]], [[1.0]], [[1.0]]))
+    for bad in ([2.0, 1.0], [-1.0, 1.0], [np.nan]):
+        with pytest.raises(StructureError, match="ascending"):
+            root_locus(loop, bad)
