@@ -13,7 +13,7 @@ from flexctrl.model.grid import peak_grid, refined
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.modes import COMPLETE
 from flexctrl.model.poles import second_order_roots
-from flexctrl.model.transfer import transfer
+from flexctrl.model.transfer import routed, transfer
 
 if TYPE_CHECKING:
     import control
@@ -126,8 +126,8 @@ def frequency_response(
     else:
         poles = _leading_poles(linear)
         low, high = _own_span(linear, poles) if span is None else _checked_span(span)
-        most = MOST_POINTS if _is_cheap(linear) else MOST_SOLVES
-        points, values = refined(transfer(linear, high), peak_grid(poles, (low, high)), most)
+        evaluate, cheap = routed(linear, high)
+        points, values = refined(evaluate, peak_grid(poles, (low, high)), MOST_POINTS if cheap else MOST_SOLVES)
     return FrequencyResponse(points, values, linear.inputs, linear.outputs, linear.name)
 
 
@@ -166,10 +166,6 @@ def _leading_poles(linear: LinearModel) -> np.ndarray:
 
 def _is_complete(linear: LinearModel) -> bool:
     return len(linear.coordinates) <= COMPLETE
-
-
-def _is_cheap(linear: LinearModel) -> bool:
-    return _is_complete(linear) and linear._modal.classical
 
 
 def _checked(omega: np.ndarray) -> np.ndarray:

@@ -10,26 +10,29 @@ import scipy.sparse.linalg as sla
 
 from flexctrl.errors import LinearizationError
 from flexctrl.model.condense import Scaled, scaled
+from flexctrl.model.coupled import coupled_transfer
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.modal import ModalSystem, rayleigh
 from flexctrl.model.modes import COMPLETE, Modes, modes_of
 from flexctrl.model.pencil import Pencil
 
-__all__ = ["Transfer", "direct_transfer", "modal_transfer", "residual_transfer", "transfer"]
+__all__ = ["Transfer", "direct_transfer", "modal_transfer", "residual_transfer", "routed", "transfer"]
 
 Transfer = Callable[[np.ndarray], np.ndarray]
 """s, shape (N,), 1/s ↦ H, shape (n_outputs, n_inputs, N)."""
 
 MOST_MODES = 400
+COUPLED = 250
 CACHED = 8192
 
 
 def transfer(linear: LinearModel, top: float) -> Transfer:
     """The evaluator that suits the model.
 
-    Up to 1000 freedoms with classical damping: poles and residues of all modes. Larger ones with Rayleigh or
-    no damping: the modes up to twice `top`, and the others by a power series that converges at least as 4⁻ʲ.
-    Everything else: one sparse factorisation for each s.
+    Up to 1000 freedoms with classical damping: poles and residues of all modes. Up to 250 with damping that
+    couples the modes: a Schur form of the modal equations. Larger ones with Rayleigh or no damping: the modes
+    up to twice `top`, and the others by a power series that converges at least as 4⁻ʲ. Everything else: one
+    sparse factorisation for each s.
 
     Parameters
     ----------
@@ -42,17 +45,42 @@ def transfer(linear: LinearModel, top: float) -> Transfer:
     callable
         s of shape (N,) to H of shape (n_outputs, n_inputs, N).
     """
+    return routed(linear, top)[0]
+
+
+def routed(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
+    """As :func:`transfer`, and whether many points are cheap.
+
+    Parameters
+    ----------
+    linear : LinearModel
+    top : float
+        Largest |s|, rad/s.
+
+    Returns
+    -------
+    evaluator : callable
+    cheap : bool
+    """
     if len(linear.coordinates) <= COMPLETE:
         system = linear._modal
-        return modal_transfer(system) if system.classical else direct_transfer(scaled(linear))
+        if system.classical:
+            return modal_transfer(system), True
+        if len(system.modes) <= COUPLED:
+            return coupled_transfer(system), True
+        return direct_transfer(scaled(linear)), False
+    return _routed_large(linear, top)
+
+
+def _routed_large(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
     base = scaled(linear)
     fit = rayleigh(base.model)
     if fit is None:
-        return direct_transfer(base)
+        return direct_transfer(base), False
     count = _modes_below(base, (2.0 * top) ** 2)
     if count > MOST_MODES:
-        return direct_transfer(base)
-    return residual_transfer(base, modes_of(linear, base, count + 2), fit, top)
+        return direct_transfer(base), False
+    return residual_transfer(base, modes_of(linear, base, count + 2), fit, top), False
 
 
 def modal_transfer(system: ModalSystem) -> Transfer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import control
@@ -138,6 +139,71 @@ def test_modal_direct_and_residual_routes_agree():
     solved = direct_transfer(scaled(frame))(z)
     assert len(frame.coordinates) == 1200
     np.testing.assert_allclose(series, solved, rtol=1e-9)
+
+
+@pytest.mark.parametrize("friction", [0.5, 40.0, "critical"])
+def test_damping_that_couples_the_modes(friction):
+    """Trolley friction on a free chain, light, heavy, and defective (two equal real poles), against dense solves."""
+    n = 6
+    K = s.chain(n).K.tolil()
+    K[0, 0] = 1.0
+    C = np.zeros((n, n))
+    C[0, 0] = 0.5 if friction == "critical" else friction
+    if friction == "critical":
+        # a seventh mass of its own, critically damped: [[0, 1], [-1, -2]] has one eigenvector only
+        M, K = np.eye(n + 1), sp.block_diag([K, [[1.0]]])
+        C = np.block([[C, np.zeros((n, 1))], [np.zeros((1, n)), np.array([[2.0]])]])
+        C[0, n] = C[n, 0] = 1e-4
+    else:
+        M = np.eye(n)
+    linear = s.model(M, K, C=C, Cq=np.eye(len(M))[[0, -1]])
+    assert not linear._modal.classical
+    omega = np.geomspace(1e-3, 3, 60)
+    np.testing.assert_allclose(linear.frequency_response(omega).values, dense_response(linear, 1j * omega), rtol=1e-8)
+    with pytest.raises(LinearizationError, match="start above 0"):
+        linear.frequency_response([0.0])
+
+
+def test_output_blind_to_the_integrator_has_its_static_value():
+    """Trolley with friction: the sway angle under a constant force is that of steady travel, none."""
+    linear = replace(s.crane(3.355, 1.0, 0.5), C=sp.csc_matrix(np.diag([4.0, 0.1])))
+    sway = linear.select(outputs=["sway_angle"]).frequency_response([0.0, 1e-6]).values[0, 0]
+    assert abs(sway[0]) < 1e-15
+    assert abs(sway[1]) < 1e-6
+
+
+@pytest.mark.parametrize("laub", [True, False])
+def test_398_states_against_python_control_with_and_without_slycot(laub, monkeypatch):
+    def missing(self, x):
+        raise ImportError
+
+    if not laub:
+        monkeypatch.setattr(control.StateSpace, "slycot_laub", missing)
+    arm = s.beam(99, ("w0",), EI=1e5, rhoA=8.0, length=10.0, beta=1e-7)
+    omega = np.geomspace(0.1, 1e4, 50)
+    theirs = control.frequency_response(arm.to_ss(), omega).frdata
+    np.testing.assert_allclose(theirs, arm.frequency_response(omega).values, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_six_thousand_freedoms_in_linear_memory():
+    """20 modes and 1000 points of a damped frame: right against direct solves; memory doubles with the size."""
+    peaks = []
+    for storeys in (100, 200):
+        frame = s.grid_frame(9, storeys, alpha=0.01, beta=1e-5)
+        tracemalloc.start()
+        modes = frame.modes(20)
+        omega = np.geomspace(0.1 * modes.omega[0], modes.omega[-1], 1000)
+        response = frame.frequency_response(omega)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert len(frame.coordinates) == 6000
+    some = slice(0, 1000, 111)
+    solved = direct_transfer(scaled(frame))(1j * omega[some])
+    np.testing.assert_allclose(response.values[..., some], solved, rtol=1e-7)
+    assert peaks[1] < 2.4 * peaks[0]
+    residual = frame.K @ modes.shapes - frame.M @ modes.shapes * modes.omega_squared
+    assert np.abs(residual).max() < 1e-9 * np.abs(frame.K @ np.abs(modes.shapes)).max()
 
 
 def test_velocity_outputs_and_feedthrough():

@@ -116,12 +116,6 @@ def test_lqr_on_a_flexible_arm_of_400_states(elements, method):
     assert closed.real.max() < 0
 
 
-def test_frequency_response_of_398_states_through_python_control():
-    arm = s.beam(99, ("w0",), EI=1e5, rhoA=8.0, length=10.0, beta=1e-7)
-    omega = np.geomspace(0.1, 1e4, 200)
-    np.testing.assert_allclose(arm.to_ss()(1j * omega), arm.frequency_response(omega).values[0, 0], rtol=1e-9)
-
-
 def test_chosen_modes_only():
     linear = s.cantilever(20, beta=1e-5)
     modes = linear.modes().select([0, 2])
