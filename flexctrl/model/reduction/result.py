@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -33,7 +34,7 @@ class Method(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced:
+class Reduced(ABC):
     """A reduced model with its origin.
 
     Attributes
@@ -47,13 +48,28 @@ class Reduced:
     full: LinearModel
     method: Method
 
+    @property
+    @abstractmethod
+    def order(self) -> int:
+        """Number of coordinates (second order) or states (first order)."""
+
+    @abstractmethod
     def transfer(self, top: float) -> Transfer:
         """Evaluator of G_r(s), good up to |s| = top (rad/s)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def damped_poles(self) -> np.ndarray:
         """Poles of the reduced model, smallest modulus first, rad/s."""
-        raise NotImplementedError
+
+    @abstractmethod
+    def frequency_response(
+        self, omega: np.ndarray | Sequence[float] | None = None, span: tuple[float, float] | None = None
+    ) -> FrequencyResponse:
+        """Response of the reduced model; as :meth:`LinearModel.frequency_response`."""
+
+    @abstractmethod
+    def to_ss(self) -> control.StateSpace:
+        """The reduced model for python-control."""
 
     @cached_property
     def error(self) -> ErrorReport:

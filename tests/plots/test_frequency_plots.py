@@ -1,0 +1,108 @@
+"""Pictures of frequency responses hold the data they are given, in the axes they are given."""
+
+from __future__ import annotations
+
+import control as ct
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from flexctrl.errors import StructureError
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.reduction import ModalTruncation
+from flexctrl.plots.frequency import mark_margins, plot_bode, plot_nyquist, plot_reduction, plot_root_locus
+from flexctrl.study.frequency import loop_grid, margins
+from flexctrl.study.loop import open_loop
+from flexctrl.study.root_locus import critical_gains, root_locus
+
+mpl.use("Agg")
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    plt.close("all")
+
+
+@pytest.fixture
+def machine() -> LinearModel:
+    """Three masses on springs, free to move; force on the first, first and last position out."""
+    K = 9.0 * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    M, C = (sp.csc_matrix(A) for A in (np.eye(3), 0.01 * K))
+    outputs = np.eye(3)[[0, 2]]
+    return LinearModel(
+        M,
+        C,
+        sp.csc_matrix(K),
+        np.eye(3)[:, :1],
+        outputs,
+        0 * outputs,
+        np.zeros((2, 1)),
+        ("a", "b", "c"),
+        ("f",),
+        ("x", "z"),
+    )
+
+
+def test_bode_of_rigid_and_flexible_lines_up_in_the_same_axes(machine):
+    flexible = machine.frequency_response(span=(0.1, 20.0))
+    rigid = machine.reduce(ModalTruncation(1)).linear.frequency_response(flexible.omega)
+    axes = plt.subplots(2, 1)[1]
+    drawn = plot_bode({"flexible": flexible, "rigid": rigid}, axes, channel=("x", "f"))
+    assert drawn[0] is axes[0]
+    assert drawn[1] is axes[1]
+    for line, response in zip(axes[0].lines, (flexible, rigid), strict=True):
+        np.testing.assert_allclose(line.get_xdata(), flexible.omega / (2 * np.pi))
+        np.testing.assert_allclose(line.get_ydata(), 20 * np.log10(abs(response.channel("x", "f"))))
+    # both start as a free mass: -180 degrees, not one at +180
+    assert [round(line.get_ydata()[0]) for line in axes[1].lines] == [-180, -180]
+    assert [text.get_text() for text in axes[0].get_legend().get_texts()] == ["flexible", "rigid"]
+
+
+def test_bode_takes_python_control_data_and_asks_for_a_channel(machine):
+    response = machine.frequency_response(span=(0.1, 20.0))
+    gain, _ = plot_bode({"": response.to_control()}, channel=("z", "f"), decibel=False)
+    np.testing.assert_allclose(gain.lines[0].get_ydata(), abs(response.channel("z", "f")))
+    assert gain.get_yscale() == "log"
+    with pytest.raises(StructureError, match=r"give \(output, input\)"):
+        plot_bode({"": response})
+
+
+def test_margins_are_marked_where_they_are(machine):
+    loop = open_loop(machine, ct.tf([2.0, 1.0], [0.01, 1]), output="x")
+    found = margins(loop)
+    axes = mark_margins(plot_bode({"L": loop.frd(loop_grid(loop)[0])}), found)
+    marked = axes[1].lines[-1]
+    np.testing.assert_allclose(marked.get_xdata(), found.phase.omega / (2 * np.pi))
+    np.testing.assert_allclose(np.ptp(marked.get_ydata()), abs(np.degrees(found.phase.margin)))
+
+
+def test_nyquist_touches_the_modulus_circle(machine):
+    loop = open_loop(machine, ct.tf([2.0, 1.0], [0.01, 1]), output="x")
+    found = margins(loop)
+    ax = plot_nyquist({"L": loop}, margins=found)
+    curve = ax.lines[0].get_xydata()
+    nearest = np.hypot(curve[:, 0] + 1, curve[:, 1]).min()
+    np.testing.assert_allclose(nearest, ax.patches[1].get_radius(), rtol=1e-2)
+
+
+def test_root_locus_draws_every_branch_and_the_critical_gain(machine):
+    loop = open_loop(machine, ct.tf([1.0, 0.5], [0.1, 1]), output="z")
+    locus = root_locus(loop)
+    critical = critical_gains(loop, locus)
+    ax = plot_root_locus({"flexible": locus}, critical=critical)
+    branches = [line for line in ax.lines if len(line.get_xdata()) == len(locus.gains)]
+    assert len(branches) == len(loop.A)
+    labels = {text.get_text() for text in ax.texts}
+    shown = [c for c in critical if c.unstable_above and c.omega <= ax.get_ylim()[1]]
+    assert labels == {f"k = {c.gain:.3g}" for c in shown}
+
+
+def test_reduction_shows_full_reduced_and_difference(machine):
+    reduced = machine.reduce(ModalTruncation(2, static_correction=True))
+    ax = plot_reduction(reduced, channel=("z", "f"))
+    full, small, gap = (line.get_ydata() for line in ax.lines)
+    assert len(full) == len(small) == len(gap)
+    np.testing.assert_allclose(gap.max(), reduced.error.absolute[1, 0], rtol=0.05)
