@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+from itertools import pairwise
 
 import pytest
 
@@ -39,7 +40,7 @@ def ceiling_crane() -> fc.Structure:
     girder = fc.Beam("girder", (0, -3, 0), (0, 3, 0), SECTION, elements=6)
     chain = [fc.Beam(f"link{i}", (0, 0, 1 - i), (0, 0, -i), SECTION) for i in (1, 2, 3)]
     joints = [fc.Support(girder.start, "v w"), fc.Support(girder.end, "v w"), fc.Pin(girder.node(3), chain[0].start)]
-    joints += [fc.Pin(a.end, b.start) for a, b in zip(chain, chain[1:], strict=False)]
+    joints += [fc.Pin(a.end, b.start) for a, b in pairwise(chain)]
     return fc.Structure([girder, *chain], joints)
 
 
