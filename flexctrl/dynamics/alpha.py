@@ -175,6 +175,10 @@ class Stepper:
         c = self.coefficients
         self.counts.worst = worst
         state = self.model.advance(point.state, step, v, point.state.t + h)
+        if self.model.motion.dead_point(state):
+            raise StepError(
+                worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part of it bend"
+            )
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
         return Point(state, rate, algorithmic, self.feed.at(state, point.supply, h), _trend(point, rate))
 

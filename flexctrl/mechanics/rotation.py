@@ -28,6 +28,19 @@ def rotation_vector(R: ca.SX) -> ca.SX:
     return ca.if_else(small, series, ca.atan2(sine, c) / sine) * s
 
 
+def rotation_of(theta: ca.SX) -> ca.SX:
+    """Return exp(θ×) (casadi), smooth through zero."""
+    import casadi as ca
+
+    square = ca.dot(theta, theta)
+    small = square < 1e-8
+    angle = ca.sqrt(ca.if_else(small, 1.0, square))
+    a = ca.if_else(small, 1.0 - square / 6.0, ca.sin(angle) / angle)
+    b = ca.if_else(small, 0.5 - square / 24.0, (1.0 - ca.cos(angle)) / (angle * angle))
+    K = ca.skew(theta)
+    return ca.DM.eye(3) + a * K + b * (K @ K)
+
+
 def inverse_tangent(theta: ca.SX, v: ca.SX) -> ca.SX:
     """Return T(θ)⁻ᵀ v = v + ½ θ×v + η θ×(θ×v) (casadi), with η = (1 − (|θ|/2) cot(|θ|/2))/|θ|².
 

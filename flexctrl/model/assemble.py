@@ -14,8 +14,8 @@ from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch, ShaftElas
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.kernel import Backend, best_backend
 from flexctrl.model.linearize import linearize
+from flexctrl.model.mobility import motion_of
 from flexctrl.model.model import Model
-from flexctrl.model.motion import motion_of
 from flexctrl.structure.elements import Beam, Rope
 from flexctrl.structure.freedoms import listed
 from flexctrl.structure.structure import Structure
@@ -41,7 +41,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     Raises
     ------
     StructureError
-        For something that is no effect, an effect given twice, or a loop of rigid parts.
+        For something that is no effect or an effect given twice.
     """
     if not isinstance(structure, Structure):
         raise StructureError(f"assemble: {structure!r} is no Structure")
@@ -78,11 +78,6 @@ def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, .
     -------
     Model or tuple of Effect
         What was given, with `BeamFlexibility`, `ShaftElasticity` and `RopeStretch` left out.
-
-    Raises
-    ------
-    StructureError
-        If rigid parts form a loop.
     """
     if isinstance(model_or_effects, Model):
         kept = rigid(model_or_effects.effects)

@@ -16,6 +16,7 @@ from flexctrl.errors import LinearizationError, StructureError, did_you_mean
 if TYPE_CHECKING:
     import control
 
+    from flexctrl.model.certificate import Certificate
     from flexctrl.model.condense import Audit
     from flexctrl.model.discrete import Hold
     from flexctrl.model.modal import ModalSystem
@@ -61,6 +62,8 @@ class LinearModel:
         Name of the machine.
     parts : mapping of str to PartMatrices
         Each part's share of K and M; empty where unknown.
+    certificate : Certificate, optional
+        What `linearize` checked; absent in models made from matrices.
     """
 
     M: sp.csc_matrix
@@ -75,6 +78,7 @@ class LinearModel:
     outputs: tuple[str, ...]
     name: str = "linear"
     parts: Mapping[str, PartMatrices] = field(default_factory=dict)
+    certificate: Certificate | None = None
 
     def __post_init__(self) -> None:
         n, m, p = len(self.coordinates), len(self.inputs), len(self.outputs)

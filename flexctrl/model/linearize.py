@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError
+from flexctrl.model.certificate import certify, taylor_slope
 from flexctrl.model.equilibrium import Rest, Search, equilibrium
 from flexctrl.model.linear import LinearModel, PartMatrices
 from flexctrl.model.model import Model
@@ -30,12 +32,14 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     Returns
     -------
     LinearModel
-        In the order of ``model.coordinates``; inputs and outputs are deviations.
+        In the order of ``model.coordinates``; inputs and outputs are deviations. Its ``certificate``
+        tells why it can be trusted.
 
     Raises
     ------
     LinearizationError
-        If the state is not an equilibrium: says by how much and where.
+        If the state is not an equilibrium (says by how much and where), or another point of the
+        certificate fails.
     EquilibriumError
         If none was given and none is found.
     """
@@ -43,13 +47,20 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     state = rest.state if isinstance(rest, Rest) else rest
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
     free = _free(model, rest)
-    _check_balance(model, state, u, free)
+    search = Search(model, u, free)
+    residual = _check_balance(search, state)
+    linear, asymmetry = _derivative(model, state, u, free)
+    slope = taylor_slope(_push(search, state), linear.K, np.where(search.turning, 1.0, search.size)[free])
+    return replace(linear, certificate=certify(linear, residual, asymmetry, slope, model.motion, state))
+
+
+def _derivative(model: Model, state: State, u: np.ndarray, free: np.ndarray) -> tuple[LinearModel, float]:
     zero = np.zeros(model.n)
     seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     K, C, M = (-model.slope(state, zero, zero, seed, u)[free][:, free] for seed in seeds)
-    T = model.motion.jacobian(state if model.large else model.rest)[: model.motion.raw][:, free]
+    T = model.motion.jacobian(state if model.large else model.rest)[:, free]
     on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=zero)), model.motion.raw)
-    return LinearModel(
+    linear = LinearModel(
         M=_symmetric(M),
         C=C.tocsc(),
         K=_symmetric(K),
@@ -63,6 +74,20 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
         name=model.structure.name,
         parts=_parts(model, state, free),
     )
+    gap = float(abs(K - K.T).max()) if K.nnz else 0.0
+    return linear, gap / max(float(abs(K).max()) if K.nnz else 0.0, 1e-300)
+
+
+def _push(search: Search, state: State) -> Callable[[np.ndarray], np.ndarray]:
+    """Force on the free coordinates after a displacement of them."""
+    model, rest = search.model, search.force(state)
+
+    def force(d: np.ndarray) -> np.ndarray:
+        step = np.zeros(model.n)
+        step[search.free] = d
+        return search.force(model.advance(state, step, search.zero, 0.0)) - rest
+
+    return force
 
 
 def _free(model: Model, rest: Rest | State) -> np.ndarray:
@@ -70,17 +95,19 @@ def _free(model: Model, rest: Rest | State) -> np.ndarray:
     return np.array([i for i, name in enumerate(model.coordinates) if name not in held], dtype=int)
 
 
-def _check_balance(model: Model, state: State, u: np.ndarray, free: np.ndarray) -> None:
+def _check_balance(search: Search, state: State) -> float:
     if np.abs(state.v).max(initial=0.0) > 0.0:
         raise LinearizationError("linearize: the state moves; give one at rest, e.g. from equilibrium(model)")
-    search = Search(model, u, free)
     force, scale = search.force(state), search.scale(state)
-    if search.relative(force, scale) > _BALANCED + search.noise(state):
+    residual = search.relative(force, scale)
+    if residual > _BALANCED + search.noise(state):
         worst = int(np.argmax(np.abs(force)))
+        name = search.model.coordinates[search.free[worst]]
         raise LinearizationError(
-            f"linearize: not an equilibrium: {model.coordinates[free[worst]]} is pushed by {force[worst]:.4g} "
-            f"(forces at work: {scale:.3g}); linearise about equilibrium(model), or name the inputs that balance it"
+            f"linearize: not an equilibrium: {name} is pushed by {force[worst]:.4g} (forces at work: {scale:.3g}); "
+            "linearise about equilibrium(model), or name the inputs that balance it"
         )
+    return residual
 
 
 def _symmetric(A: sp.spmatrix) -> sp.csc_matrix:

@@ -1,8 +1,8 @@
 """Followers and drives as casadi expressions: how nodes ride on their masters.
 
 Only places and rates are written down. Accelerations, the forces given back to masters, the matrix T
-and its change with the pose all follow from the rates by differentiation:
-V = T(pose) (base, own), A = T (base, own)' + dT/dt (base, own), collected = Tᵀ F.
+and its change with the pose all follow from the rates by differentiation: V = T(pose) w,
+A = T ẇ + Ṫ w, collected = Tᵀ F. Loops of rigid parts are closed by making some freedoms depend on the others.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ import numpy as np
 
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, linear_motion, rotary_motion
-from flexctrl.mechanics.rotation import rotation_vector
+from flexctrl.mechanics.rotation import rotation_of, rotation_vector
 from flexctrl.structure.drives import Drive, RotaryDrive
 from flexctrl.structure.freedoms import Vector
 from flexctrl.structure.ties import Copy, Follow, Ride, Turn
 
 if TYPE_CHECKING:
     import casadi as ca
+
+_CLOSING = 4
+"""Newton corrections that close loops after a step; the contraction is the turn within the step."""
 
 
 @dataclass(frozen=True)
@@ -36,71 +39,89 @@ class Link:
     rigid: bool
 
 
+@dataclass(frozen=True)
+class Loop:
+    """A condition that closes a loop of rigid parts: a freedom of ``node`` is that of ``other``, or held (−1)."""
+
+    node: int
+    freedom: int
+    other: int
+
+
 @dataclass(frozen=True, eq=False)
 class Linkage:
-    """The nodes that follow or lead, in numbers of their own, and the functions of their motion.
+    """The nodes that follow, lead or are driven, in numbers of their own, and the functions of their motion.
+
+    The freedoms of a linkage are its independent ones, then as many dependent ones as loops are closed.
 
     Attributes
     ----------
-    count : int
-        Nodes.
+    cells : numpy.ndarray of int, shape (count, 6)
+        Number of each nodal freedom among the linkage's; one past the last for none.
     rest : numpy.ndarray, shape (count, 3)
         Positions at rest.
     follows : tuple of Ride, Turn or Copy
-        In an order in which they can be evaluated; ``own`` counts from 1 among the own freedoms here.
+        In an order in which they can be evaluated; ``own`` counts from 1 among the linkage's freedoms.
     lines : tuple of (int, numpy.ndarray)
         Nodes that turn about body axes (columns).
     links : tuple of Link
-    owns : int
-        Own freedoms of hinges and slides.
+    loops : tuple of Loop
+        Independent ones.
+    free : int
+        Independent freedoms.
     """
 
-    count: int
+    cells: np.ndarray
     rest: np.ndarray
     follows: tuple[Follow, ...]
     lines: tuple[tuple[int, np.ndarray], ...]
     links: tuple[Link, ...]
-    owns: int
+    loops: tuple[Loop, ...]
+    free: int
+
+    @property
+    def count(self) -> int:
+        """Number of nodes."""
+        return len(self.cells)
 
     @cached_property
     def place(self) -> Callable[..., np.ndarray]:
-        """(old pose, pose with own freedoms moved, own steps) → new pose (count, 12)."""
-        return _callable("place", [self._old, self._pose, self._own], self._placed())
+        """(old pose, step of the independent freedoms) → new pose (count, 12)."""
+        return _callable("place", [self._pose, self._rate], self._closed_place())
 
     @cached_property
     def rates(self) -> Callable[..., np.ndarray]:
-        """(pose, base rates, own rates) → raw rates: (count, 6), then the source angles of rigid shafts."""
-        return _callable("rates", [self._pose, self._base, self._own], self._raw)
+        """(pose, independent rates) → raw rates: (count, 6), then the source angles of rigid shafts."""
+        return _callable("rates", [self._pose, self._rate], self._raw)
 
     @cached_property
     def accelerations(self) -> Callable[..., np.ndarray]:
-        """(pose, base rates, own rates, their rates) → raw accelerations."""
+        """(pose, independent rates, their rates) → raw accelerations."""
         import casadi as ca
 
-        base, own = ca.SX.sym("base_rate", 6, self.count), ca.SX.sym("own_rate", self.owns)
+        change = ca.SX.sym("change", self.free)
         V = ca.reshape(self._raw[: 6 * self.count], 6, self.count)
         turning = [ca.skew(V[3:, i]) @ _rotation(self._pose[:, i]) for i in range(self.count)]
         moving = ca.vertcat(*[ca.vertcat(V[:3, i], ca.vec(w.T)) for i, w in enumerate(turning)])
         carried = ca.jtimes(self._raw, ca.vec(self._pose), moving)
-        pushed = ca.substitute(self._raw, ca.vertcat(ca.vec(self._base), self._own), ca.vertcat(ca.vec(base), own))
-        return _callable("accelerations", [self._pose, self._base, self._own, base, own], pushed + carried)
+        pushed = ca.substitute(self._raw, self._rate, change)
+        return _callable("accelerations", [self._pose, self._rate, change], pushed + carried)
 
     @cached_property
     def collect(self) -> Callable[..., np.ndarray]:
-        """(pose, raw forces) → forces on base rates (6 count), then on own rates."""
+        """(pose, raw forces) → forces on the independent freedoms."""
         return _callable("collect", [self._pose, self._force], self._collected)
 
     @cached_property
     def matrix(self) -> Callable[..., np.ndarray]:
-        """Pose → T, shape (raw, 6 count + owns), column by column."""
+        """Pose → T, shape (raw, free), column by column."""
         import casadi as ca
 
-        T = ca.jacobian(self._raw, ca.vertcat(ca.vec(self._base), self._own))
-        return _callable("matrix", [self._pose], ca.vec(ca.densify(T)))
+        return _callable("matrix", [self._pose], ca.vec(ca.densify(ca.jacobian(self._raw, self._rate))))
 
     @cached_property
     def stiffening(self) -> Callable[..., np.ndarray]:
-        """(pose, raw forces) → ∂collected/∂(raw motion of the nodes), shape (6 count + owns, 6 count), by columns."""
+        """(pose, raw forces) → ∂collected/∂(raw motion of the nodes), shape (free, 6 count), by columns."""
         import casadi as ca
 
         d = ca.SX.sym("d", 6, self.count)
@@ -124,40 +145,32 @@ class Linkage:
         values = [self._drive_motion(link, self._pose, still).driven for link in self.links]
         return _callable("driven", [self._pose], ca.vertcat(*values, ca.SX(0, 1)))
 
+    @cached_property
+    def grip(self) -> Callable[..., np.ndarray]:
+        """Pose → the matrix whose inverse gives the dependent freedoms, column by column; singular at a dead point."""
+        import casadi as ca
+
+        return _callable("grip", [self._pose], ca.vec(ca.densify(self._loop_slopes(self._pose)[1])))
+
     def matrix_at(self, pose: np.ndarray) -> np.ndarray:
         """Return T at a pose."""
-        return self.matrix(pose).reshape(6 * self.count + self.owns, -1).T
+        return self.matrix(pose).reshape(self.free, -1).T
 
     def stiffening_at(self, pose: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return ∂collected/∂(raw motion) at a pose under constant raw forces."""
         return self.stiffening(pose, force).reshape(6 * self.count, -1).T
 
     @cached_property
-    def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    def _pose(self) -> ca.SX:
         import casadi as ca
 
-        return (
-            ca.SX.sym("pose", 12, self.count),
-            ca.SX.sym("old", 12, self.count),
-            ca.SX.sym("base", 6, self.count),
-            ca.SX.sym("own", self.owns),
-        )
+        return ca.SX.sym("pose", 12, self.count)
 
-    @property
-    def _pose(self) -> ca.SX:
-        return self._symbols[0]
+    @cached_property
+    def _rate(self) -> ca.SX:
+        import casadi as ca
 
-    @property
-    def _old(self) -> ca.SX:
-        return self._symbols[1]
-
-    @property
-    def _base(self) -> ca.SX:
-        return self._symbols[2]
-
-    @property
-    def _own(self) -> ca.SX:
-        return self._symbols[3]
+        return ca.SX.sym("rate", self.free)
 
     @cached_property
     def _force(self) -> ca.SX:
@@ -169,82 +182,141 @@ class Linkage:
     def _collected(self) -> ca.SX:
         import casadi as ca
 
-        return ca.jtimes(self._raw, ca.vertcat(ca.vec(self._base), self._own), self._force, True)
+        return ca.jtimes(self._raw, self._rate, self._force, True)
 
     @cached_property
     def _raw(self) -> ca.SX:
         """Raw rates of all nodes and of the source angles behind rigid shafts."""
         import casadi as ca
 
-        motion = [(self._base[:3, i], self._base[3:, i]) for i in range(self.count)]
-        for node, axes in self.lines:
-            motion[node] = (motion[node][0], _rotation(self._pose[:, node]) @ axes @ motion[node][1])
-        for follow in self.follows:
-            motion[follow.node] = self._followed(follow, motion)
-        sources = []
-        for link in self.links:
-            if link.rigid:
-                drive = self._drive_motion(link, self._pose, motion)
-                sources.append(drive.p["ratio"] * drive.driven_rate)
-        return ca.vertcat(*[ca.vertcat(v, w) for v, w in motion], *sources)
+        motion = self._open_rates(self._pose, self._all(self._pose, self._rate))
+        drives = [self._drive_motion(link, self._pose, motion) for link in self.links if link.rigid]
+        return ca.vertcat(*[ca.vertcat(v, w) for v, w in motion], *[m.p["ratio"] * m.driven_rate for m in drives])
 
-    def _followed(self, f: Follow, motion: Sequence[tuple[ca.SX, ca.SX]]) -> tuple[ca.SX, ca.SX]:
+    def _all(self, pose: ca.SX, rate: ca.SX) -> ca.SX:
+        """Return all freedoms' rates: the dependent ones keep the loops closed."""
+        import casadi as ca
+
+        if not self.loops:
+            return rate
+        onto, within = self._loop_slopes(pose)
+        return ca.vertcat(rate, -ca.solve(within, onto @ rate))
+
+    def _loop_slopes(self, pose: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Return how fast loops open with the independent and with the dependent freedoms."""
+        import casadi as ca
+
+        every = ca.SX.sym("every", self.free + len(self.loops))
+        motion = self._open_rates(pose, every)
+        opening = [self._between(loop, [ca.vertcat(v, w) for v, w in motion]) for loop in self.loops]
+        G = ca.jacobian(ca.vertcat(*opening), every)
+        return G[:, : self.free], G[:, self.free :]
+
+    def _between(self, loop: Loop, values: Sequence[ca.SX]) -> ca.SX:
+        """Return a value of a loop's node less that of the other, or of the ground."""
+        value = values[loop.node][loop.freedom]
+        return value if loop.other < 0 else value - values[loop.other][loop.freedom]
+
+    def _open_rates(self, pose: ca.SX, every: ca.SX) -> list[tuple[ca.SX, ca.SX]]:
+        """Return velocities and spins of all nodes, loops left open."""
+        base = [self._base(i, every) for i in range(self.count)]
+        motion = [(b[:3], b[3:]) for b in base]
+        for node, axes in self.lines:
+            motion[node] = (motion[node][0], _rotation(pose[:, node]) @ axes @ motion[node][1])
+        for follow in self.follows:
+            motion[follow.node] = self._followed(follow, motion, pose, every)
+        return motion
+
+    def _base(self, node: int, every: ca.SX) -> ca.SX:
+        """Return the six values that a node's freedoms have by themselves."""
+        import casadi as ca
+
+        size = every.shape[0]
+        return ca.vertcat(*[every[int(k)] if k < size else ca.SX(0) for k in self.cells[node]])
+
+    def _followed(
+        self, f: Follow, motion: Sequence[tuple[ca.SX, ca.SX]], pose: ca.SX, every: ca.SX
+    ) -> tuple[ca.SX, ca.SX]:
         """Velocity and spin of a follower; own rates are absolute along the axis, so rows read as the join table."""
         import casadi as ca
 
         (v, w), (mv, mw) = motion[f.node], motion[f.master]
         if isinstance(f, Turn):
-            a = _rotation(self._pose[:, f.master]) @ ca.DM(f.axis)
-            return v, mw + a * (self._rate(f.own) - ca.dot(a, mw))
+            a = _rotation(pose[:, f.master]) @ ca.DM(f.axis)
+            return v, mw + a * (_own(f.own, every) - ca.dot(a, mw))
         if isinstance(f, Ride):
-            moved = mv + ca.cross(mw, self._pose[:3, f.node] - self._pose[:3, f.master])
+            moved = mv + ca.cross(mw, pose[:3, f.node] - pose[:3, f.master])
             if f.along is not None:
-                a = _rotation(self._pose[:, f.master]) @ ca.DM(f.along)
-                moved = moved + a * (self._rate(f.own) - ca.dot(a, mv))
+                a = _rotation(pose[:, f.master]) @ ca.DM(f.along)
+                moved = moved + a * (_own(f.own, every) - ca.dot(a, mv))
             return moved, w
         if f.freedom == 3:
             return v, mw
         return ca.vertcat(*[mv[k] if k == f.freedom else v[k] for k in range(3)]), w
 
-    def _rate(self, own: int) -> ca.SX:
+    def _closed_place(self) -> ca.SX:
+        """Return the new pose; the dependent steps are found by Newton's method with the slopes before the step."""
         import casadi as ca
 
-        return self._own[own - 1] if own else ca.SX(0)
+        old, step = self._pose, self._rate
+        if not self.loops:
+            return self._open_place(old, step)
+        _, within = self._loop_slopes(old)
+        dependent = self._all(old, step)[self.free :]
+        for _ in range(_CLOSING):
+            dependent = dependent - ca.solve(within, self._gaps(self._open_place(old, ca.vertcat(step, dependent))))
+        return self._open_place(old, ca.vertcat(step, dependent))
 
-    def _placed(self) -> ca.SX:
+    def _gaps(self, pose: ca.SX) -> ca.SX:
+        """Return how far loops are open, from positions and rotation vectors since rest."""
         import casadi as ca
 
-        x = [self._pose[:3, i] for i in range(self.count)]
-        R = [_rotation(self._pose[:, i]) for i in range(self.count)]
-        old_R = [_rotation(self._old[:, i]) for i in range(self.count)]
+        shaped = ca.reshape(pose, 12, self.count)
+        since = [
+            ca.vertcat(shaped[:3, i] - ca.DM(self.rest[i]), rotation_vector(_rotation(shaped[:, i])))
+            for i in range(self.count)
+        ]
+        return ca.vertcat(*[self._between(loop, since) for loop in self.loops])
+
+    def _open_place(self, old: ca.SX, step: ca.SX) -> ca.SX:
+        import casadi as ca
+
+        moved = [self._base(i, step) for i in range(self.count)]
+        old_R = [_rotation(old[:, i]) for i in range(self.count)]
+        for node, axes in self.lines:
+            moved[node] = ca.vertcat(moved[node][:3], old_R[node] @ axes @ moved[node][3:])
+        x = [old[:3, i] + m[:3] for i, m in enumerate(moved)]
+        R = [rotation_of(m[3:]) @ r for m, r in zip(moved, old_R, strict=True)]
         for f in self.follows:
             n, m = f.node, f.master
             if isinstance(f, Turn):
                 axis = ca.DM(f.axis)
                 turned = ca.dot(old_R[m] @ axis, rotation_vector(R[m] @ old_R[m].T))
-                phi = _twist(old_R[m].T @ old_R[n], axis) + self._rate(f.own) - turned
+                phi = _twist(old_R[m].T @ old_R[n], axis) + _own(f.own, step) - turned
                 K = ca.skew(axis)
                 R[n] = R[m] @ (ca.DM.eye(3) + ca.sin(phi) * K + (1.0 - ca.cos(phi)) * (K @ K))
             elif isinstance(f, Ride):
-                x[n] = x[m] + R[m] @ (ca.DM(self.rest[n] - self.rest[m]) + self._slid(f, x, R, old_R))
+                slid = self._slid(f, x, R, old, _own(f.own, step))
+                x[n] = x[m] + R[m] @ (ca.DM(self.rest[n] - self.rest[m]) + slid)
             elif f.freedom == 3:
                 R[n] = R[m]
             else:
-                moved = x[m][f.freedom] + float(self.rest[n, f.freedom] - self.rest[m, f.freedom])
-                x[n] = ca.vertcat(*[moved if k == f.freedom else x[n][k] for k in range(3)])
+                value = x[m][f.freedom] + float(self.rest[n, f.freedom] - self.rest[m, f.freedom])
+                x[n] = ca.vertcat(*[value if k == f.freedom else x[n][k] for k in range(3)])
         return ca.vertcat(*[ca.vertcat(p, ca.vec(q.T)) for p, q in zip(x, R, strict=True)])
 
-    def _slid(self, f: Ride, x: list[ca.SX], R: list[ca.SX], old_R: list[ca.SX]) -> ca.SX:
+    def _slid(self, f: Ride, x: list[ca.SX], R: list[ca.SX], old: ca.SX, step: ca.SX) -> ca.SX:
         """How far a slide stands out along its axis; the master's part of the step is seen along the mean axis."""
         import casadi as ca
 
         if f.along is None:
             return ca.SX(3, 1)
         along, m = ca.DM(f.along), f.master
-        arm = old_R[m].T @ (self._old[:3, f.node] - self._old[:3, m]) - ca.DM(self.rest[f.node] - self.rest[m])
-        mean = (R[m] + old_R[m]) @ along
+        old_R = _rotation(old[:, m])
+        arm = old_R.T @ (old[:3, f.node] - old[:3, m]) - ca.DM(self.rest[f.node] - self.rest[m])
+        mean = (R[m] + old_R) @ along
         mean = mean / ca.sqrt(ca.dot(mean, mean))
-        return along * (ca.dot(along, arm) + self._rate(f.own) - ca.dot(mean, x[m] - self._old[:3, m]))
+        return along * (ca.dot(along, arm) + step - ca.dot(mean, x[m] - old[:3, m]))
 
     def _drive_motion(self, link: Link, pose: ca.SX, motion: Sequence[tuple[ca.SX, ca.SX]]) -> DriveMotion:
         import casadi as ca
@@ -258,6 +330,12 @@ class Linkage:
         if isinstance(d, RotaryDrive):
             return rotary_motion(node(link.node), node(link.base), ca.SX.zeros(3), ca.SX(0), p)
         return linear_motion(node(link.node), node(link.base), ca.SX.zeros(3), p)
+
+
+def _own(number: int, values: ca.SX) -> ca.SX:
+    import casadi as ca
+
+    return values[number - 1] if number else ca.SX(0)
 
 
 def _rotation(pose: ca.SX) -> ca.SX:
@@ -299,7 +377,7 @@ def _callable(name: str, arguments: list[ca.SX], result: ca.SX) -> Callable[...,
 
 
 def renumbered(follow: Follow, local: dict[int, int], own: dict[int, int]) -> Follow:
-    """Return a follower in the node and own numbers of a linkage; an own freedom that is held becomes 0."""
+    """Return a follower in the node and freedom numbers of a linkage."""
     node, master = local[follow.node], local[follow.master]
     if isinstance(follow, Copy):
         return Copy(node, follow.freedom, master)

@@ -14,15 +14,15 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import exponential, orthonormal
-from flexctrl.model.linkage import Link, Linkage, renumbered
+from flexctrl.model.linkage import Linkage
 from flexctrl.structure.drives import Drive, RotaryDrive
-from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
-from flexctrl.structure.join_table import JoinTable
-from flexctrl.structure.joints import main_axis
-from flexctrl.structure.structure import Structure
-from flexctrl.structure.ties import Closure, Copy, Group, Ties, Turn, tie
+from flexctrl.structure.ties import Closure
+
+DENSE_UP_TO = 60
+"""Degrees of freedom up to which matrices are worked as plain arrays."""
+
+_DEAD = 200.0
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,13 @@ class Motion:
         The nodes that follow, lead or are driven.
     nodes : numpy.ndarray of int
         Their numbers.
-    owns : numpy.ndarray of int
-        Degrees of freedom of its hinges and slides.
+    linked : numpy.ndarray of int
+        Degrees of freedom of the linkage.
     rest : State
     notes : tuple of str
-        What was released or held so that rigid loops close.
+        How loops of rigid parts are closed.
     closures : tuple of Closure
-        Conditions that the remaining freedoms meet to first order; watched during a run.
+        The conditions that close them; watched during a run.
     """
 
     names: tuple[str, ...]
@@ -99,7 +99,7 @@ class Motion:
     drives: tuple[Drive, ...]
     linkage: Linkage
     nodes: np.ndarray
-    owns: np.ndarray
+    linked: np.ndarray
     rest: State
     notes: tuple[str, ...]
     closures: tuple[Closure, ...]
@@ -146,11 +146,6 @@ class Motion:
         return np.append(cells, self.source_base + np.flatnonzero(self.rigid))
 
     @cached_property
-    def _bases(self) -> np.ndarray:
-        """Raw places of the linkage's nodes."""
-        return self._linked[: 6 * len(self.nodes)]
-
-    @cached_property
     def _rotary(self) -> np.ndarray:
         return np.array([isinstance(d, RotaryDrive) for d in self.drives], dtype=bool)
 
@@ -176,12 +171,11 @@ class Motion:
         """
         padded = np.append(step, 0.0)
         moved = padded[self.place]
-        for node, axes in self.linkage.lines:
-            moved[self.nodes[node], 3:] = state.R[self.nodes[node]] @ axes @ moved[self.nodes[node], 3:]
         x, R = state.x + moved[:, :3], orthonormal(exponential(moved[:, 3:]) @ state.R)
         if not self.plain:
-            pose = self.linkage.place(self._pose(state.x, state.R), self._pose(x, R), padded[self.owns])
-            x[self.nodes], R[self.nodes] = pose.reshape(-1, 12)[:, :3], pose.reshape(-1, 4, 3)[:, 1:]
+            pose = self.linkage.place(self._pose(state.x, state.R), step[self.linked])
+            x[self.nodes] = pose.reshape(-1, 12)[:, :3]
+            R[self.nodes] = orthonormal(pose.reshape(-1, 4, 3)[:, 1:])
         return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t)
 
     def unwound(self, x: np.ndarray, R: np.ndarray, before: np.ndarray) -> np.ndarray:
@@ -197,34 +191,28 @@ class Motion:
 
     def rates(self, state: State, v: np.ndarray) -> np.ndarray:
         """Return the raw rates of own rates ``v``."""
-        own = np.append(v, 0.0)
-        raw = own[self.cells]
+        raw = np.append(v, 0.0)[self.cells]
         if not self.plain:
-            raw[self._linked] = self.linkage.rates(self._pose(state.x, state.R), raw[self._bases], own[self.owns])
+            raw[self._linked] = self.linkage.rates(self._pose(state.x, state.R), v[self.linked])
         return raw
 
     def accelerations(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the raw accelerations of own rates ``v`` and accelerations ``a``."""
-        rate = np.append(a, 0.0)
-        raw = rate[self.cells]
+        raw = np.append(a, 0.0)[self.cells]
         if not self.plain:
-            own = np.append(v, 0.0)
-            base = own[self.cells[self._bases]]
-            raw[self._linked] = self.linkage.accelerations(
-                self._pose(state.x, state.R), base, own[self.owns], raw[self._bases], rate[self.owns]
-            )
+            pose = self._pose(state.x, state.R)
+            raw[self._linked] = self.linkage.accelerations(pose, v[self.linked], a[self.linked])
         return raw
 
     def collect(self, state: State, raw: np.ndarray) -> np.ndarray:
         """Return Tᵀ F: raw forces on the degrees of freedom (n,)."""
         if self.plain:
             return np.bincount(self.cells, weights=raw, minlength=self.n + 1)[:-1]
-        back = self.linkage.collect(self._pose(state.x, state.R), raw[self._linked])
-        raw = raw.copy()
-        raw[self._bases] = back[: self._bases.size]
-        forces = np.bincount(self.cells, weights=raw, minlength=self.n + 1)
-        np.add.at(forces, self.owns, back[self._bases.size :])
-        return forces[:-1]
+        rest = raw.copy()
+        rest[self._linked] = 0.0
+        forces = np.bincount(self.cells, weights=rest, minlength=self.n + 1)[:-1]
+        forces[self.linked] += self.linkage.collect(self._pose(state.x, state.R), raw[self._linked])
+        return forces
 
     def jacobian(self, state: State) -> sp.csr_matrix:
         """Return T (raw × n): raw rates from own rates."""
@@ -251,8 +239,8 @@ class Motion:
 
     @cached_property
     def _lead(self) -> sp.csr_matrix:
-        """Base and own rates of the linkage from own rates."""
-        return _select(np.append(self.cells[self._bases], self.owns), self.n)
+        """Independent rates of the linkage from own rates."""
+        return _select(self.linked, self.n)
 
     def dense_jacobian(self, state: State) -> np.ndarray:
         """Return T (raw × n) as an array: quicker while it is small."""
@@ -272,8 +260,16 @@ class Motion:
     def stiffening(self, state: State, raw: np.ndarray) -> np.ndarray:
         """Return ∂(Tᵀ F)/∂(own freedoms) under constant raw forces F, shape (n, n): the levers turn."""
         pose, lead = self._pose(state.x, state.R), self._lead if self.n > DENSE_UP_TO else self._dense_lead
-        motion = self.linkage.matrix_at(pose)[: self._bases.size] @ lead
+        motion = self.linkage.matrix_at(pose)[: 6 * len(self.nodes)] @ lead
         return lead.T @ (self.linkage.stiffening_at(pose, raw[self._linked]) @ motion)
+
+    def dead_point(self, state: State) -> bool:
+        """Tell whether a loop of rigid parts is near a position from which its coordinates cannot move it."""
+        if not self.linkage.loops:
+            return False
+        size = len(self.linkage.loops)
+        grip = self.linkage.grip(self._pose(state.x, state.R)).reshape(size, size)
+        return bool(np.linalg.cond(grip / np.abs(grip).max(axis=0)) > _DEAD)
 
     def closure_error(self, state: State) -> float:
         """Return how far the conditions that close rigid loops are violated [m or rad]."""
@@ -287,171 +283,7 @@ class Motion:
         return worst
 
 
-DENSE_UP_TO = 60
-"""Degrees of freedom up to which matrices are worked as plain arrays."""
-
-
-def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...]) -> Motion:
-    """Work out how the nodes of a structure move.
-
-    Parameters
-    ----------
-    structure : Structure
-    rigid : tuple of Group
-        Parts that do not deform, rigid bodies included.
-    elastic : tuple of str
-        Drives with an elastic shaft, whose source angle is a degree of freedom.
-
-    Returns
-    -------
-    Motion
-
-    Raises
-    ------
-    StructureError
-        If rigid parts form a loop that only moves out of proportion to its freedoms.
-    """
-    ties = _ties(structure, rigid)
-    open_loop = _motion(structure, ties, elastic, held=frozenset(), notes=())
-    if not ties.closures:
-        return open_loop
-    held, notes = _close(structure, open_loop, ties.closures)
-    return _motion(structure, ties, elastic, held, notes)
-
-
-def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
-    if isinstance(structure.joints, JoinTable):
-        if rigid:
-            raise StructureError(
-                f"structure {structure.name!r} is tied by a join table of numbers; rigid parts need joints to ride on"
-            )
-        table = structure.joints
-        numbers = {n for row in table.rows for n in row}
-        return Ties(table.rows, (), (), (), max(numbers, default=0))
-    return tie(structure.nodes, structure.joints, rigid)
-
-
-def _motion(
-    structure: Structure, ties: Ties, elastic: tuple[str, ...], held: frozenset[int], notes: tuple[str, ...]
-) -> Motion:
-    names = [*_names(structure, ties), *(f"{name}_source" for name in elastic)]
-    kept = [i for i in range(len(names)) if i not in held]
-    number = np.full(len(names) + 1, len(kept))
-    number[kept] = np.arange(len(kept))
-    cells = np.array([*ties.cells, (0,) * 6])
-    place = number[np.where(cells > 0, cells - 1, len(names))]
-    x = np.array([*(n.position for n in structure.nodes), (0.0, 0.0, 0.0)])
-    R = np.broadcast_to(np.eye(3), (len(x), 3, 3)).copy()
-    zero = np.zeros(len(kept))
-    after = {name: ties.free + i for i, name in enumerate(elastic)}
-    sources = number[np.array([after.get(d.name, len(names)) for d in structure.drives], dtype=int)]
-    linkage, nodes, owns = _linkage(structure, ties, elastic, x, number)
-    return Motion(
-        names=tuple(names[i] for i in kept),
-        place=place,
-        sources=sources,
-        drives=structure.drives,
-        linkage=linkage,
-        nodes=nodes,
-        owns=owns,
-        rest=State(x, R, zero, zero, np.zeros(len(structure.drives))),
-        notes=notes,
-        closures=ties.closures,
-    )
-
-
-def _linkage(
-    s: Structure, ties: Ties, elastic: tuple[str, ...], x: np.ndarray, number: np.ndarray
-) -> tuple[Linkage, np.ndarray, np.ndarray]:
-    """Return the linkage of a structure, the numbers of its nodes and of its own freedoms."""
-    ground = len(s.nodes)
-    sides = [(s.number(d.node), ground if d.against is None else s.number(d.against)) for d in s.drives]
-    used = {n for f in ties.follows for n in (f.node, f.master)} | {n for n, _ in ties.lines}
-    nodes = sorted(used | {n for pair in sides for n in pair})
-    local = {n: i for i, n in enumerate(nodes)}
-    free = len(number) and int(number[-1])
-    follows = [f.own for f in ties.follows if not isinstance(f, Copy) and f.own and number[f.own - 1] < free]
-    own = {o: i for i, o in enumerate(follows, 1)}
-    links = tuple(
-        Link(d, local[a], local[b], tuple((x[a] - x[b]).tolist()), d.name not in elastic)
-        for d, (a, b) in zip(s.drives, sides, strict=True)
-    )
-    linkage = Linkage(
-        count=len(nodes),
-        rest=x[nodes],
-        follows=tuple(renumbered(f, local, own) for f in ties.follows),
-        lines=tuple((local[n], _line_axes(along)) for n, along in ties.lines),
-        links=links,
-        owns=len(follows),
-    )
-    return linkage, np.array(nodes, dtype=int), number[np.array(follows, dtype=int) - 1]
-
-
 def _select(numbers: np.ndarray, n: int) -> sp.csr_matrix:
     """Return the matrix that picks entries by number; ``n`` picks nothing."""
     rows = np.flatnonzero(numbers < n)
     return sp.csr_matrix((np.ones(rows.size), (rows, numbers[rows])), shape=(numbers.size, n))
-
-
-def _line_axes(along: Vector) -> np.ndarray:
-    """Axes (columns) whose main one is the line; ties hold the turn about it."""
-    main = main_axis(along)
-    axes = np.eye(3)
-    side = np.cross(along, axes[:, (main + 1) % 3])
-    axes[:, (main + 2) % 3] = side / np.linalg.norm(side)
-    axes[:, (main + 1) % 3] = np.cross(axes[:, (main + 2) % 3], along)
-    axes[:, main] = along
-    return axes
-
-
-def _names(structure: Structure, ties: Ties) -> list[str]:
-    """Name each degree of freedom after the first node that has it: ``part_index_freedom``."""
-    names = [""] * ties.free
-    for follow in ties.follows:
-        if not isinstance(follow, Copy) and follow.own:
-            node = structure.nodes[follow.node]
-            kind = "turn" if isinstance(follow, Turn) else "slide"
-            names[follow.own - 1] = f"{node.part}_{node.index}_{kind}"
-    for node, row in zip(structure.nodes, ties.cells, strict=True):
-        for f, number in enumerate(row):
-            if number > 0 and not names[number - 1]:
-                names[number - 1] = f"{node.part}_{node.index}_{IDENTIFIERS[f]}"
-    return names
-
-
-def _close(
-    structure: Structure, motion: Motion, closures: tuple[Closure, ...]
-) -> tuple[frozenset[int], tuple[str, ...]]:
-    """Find which degrees of freedom rigid loops hold; conditions that others already meet are dropped with a note."""
-    T = motion.jacobian(motion.rest)
-    rows = T[[6 * c.node + c.freedom for c in closures]].toarray()
-    for row, c in zip(rows, closures, strict=True):
-        row -= T[6 * c.other + c.freedom].toarray().ravel() if c.other >= 0 else 0.0
-    rows[np.abs(rows) < 1e-9 * max(1.0, structure.size)] = 0.0
-    tied = np.flatnonzero(rows.any(axis=0))
-    loose = tied[_undecided(rows[:, tied])]
-    labels = [_label(structure, c) for c in closures]
-    if loose.size:
-        worst = int(np.argmax(rows[:, loose].any(axis=1)))
-        names = ", ".join(motion.names[i] for i in loose if rows[worst, i])
-        raise StructureError(
-            f"rigid parts form a loop: {labels[worst]} ties {names} together. Loops of rigid parts are not "
-            "eliminated; keep one of the parts in the loop flexible"
-        )
-    why = {i: ", ".join(label for row, label in zip(rows, labels, strict=True) if row[i]) for i in tied.tolist()}
-    idle = [label for row, label in zip(rows, labels, strict=True) if not row.any()]
-    notes = [f"{label} is held by rigid parts already; it is left free to second order" for label in idle]
-    return frozenset(why), (*notes, *(f"{motion.names[i]} is held, because of {reason}" for i, reason in why.items()))
-
-
-def _undecided(rows: np.ndarray) -> np.ndarray:
-    """Tell which unknowns of rows @ q = 0 are not zero in every solution."""
-    if not rows.size:
-        return np.zeros(rows.shape[1], dtype=bool)
-    _, values, right = np.linalg.svd(rows / np.abs(rows).max(axis=0))
-    rank = int(np.count_nonzero(values > 1e-9 * values[0]))
-    return np.abs(right[rank:]).max(axis=0, initial=0.0) > 1e-7
-
-
-def _label(structure: Structure, c: Closure) -> str:
-    return f"{FREEDOMS[c.freedom]} of {structure.nodes[c.node]}"

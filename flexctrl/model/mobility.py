@@ -1,0 +1,191 @@
+"""From a structure to its motion: which nodes lead, which follow, and how loops of rigid parts close."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+
+from flexctrl.errors import StructureError
+from flexctrl.model.linkage import Link, Linkage, Loop, renumbered
+from flexctrl.model.motion import Motion, State
+from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
+from flexctrl.structure.join_table import JoinTable
+from flexctrl.structure.joints import main_axis
+from flexctrl.structure.structure import Structure
+from flexctrl.structure.ties import Closure, Copy, Group, Ties, Turn, tie
+
+
+def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...]) -> Motion:
+    """Work out how the nodes of a structure move.
+
+    Parameters
+    ----------
+    structure : Structure
+    rigid : tuple of Group
+        Parts that do not deform, rigid bodies included.
+    elastic : tuple of str
+        Drives with an elastic shaft, whose source angle is a degree of freedom.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    StructureError
+        If rigid parts are asked of a machine that is tied by a table of numbers.
+    """
+    ties = _ties(structure, rigid)
+    open_loop = _motion(structure, ties, elastic, _Loops((), (), ()))
+    return _motion(structure, ties, elastic, _loops(structure, open_loop, ties)) if ties.closures else open_loop
+
+
+def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
+    if isinstance(structure.joints, JoinTable):
+        if rigid:
+            raise StructureError(
+                f"structure {structure.name!r} is tied by a join table of numbers; rigid parts need joints to ride on"
+            )
+        table = structure.joints
+        numbers = {n for row in table.rows for n in row}
+        return Ties(table.rows, (), (), (), max(numbers, default=0))
+    return tie(structure.nodes, structure.joints, rigid)
+
+
+@dataclass(frozen=True)
+class _Loops:
+    """Independent closures, the degrees of freedom that depend on the others through them, and what to say of it."""
+
+    closures: tuple[Closure, ...]
+    dependent: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], loops: _Loops) -> Motion:
+    names = [*_names(structure, ties), *(f"{name}_source" for name in elastic)]
+    kept = [i for i in range(len(names)) if i not in loops.dependent]
+    number = np.full(len(names) + 1, len(kept))
+    number[kept] = np.arange(len(kept))
+    cells = np.array([*ties.cells, (0,) * 6])
+    open_place = np.where(cells > 0, cells - 1, len(names))
+    x = np.array([*(n.position for n in structure.nodes), (0.0, 0.0, 0.0)])
+    R = np.broadcast_to(np.eye(3), (len(x), 3, 3)).copy()
+    zero = np.zeros(len(kept))
+    after = {name: ties.free + i for i, name in enumerate(elastic)}
+    sources = number[np.array([after.get(d.name, len(names)) for d in structure.drives], dtype=int)]
+    linkage, nodes, linked = _linkage(structure, ties, elastic, x, open_place, loops)
+    return Motion(
+        names=tuple(names[i] for i in kept),
+        place=number[open_place],
+        sources=sources,
+        drives=structure.drives,
+        linkage=linkage,
+        nodes=nodes,
+        linked=number[linked],
+        rest=State(x, R, zero, zero, np.zeros(len(structure.drives))),
+        notes=loops.notes,
+        closures=loops.closures,
+    )
+
+
+def _linkage(
+    s: Structure, ties: Ties, elastic: tuple[str, ...], x: np.ndarray, place: np.ndarray, loops: _Loops
+) -> tuple[Linkage, np.ndarray, np.ndarray]:
+    """Return the linkage of a structure, the numbers of its nodes and of its independent freedoms."""
+    none = ties.free + len(elastic)
+    sides = [(s.number(d.node), len(s.nodes) if d.against is None else s.number(d.against)) for d in s.drives]
+    used = {n for f in ties.follows for n in (f.node, f.master)} | {n for n, _ in ties.lines}
+    used |= {n for pair in sides for n in pair}
+    used |= set(np.flatnonzero(np.isin(place, loops.dependent).any(axis=1)).tolist())
+    nodes = sorted(used)
+    local = {n: i for i, n in enumerate(nodes)}
+    owns = {f.own - 1 for f in ties.follows if not isinstance(f, Copy) and f.own}
+    every = (set(place[nodes].ravel().tolist()) - {none}) | owns
+    independent = sorted(every - set(loops.dependent))
+    order = {number: i for i, number in enumerate([*independent, *loops.dependent])}
+    cells = [[order.get(k, len(order)) for k in row] for row in place[nodes].tolist()]
+    linkage = Linkage(
+        cells=np.array(cells, dtype=int).reshape(-1, 6),
+        rest=x[nodes],
+        follows=tuple(renumbered(f, local, {k + 1: i + 1 for k, i in order.items()}) for f in ties.follows),
+        lines=tuple((local[n], _line_axes(along)) for n, along in ties.lines),
+        links=tuple(
+            Link(d, local[a], local[b], tuple((x[a] - x[b]).tolist()), d.name not in elastic)
+            for d, (a, b) in zip(s.drives, sides, strict=True)
+        ),
+        loops=tuple(Loop(local[c.node], c.freedom, local.get(c.other, -1)) for c in loops.closures),
+        free=len(independent),
+    )
+    return linkage, np.array(nodes, dtype=int), np.array(independent, dtype=int)
+
+
+def _line_axes(along: Vector) -> np.ndarray:
+    """Axes (columns) whose main one is the line; ties hold the turn about it."""
+    main = main_axis(along)
+    axes = np.eye(3)
+    side = np.cross(along, axes[:, (main + 1) % 3])
+    axes[:, (main + 2) % 3] = side / np.linalg.norm(side)
+    axes[:, (main + 1) % 3] = np.cross(axes[:, (main + 2) % 3], along)
+    axes[:, main] = along
+    return axes
+
+
+def _names(structure: Structure, ties: Ties) -> list[str]:
+    """Name each degree of freedom after the first node that has it: ``part_index_freedom``."""
+    names = [""] * ties.free
+    for follow in ties.follows:
+        if not isinstance(follow, Copy) and follow.own:
+            node = structure.nodes[follow.node]
+            kind = "turn" if isinstance(follow, Turn) else "slide"
+            names[follow.own - 1] = f"{node.part}_{node.index}_{kind}"
+    for node, row in zip(structure.nodes, ties.cells, strict=True):
+        for f, number in enumerate(row):
+            if number > 0 and not names[number - 1]:
+                names[number - 1] = f"{node.part}_{node.index}_{IDENTIFIERS[f]}"
+    return names
+
+
+def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
+    """Choose which closures are independent, and which degrees of freedom shall follow from the others."""
+    rows = _openings(motion, motion.rest, ties.closures)
+    moved = motion.advance(motion.rest, 0.1 * np.cos(np.arange(motion.n)), motion.rest.v, 0.0)
+    kept = np.abs(rows).max(axis=1) + np.abs(_openings(motion, moved, ties.closures)).max(axis=1) > 0.0
+    tolerance = 1e-9 * max(1.0, structure.size)
+    chosen = _independent(rows.T, tolerance)
+    dependent = _independent(rows[chosen], tolerance)
+    labels = [_label(structure, c) for c in ties.closures]
+    notes = [
+        f"{label} is held by rigid parts already; it is left free to second order"
+        for i, label in enumerate(labels)
+        if kept[i] and i not in chosen
+    ]
+    if chosen:
+        tied = ", ".join(motion.names[i] for i in dependent)
+        notes.append(f"{tied} given by the others through " + ", ".join(labels[i] for i in chosen))
+    return _Loops(tuple(ties.closures[i] for i in chosen), tuple(dependent), tuple(notes))
+
+
+def _openings(motion: Motion, state: State, closures: tuple[Closure, ...]) -> np.ndarray:
+    """Return how fast each loop opens with each degree of freedom."""
+    T = motion.jacobian(state)
+    rows = T[[6 * c.node + c.freedom for c in closures]].toarray()
+    others = [6 * c.other + c.freedom if c.other >= 0 else -1 for c in closures]
+    for row, other in zip(rows, others, strict=True):
+        if other >= 0:
+            row -= T[other].toarray().ravel()
+    return rows
+
+
+def _independent(A: np.ndarray, tolerance: float) -> list[int]:
+    """Return columns of A that span all of them, the largest first (QR with column pivoting)."""
+    if not A.size:
+        return []
+    _, R, order = qr(A, mode="economic", pivoting=True)
+    rank = int(np.count_nonzero(np.abs(np.diag(R)) > tolerance))
+    return sorted(int(i) for i in order[:rank])
+
+
+def _label(structure: Structure, c: Closure) -> str:
+    return f"{FREEDOMS[c.freedom]} of {structure.nodes[c.node]}"
