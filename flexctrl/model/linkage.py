@@ -154,11 +154,11 @@ class Linkage:
 
     def matrix_at(self, pose: np.ndarray) -> np.ndarray:
         """Return T at a pose."""
-        return self.matrix(pose).reshape(self.free, -1).T
+        return self.matrix(pose).reshape(self.free, self._raw.shape[0]).T
 
     def stiffening_at(self, pose: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return ∂collected/∂(raw motion) at a pose under constant raw forces."""
-        return self.stiffening(pose, force).reshape(6 * self.count, -1).T
+        return self.stiffening(pose, force).reshape(6 * self.count, self.free).T
 
     @cached_property
     def _pose(self) -> ca.SX:
