@@ -151,7 +151,8 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
     """Choose which closures are independent, and which degrees of freedom shall follow from the others."""
     rows = _openings(motion, motion.rest, ties.closures)
     moved = motion.advance(motion.rest, 0.1 * np.cos(np.arange(motion.n)), motion.rest.v, 0.0)
-    kept = np.abs(rows).max(axis=1) + np.abs(_openings(motion, moved, ties.closures)).max(axis=1) > 0.0
+    turned = _openings(motion, moved, ties.closures)
+    kept = np.abs(rows).max(axis=1, initial=0.0) + np.abs(turned).max(axis=1, initial=0.0) > 0.0
     tolerance = 1e-9 * max(1.0, structure.size)
     chosen = _independent(rows.T, tolerance)
     dependent = _independent(rows[chosen], tolerance)
