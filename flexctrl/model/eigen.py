@@ -14,7 +14,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError
-from flexctrl.model.pencil import EPS, HIDDEN, Pencil, ShiftedPencil
+from flexctrl.model.pencil import EPS, HIDDEN, Pencil, ShiftedPencil, stiffness_noise
 
 __all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
 
@@ -62,34 +62,22 @@ def coordinate_scales(M: sp.spmatrix, C: sp.spmatrix, K: sp.spmatrix) -> np.ndar
     return 2.0 ** -np.round(0.5 * np.log2(np.where(d > 0, d, 1.0)))
 
 
-def stiffness_noise(K: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
-    """Spread of φᵀ K φ when every entry of K carries its own rounding error.
-
-    Parameters
-    ----------
-    K : sparse matrix, shape (n, n)
-    shapes : numpy.ndarray, shape (n, k)
-
-    Returns
-    -------
-    numpy.ndarray, shape (k,)
-    """
-    squares = shapes * shapes
-    return EPS * np.sqrt(np.einsum("ij,ij->j", squares, abs(K).power(2) @ squares))
-
-
-def complete_pairs(K: sp.csc_matrix, M: sp.csc_matrix) -> Eigenpairs:
+def complete_pairs(
+    K: sp.csc_matrix, M: sp.csc_matrix, origin: tuple[sp.csc_matrix, sp.csc_matrix] | None = None
+) -> Eigenpairs:
     """All eigenpairs, dense; M positive definite.
 
     Parameters
     ----------
     K, M : sparse matrices, shape (n, n), symmetric, scaled
+    origin : tuple of two sparse matrices, optional
+        K₀ and T where K = Tᵀ K₀ T: rounding is then judged by the entries of K₀.
 
     Returns
     -------
     Eigenpairs
     """
-    pencil = Pencil(K, M)
+    pencil = Pencil(K, M, origin=origin)
     k, m = pencil.K.toarray(), pencil.M.toarray()
     lam, phi = _direct(k, m)
     top = np.abs(lam).max(initial=0.0)
@@ -100,7 +88,7 @@ def complete_pairs(K: sp.csc_matrix, M: sp.csc_matrix) -> Eigenpairs:
         if top <= 1e4 * -sigma:
             break
         lam, phi = _low_and_high(pencil.at(sigma), k, m, np.sqrt(top * -sigma))
-        scale = _first_flexible(K, lam, phi, sigma)
+        scale = _first_flexible(pencil, lam, phi, sigma)
         if scale == 0.0 or 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
             break
         sigma = pencil.below_all(-scale)
@@ -131,7 +119,7 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
     for seed in range(20):
         sigma = pencil.below_all(sigma)
         lam, phi = pencil.at(sigma).lanczos(wanted, seed)
-        scale = _first_flexible(K, lam, phi, sigma)
+        scale = _first_flexible(pencil, lam, phi, sigma)
         if scale == 0.0 and 2 * wanted < n - 2:
             wanted *= 2
         elif scale > 0.0 and not 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
@@ -162,9 +150,9 @@ def _low_and_high(inverted: ShiftedPencil, k: np.ndarray, m: np.ndarray, split: 
     return np.concatenate([lam_low, lam_high]), np.hstack([low, rest @ y])
 
 
-def _first_flexible(K: sp.csc_matrix, lam: np.ndarray, phi: np.ndarray, sigma: float) -> float:
+def _first_flexible(pencil: Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) -> float:
     """Smallest |λ| that stands clear of rounding; 0 if none does."""
-    floor = np.maximum(RIGID_NOISE * stiffness_noise(K, phi), UNCLEAR * abs(sigma))
+    floor = np.maximum(RIGID_NOISE * pencil.noise(phi), UNCLEAR * abs(sigma))
     clear = np.abs(lam)[np.abs(lam) > floor]
     return float(clear.min()) if clear.size else 0.0
 
@@ -180,14 +168,14 @@ def _none_missed(pencil: Pencil, lam: np.ndarray, count: int) -> bool:
 
 def _settled(pencil: Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) -> Eigenpairs:
     """Orthonormalise, polish the soft vectors, set λ of the rigid ones to 0 and sort."""
-    K, M = pencil.K, pencil.M
-    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * stiffness_noise(K, phi), UNCLEAR * abs(sigma))
+    M = pencil.M
+    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * pencil.noise(phi), UNCLEAR * abs(sigma))
     flexible = np.abs(lam)[~soft].min() if not soft.all() else 0.0
     rigid = np.zeros(lam.size, dtype=bool)
     lam = lam.copy()
     if soft.any():
         phi, lam[soft] = _polished(pencil, phi, soft, sigma)
-        noise = stiffness_noise(K, phi)
+        noise = pencil.noise(phi)
         near = (np.abs(lam) <= RIGID_GAP * flexible) & soft
         rigid = soft & ((np.abs(lam) <= RIGID_NOISE * noise) | near)
         lam[rigid] = 0.0

@@ -228,7 +228,7 @@ def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenp
     if not null.shape[1]:
         return complete_pairs(K, M)
     T, _ = static_map(K, null)
-    pairs = complete_pairs(sp.csc_matrix(T.T @ K @ T), sp.csc_matrix(T.T @ M @ T))
+    pairs = complete_pairs(sp.csc_matrix(T.T @ K @ T), sp.csc_matrix(T.T @ M @ T), origin=(K, T))
     return Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid)
 
 

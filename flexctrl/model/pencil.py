@@ -11,10 +11,26 @@ import scipy.sparse.linalg as sla
 
 from flexctrl.errors import LinearizationError
 
-__all__ = ["EPS", "HIDDEN", "SINGULAR", "Pencil", "ShiftedPencil"]
+__all__ = ["EPS", "HIDDEN", "SINGULAR", "Pencil", "ShiftedPencil", "stiffness_noise"]
 
 EPS = float(np.finfo(float).eps)
 HIDDEN, SINGULAR = -1, -2
+
+
+def stiffness_noise(K: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
+    """Spread of φᵀ K φ when every entry of K carries its own rounding error.
+
+    Parameters
+    ----------
+    K : sparse matrix, shape (n, n)
+    shapes : numpy.ndarray, shape (n, k)
+
+    Returns
+    -------
+    numpy.ndarray, shape (k,)
+    """
+    squares = shapes * shapes
+    return EPS * np.sqrt(np.einsum("ij,ij->j", squares, abs(K).power(2) @ squares))
 
 
 @dataclass(frozen=True)
@@ -71,15 +87,31 @@ class Pencil:
     K, M : sparse matrices, shape (n, n), symmetric
     ordered : bool
         The order of the coordinates is already one of little fill.
+    origin : tuple of two sparse matrices, optional
+        K₀ and T where K = Tᵀ K₀ T.
     """
 
-    def __init__(self, K: sp.spmatrix, M: sp.spmatrix, ordered: bool = False) -> None:
+    def __init__(
+        self,
+        K: sp.spmatrix,
+        M: sp.spmatrix,
+        ordered: bool = False,
+        origin: tuple[sp.csc_matrix, sp.csc_matrix] | None = None,
+    ) -> None:
         k, m = sp.coo_matrix(K), sp.coo_matrix(M)
         at = (np.concatenate([k.row, m.row]), np.concatenate([k.col, m.col]))
         none_k, none_m = np.zeros_like(k.data, dtype=float), np.zeros_like(m.data, dtype=float)
         self.K = sp.csc_matrix((np.concatenate([k.data, none_m]), at), shape=K.shape)
         self.M = sp.csc_matrix((np.concatenate([none_k, m.data]), at), shape=K.shape)
         self.spec = "NATURAL" if ordered else "MMD_AT_PLUS_A"
+        self.origin = origin
+
+    def noise(self, shapes: np.ndarray) -> np.ndarray:
+        """Spread of φᵀ K φ by the rounding of the entries that K was made from."""
+        if self.origin is None:
+            return stiffness_noise(self.K, shapes)
+        K, T = self.origin
+        return stiffness_noise(K, T @ shapes)
 
     def reordered(self) -> tuple[Pencil, np.ndarray]:
         """The same in an order of little fill, found once; row i of it is row order[i] here."""

@@ -164,6 +164,37 @@ def test_overhead_crane(M, m, l, pole):
     assert modes.omega[1] == pytest.approx(pole, rel=1e-6)
 
 
+@pytest.mark.parametrize(("bays", "storeys", "count"), [(2, 3, None), (4, 30, None), (9, 60, 12)])
+def test_free_frame_in_local_axes_keeps_three_rigid_modes(bays, storeys, count):
+    """Every node has axes of its own, so that K's entries carry rounding: 3 exact zeros, and only 3."""
+    frame = s.grid_frame(bays, storeys, clamped=False)
+    nodes = len(frame.coordinates) // 3
+    rng = np.random.default_rng(bays)
+    angles = rng.uniform(0, 2 * np.pi, nodes)
+    c, sn = np.cos(angles), np.sin(angles)
+    blocks = [np.array([[a, -b, 0], [b, a, 0], [0, 0, 1]]) for a, b in zip(c, sn, strict=True)]
+    T = sp.block_diag(blocks, format="csc")
+    turned = s.model(T.T @ frame.M @ T, T.T @ frame.K @ T).modes(count)
+    plain = frame.modes(count)
+    assert turned.rigid == plain.rigid == 3
+    np.testing.assert_allclose(turned.omega[3:12], plain.omega[3:12], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "stiffness", "locked", "free"),
+    [
+        (48014.0 + 2 / 9, 65000.0, 1.8e6, 5.262348, 8.073488),
+        (0.0021, 0.0059, 1.61, 16.519121, 32.242023),
+    ],
+)
+def test_hoist_and_flexible_joint(first, second, stiffness, locked, free):
+    """Drum mass (30·30² + 8)/0.75² with 65 t on a rope; joint with hub and link: locked and free."""
+    held = s.model(np.array([[second]]), np.array([[stiffness]])).modes()
+    both = s.model(np.diag([first, second]), stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])).modes()
+    assert held.omega == pytest.approx([locked], rel=1e-6)
+    assert both.omega == pytest.approx([0.0, free], rel=1e-6)
+
+
 @pytest.mark.parametrize(("motor", "ratio"), [(1e-4, 100.0), (1e-6, 1e3), (1e-8, 1e4)])
 def test_gear_drive_seen_from_either_side(motor, ratio):
     modes = s.geared(motor, ratio, 5.0, 1000.0).modes()
