@@ -97,12 +97,3 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     c[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     c[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return c
-
-
-def skew_arrays(v: np.ndarray) -> np.ndarray:
-    """Return the matrices of v× for v of shape (n, 3)."""
-    S = np.zeros((*v.shape[:-1], 3, 3))
-    S[..., 2, 1] = v[..., 0]
-    S[..., 0, 2] = v[..., 1]
-    S[..., 1, 0] = v[..., 2]
-    return S - np.swapaxes(S, -1, -2)

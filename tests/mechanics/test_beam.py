@@ -1,0 +1,205 @@
+"""The beam kernels: minus the gradients of their energies, Lagrange's equations, the textbook matrices at rest."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from moving_nodes import gradient, kernel, lagrange, random_slots, slopes, slot, turned
+from numpy.polynomial.legendre import leggauss
+from scipy.spatial.transform import Rotation
+
+import flexctrl as fc
+from flexctrl.mechanics import beam
+from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, to_space
+
+SECTION = fc.Section(
+    EA=900.0, EI_y=40.0, EI_z=70.0, GJ=30.0, rhoA=1.3, rhoJ=0.05, rhoI_y=0.02, rhoI_z=0.03, GA_y=400.0, GA_z=250.0
+)
+BEAM = fc.Beam("b", (0.1, -0.2, 0.3), (1.0, 0.5, -0.4), SECTION, up=(0.3, 0.2, 1.0))
+L, AXES = BEAM.length, BEAM.axes
+ENDS = np.array([BEAM.start.position, BEAM.end.position])
+G = np.array([1.0, -2.0, -9.0])
+REST = np.concatenate([slot(x, np.eye(3)) for x in ENDS])
+
+
+def parameters() -> ca.DM:
+    y, z = bending(SECTION.EI_y, SECTION.GA_z, L), bending(SECTION.EI_z, SECTION.GA_y, L)
+    rho = (SECTION.rhoA * L, SECTION.rhoJ * L, SECTION.rhoI_y, SECTION.rhoI_z)
+    return ca.DM([*AXES.ravel(), L, SECTION.EA, SECTION.GJ, *y, *z, *rho])
+
+
+def motion(a, b):
+    return beam.beam_motion(a, b, ca.SX(parameters()))
+
+
+def force(share):
+    def make(a, b):
+        m = motion(a, b)
+        return beam.nodal_force(m, share(m))
+
+    return make
+
+
+def weight(m):
+    return beam.weight(m, G)
+
+
+def height(a, b):
+    return beam.height_energy(motion(a, b), G, 0.5 * (a.x + b.x))
+
+
+def strain(a, b):
+    return beam.strain_energy(motion(a, b))
+
+
+def kinetic(a, b):
+    return beam.kinetic_energy(motion(a, b))
+
+
+ELASTIC = kernel(force(beam.elastic_force), 2)
+INERTIAL = kernel(force(beam.inertial_force), 2)
+WEIGHT = kernel(force(weight), 2)
+VISCOUS = kernel(force(beam.viscous_force), 2)
+DRAG = kernel(force(beam.drag), 2)
+STATES = [
+    random_slots(seed, ENDS, turn, push, 2.0)
+    for seed, (turn, push) in enumerate([(0.0, 0.0), (1e-6, 1e-6), (0.05, 0.02), (0.3, 0.1), (0.6, 0.3), (0.9, 0.4)])
+]
+
+
+def element_frame(slots):
+    """The element frame and the nodes' rotation vectors in it, in plain numpy."""
+    (x1, R1), (x2, R2) = ((s[:3], s[3:12].reshape(3, 3)) for s in slots.reshape(2, -1))
+    e1 = (x2 - x1) / np.linalg.norm(x2 - x1)
+    e3 = np.cross(e1, R1 @ AXES[:, 1] + R2 @ AXES[:, 1])
+    e3 /= np.linalg.norm(e3)
+    E = np.column_stack([e1, np.cross(e3, e1), e3])
+    turns = [Rotation.from_matrix(E.T @ R @ AXES).as_rotvec() for R in (R1, R2)]
+    return E, np.linalg.norm(x2 - x1), turns
+
+
+def close(found, expected, tolerance=1e-11):
+    scale = max(1.0, np.abs(expected).max())
+    assert np.abs(np.asarray(found) - expected).max() < tolerance * scale
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_strain_energy_is_that_of_the_textbook_stiffness_with_bowing(slots):
+    """½ dᵀ K_e d of the rotations against the chord, and ½ EA L (stretch/L + ∫½(v'² + w'²)/L)²."""
+    _, chord, (t1, t2) = element_frame(slots)
+    d = np.concatenate([np.zeros(3), t1, np.zeros(3), t2])
+    s, weights = (0.5 * (leggauss(4)[0] + 1.0), 0.5 * leggauss(4)[1])
+    slope = [(1 - 4 * s + 3 * s**2) * a + (3 * s**2 - 2 * s) * b for a, b in ((t1[1], t2[1]), (t1[2], t2[2]))]
+    axial = chord / L - 1.0 + 0.5 * weights @ (slope[0] ** 2 + slope[1] ** 2)
+    expected = 0.5 * d @ beam_stiffness(SECTION, L) @ d + 0.5 * SECTION.EA * L * axial**2
+    close(kernel(strain, 2)(slots), expected)
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_height_energy_is_that_of_the_deflected_axis(slots):
+    """−∫ρA g·x ds along the cubic between the nodes."""
+    E, _, (t1, t2) = element_frame(slots)
+    s, weights = (0.5 * (leggauss(4)[0] + 1.0), 0.5 * leggauss(4)[1])
+    n2, n4 = s * (1 - s) ** 2 * L, s**2 * (s - 1) * L
+    off = np.outer(n2 * t1[2] + n4 * t2[2], E[:, 1]) - np.outer(n2 * t1[1] + n4 * t2[1], E[:, 2])
+    axis = np.outer(1 - s, slots[:3]) + np.outer(s, slots[24:27]) + off
+    close(kernel(height, 2)(slots), -SECTION.rhoA * L * weights @ (axis @ G))
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_kinetic_energy_is_that_of_the_consistent_mass_in_the_frame(slots):
+    E, _, _ = element_frame(slots)
+    V = np.concatenate([E.T @ s[k : k + 3] for s in slots.reshape(2, -1) for k in (12, 15)])
+    close(kernel(kinetic, 2)(slots), 0.5 * V @ beam_mass(SECTION, L) @ V)
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_elastic_force_is_minus_the_gradient_of_the_strain_energy(slots):
+    close(ELASTIC(slots), -gradient(strain, 2)(slots))
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_weight_is_minus_the_gradient_of_the_height_energy(slots):
+    close(WEIGHT(slots), -gradient(height, 2)(slots))
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_inertial_force_is_lagranges(slots):
+    close(INERTIAL(slots), -lagrange(kinetic, 2)(slots))
+
+
+@pytest.mark.parametrize("slots", STATES[2:])
+def test_drag_takes_twice_the_kinetic_energy_a_second(slots):
+    V = np.concatenate([slots[12:18], slots[36:42]])
+    assert DRAG(slots) @ V == pytest.approx(-2.0 * kernel(kinetic, 2)(slots))
+
+
+@pytest.mark.parametrize("slots", STATES[2:])
+def test_viscous_force_dissipates_but_not_in_rigid_motion(slots):
+    V = np.concatenate([slots[12:18], slots[36:42]])
+    assert VISCOUS(slots) @ V < 0.0
+    spin, drift = np.array([0.4, -0.8, 1.7]), np.array([1.0, 2.0, 3.0])
+    rigid = slots.copy()
+    for start in (0, 24):
+        rigid[start + 12 : start + 18] = [*(drift + np.cross(spin, rigid[start : start + 3])), *spin]
+    close(VISCOUS(rigid), np.zeros(12), 1e-10)
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_forces_turn_with_the_machine(slots):
+    Q = Rotation.from_rotvec([1.0, 2.0, -2.0]).as_matrix()
+    for share in (ELASTIC, INERTIAL, VISCOUS, DRAG):
+        close(share(turned(slots, Q)), np.kron(np.eye(4), Q) @ share(slots), 1e-12)
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_internal_forces_are_in_balance(slots):
+    """No net force or moment: the element does not know where it is."""
+    for share in (ELASTIC, VISCOUS):
+        f1, m1, f2, m2 = share(slots).reshape(4, 3)
+        close(f1 + f2, np.zeros(3))
+        close(m1 + m2 + np.cross(slots[:3], f1) + np.cross(slots[24:27], f2), np.zeros(3), 1e-10)
+
+
+def test_a_rigid_motion_makes_no_elastic_force():
+    for seed in range(3):
+        close(ELASTIC(random_slots(seed, ENDS, 0.0, 0.0, 1.0)), np.zeros(12), 1e-10)
+
+
+def test_tangents_at_rest_are_the_textbook_matrices():
+    """Timoshenko's K_e with GA, consistent M_e with rotary inertia, in the beam's own skew axes."""
+    K, M = to_space(beam_stiffness(SECTION, L), AXES), to_space(beam_mass(SECTION, L), AXES)
+    close(slopes(force(beam.elastic_force), 2)[0](REST), -K, 1e-12)
+    close(slopes(force(beam.viscous_force), 2)[1](REST), -K, 1e-12)
+    close(slopes(force(beam.inertial_force), 2)[2](REST), -M, 1e-12)
+    close(slopes(force(beam.drag), 2)[1](REST), -M, 1e-12)
+
+
+def test_tangents_of_a_turned_element_are_the_turned_matrices():
+    slots = random_slots(3, ENDS, 0.0, 0.0, 0.0)
+    Q = slots[3:12].reshape(3, 3)
+    K, M = to_space(beam_stiffness(SECTION, L), Q @ AXES), to_space(beam_mass(SECTION, L), Q @ AXES)
+    close(slopes(force(beam.elastic_force), 2)[0](slots), -K, 1e-11)
+    close(slopes(force(beam.inertial_force), 2)[2](slots), -M, 1e-12)
+
+
+def test_a_stretched_element_stiffens_as_a_string_in_bending():
+    """Geometric stiffness of an axial force N, Przemieniecki 1968, §15.2: 6N/5L, N/10, 2NL/15, −NL/30.
+
+    The stretched chord also is the new lever of the end moments, so K_e is taken with it.
+    """
+    stretch = 0.2 * L
+    N, chord = SECTION.EA * stretch / L, L + stretch
+    slots = np.concatenate([slot(ENDS[0], np.eye(3)), slot(ENDS[1] + stretch * AXES[:, 0], np.eye(3))])
+    inward = np.kron(np.eye(4), AXES).T
+    K = -inward @ slopes(force(beam.elastic_force), 2)[0](slots) @ inward.T
+    geometric = N * np.array([[2 * L / 15, -L / 30], [-L / 30, 2 * L / 15]])
+    against_chord = np.array([[1 / chord, 1, -1 / chord, 0], [1 / chord, 0, -1 / chord, 1]])
+    string = N / chord * np.outer([1, 0, -1, 0], [1, 0, -1, 0])
+    a, b = bending(SECTION.EI_z, SECTION.GA_y, L)
+    expected = against_chord.T @ (np.array([[a, b], [b, a]]) + geometric) @ against_chord + string
+    plane = [1, 5, 7, 11]
+    close(K[np.ix_(plane, plane)], expected)
+    small = against_chord.T @ geometric @ against_chord + string
+    assert small[0, 0] * chord / N == pytest.approx(1.0 + 0.2 * L / chord)
