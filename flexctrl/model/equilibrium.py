@@ -15,7 +15,7 @@ from flexctrl.model.solve import SingularMatrixError, factorise
 
 _TARGET = 1e-12
 _LARGEST_TURN = 0.3
-_ITERATIONS = 400
+_ITERATIONS = 240
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def equilibrium(
 
     Newton's method with a shift by the masses that fades with the residual (pseudo-transient
     continuation, Kelley & Keyes 1998): where the shape has no stiffness yet, as in a slack or
-    straight chain, the masses give the step its direction.
+    straight chain, the masses give the step its direction. If that fails, the loads come on in parts.
 
     Parameters
     ----------
@@ -86,7 +86,9 @@ def equilibrium(
     held = {model.coordinate(name): value for name, value in (hold or {}).items()}
     state = _place(model, start or model.rest, held)
     search = Search(model, u, np.array(sorted(set(range(model.n)) - set(held)), dtype=int))
-    best, residual, iterations = search.run(state)
+    best, residual, iterations = search.run(state, _ITERATIONS)
+    if not residual <= tolerance + search.noise(best):
+        best, residual, iterations = search.in_parts(state, tolerance)
     if not residual <= tolerance + search.noise(best):
         raise EquilibriumError(search.complaint(best, residual), best, residual)
     outputs = dict(zip(model.outputs, model.measure(best).tolist(), strict=True))
@@ -112,10 +114,12 @@ class Search:
         self.turning = turning
         mass = np.asarray(model.mass().diagonal())
         heaviest = mass[~turning].max(initial=0.0) or mass.max(initial=0.0) or 1.0
+        self.kept = np.zeros(len(free))
         self.inertia = np.maximum(mass, 1e-6 * heaviest * np.where(turning, self.size**2, 1.0))
 
     def force(self, state: State) -> np.ndarray:
-        return (self.model.balance(state, self.zero, self.zero) + self.model.loads(state, self.u))[self.free]
+        force = self.model.balance(state, self.zero, self.zero) + self.model.loads(state, self.u)
+        return force[self.free] - self.kept
 
     def scale(self, state: State) -> float:
         """The forces at work: all loads and weights together."""
@@ -143,14 +147,28 @@ class Search:
         over = np.abs(step / limit).max(initial=0.0)
         return step / over if over > 1.0 else step
 
-    def run(self, state: State) -> tuple[State, float, int]:
+    def in_parts(self, state: State, tolerance: float) -> tuple[State, float, int]:
+        """Let go of what holds the start in equilibrium part by part, in smaller parts where that fails."""
+        holding, done, part, total = self.force(state), 0.0, 0.125, 0
+        while done < 1.0 and part > 1e-3:
+            self.kept = max(0.0, 1.0 - done - part) * holding
+            trial, residual, iterations = self.run(state, _ITERATIONS // 2)
+            total += iterations
+            if residual <= tolerance + self.noise(trial):
+                state, done, part = trial, done + part, min(1.5 * part, 1.0 - done - part)
+            else:
+                part *= 0.5
+        self.kept = np.zeros_like(self.kept)
+        return state, self.relative(self.force(state), self.scale(state)), total
+
+    def run(self, state: State, iterations: int) -> tuple[State, float, int]:
         force = self.force(state)
         scale = self.scale(state)
         load = max(np.abs(force / self.lever[self.free]).max(initial=0.0), 1e-300)
         shift = 10.0 * load / (self.inertia[~self.turning].max(initial=1e-300) * self.size) if force.size else 0.0
         floor, here = 1e-7 * shift, self.relative(force, scale)
         best, least, stalled = state, here, 0
-        for iteration in range(_ITERATIONS):
+        for iteration in range(iterations):
             if here <= _TARGET or (stalled > 8 and least <= max(1e-9, self.noise(best))):
                 return best, least, iteration
             try:
@@ -163,12 +181,12 @@ class Search:
             if there > 1e3 * here or not np.isfinite(there):
                 shift = 10.0 * max(shift, floor)
                 continue
-            shift = max(shift * (0.1 if there < 0.5 * here else 0.5 if there < here else 4.0), floor)
+            shift = max(shift * (0.1 if there < here else 0.3 if there < 10.0 * here else 3.0), floor)
             state, force, here = trial, pushed, there
             stalled = 0 if here < 0.7 * least else stalled + 1
             if here < least:
                 best, least = state, here
-        return best, least, _ITERATIONS
+        return best, least, iterations
 
     def complaint(self, state: State, residual: float) -> str:
         force = np.abs(self.force(state) / self.lever[self.free])
