@@ -22,7 +22,8 @@ MASS_RANK = 1e-12
 STIFFNESS_RANK = 1e-13
 MASS_DUST = 1e-26
 DUST = 1e-14
-DENSE_BLOCK = 1500
+DENSE_BLOCK = 300
+SMALL_PIVOT = 1e-8
 
 
 @dataclass(frozen=True)
@@ -134,10 +135,15 @@ def pivots(basis: sp.csc_matrix) -> np.ndarray:
     single = np.diff(basis.indptr) == 1
     chosen = np.zeros(basis.shape[1], dtype=int)
     chosen[single] = basis[:, single].indices
-    if not single.all():
-        others = basis[:, ~single].toarray()
-        others[chosen[single]] = 0.0
-        chosen[~single] = la.qr(others.T, pivoting=True)[2][: others.shape[1]]
+    free = np.ones(basis.shape[0])
+    free[chosen[single]] = 0.0
+    others = sp.csc_matrix(sp.diags(free) @ basis[:, ~single])
+    columns = np.flatnonzero(~single)
+    for group in _groups(others.T @ others):
+        block = sp.csc_matrix(others[:, group])
+        rows = np.unique(block.indices)
+        leading = la.qr(block[rows].toarray().T, mode="r", pivoting=True)[1][: group.size]
+        chosen[columns[group]] = rows[leading]
     return chosen
 
 
@@ -173,36 +179,41 @@ def _peak(A: sp.spmatrix) -> float:
 def _definite(block: sp.csc_matrix) -> bool:
     """Whether all pivots of the unit-diagonal matrix stand clear of zero."""
     try:
-        lu = sla.splu(
-            block,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        lu = _symmetric_lu(block)
     except RuntimeError:
         return False
-    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > 1e-8).all())
+    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > SMALL_PIVOT).all())
+
+
+def _groups(A: sp.spmatrix) -> list[np.ndarray]:
+    """Connected components of a symmetric pattern, as index arrays."""
+    count, label = connected_components(A, directed=False)
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.searchsorted(label[order], np.arange(1, count))) if count else []
 
 
 def _split_components(
     block: sp.csc_matrix, tolerance: float, semidefinite: bool
 ) -> tuple[sp.csc_matrix, sp.csc_matrix]:
-    count, label = connected_components(block, directed=False)
-    order = np.argsort(label, kind="stable")
-    bounds = np.searchsorted(label[order], np.arange(count + 1))
     nulls, rests = [], []
-    for i in range(count):
-        rows = order[bounds[i] : bounds[i + 1]]
-        null, rest = _split_dense(block[rows][:, rows], tolerance, semidefinite)
+    for rows in _groups(block):
+        null, rest = _split_block(block[rows][:, rows], tolerance, semidefinite)
         embed = sp.identity(block.shape[0], format="csc")[:, rows]
         nulls.append(embed @ null)
         rests.append(embed @ rest)
     return sp.csc_matrix(sp.hstack(nulls)), sp.csc_matrix(sp.hstack(rests))
 
 
+def _split_block(block: sp.csc_matrix, tolerance: float, semidefinite: bool) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    if block.shape[0] <= DENSE_BLOCK:
+        return _split_dense(block, tolerance, semidefinite)
+    null, rest = _split_sparse(block)
+    if _peak(block @ null) > 100.0 * tolerance:
+        return _split_dense(block, tolerance, semidefinite)
+    return null, rest
+
+
 def _split_dense(block: sp.csc_matrix, tolerance: float, semidefinite: bool) -> tuple[sp.csc_matrix, sp.csc_matrix]:
-    if block.shape[0] > DENSE_BLOCK:
-        return _null_iterative(block, tolerance)
     values, vectors = la.eigh(block.toarray())
     limit = tolerance * max(np.abs(values).max(), 1.0)
     if semidefinite and values.min() < -1e-9 * np.abs(values).max():
@@ -214,15 +225,20 @@ def _split_dense(block: sp.csc_matrix, tolerance: float, semidefinite: bool) -> 
     return sp.csc_matrix(vectors[:, null]), sp.csc_matrix(vectors[:, ~null])
 
 
-def _null_iterative(block: sp.csc_matrix, tolerance: float) -> tuple[sp.csc_matrix, sp.csc_matrix]:
-    """Null vectors of a large component, by Lanczos near zero; the rest stays one unit vector a pivot."""
-    n, wanted = block.shape[0], 8
-    while True:
-        values, vectors = sla.eigsh(block, wanted, sigma=-1e-9, v0=np.ones(n))
-        null = np.abs(values) <= tolerance * 10
-        if not null.all() or wanted == n - 1:
-            break
-        wanted = min(2 * wanted, n - 1)
-    basis = sp.csc_matrix(vectors[:, null])
-    others = np.setdiff1d(np.arange(n), pivots(basis))
-    return basis, sp.identity(n, format="csc")[:, others]
+def _split_sparse(block: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    """Coordinates with a vanishing pivot depend on the others: N = [-A_II⁻¹ A_IJ; 1], as sparse as A is local."""
+    n = block.shape[0]
+    unit = sp.identity(n, format="csc")
+    lu = _symmetric_lu(sp.csc_matrix(block + 1e-13 * unit))
+    pivot = np.zeros(n)
+    pivot[np.argsort(lu.perm_c)] = lu.U.diagonal()
+    dependent = np.flatnonzero(np.abs(pivot) < SMALL_PIVOT)
+    free = np.setdiff1d(np.arange(n), dependent)
+    weights = _symmetric_lu(block[free][:, free]).solve(block[free][:, dependent].toarray())
+    weights[np.abs(weights) < 1e-13] = 0.0
+    return sp.csc_matrix(unit[:, dependent] - unit[:, free] @ sp.csc_matrix(weights)), unit[:, free]
+
+
+def _symmetric_lu(A: sp.csc_matrix) -> sla.SuperLU:
+    options = {"SymmetricMode": True}
+    return sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)

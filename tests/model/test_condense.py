@@ -184,6 +184,21 @@ def test_dashpot_without_spring_creeps_exactly():
         linear.frequency_response([0.0])
 
 
+def test_massless_directions_across_the_coordinates_of_a_large_frame():
+    """No rotary inertia, and axes at every node that mix its three freedoms: 310 null vectors, none aligned."""
+    frame = s.grid_frame(9, 30, clamped=False)
+    nodes = len(frame.coordinates) // 3
+    turning = sp.diags(np.tile([1.0, 1.0, 0.0], nodes))
+    plain = replace(frame, M=sp.csc_matrix(turning @ frame.M @ turning))
+    rng = np.random.default_rng(0)
+    T = sp.block_diag([la.qr(rng.standard_normal((3, 3)))[0] for _ in range(nodes)], format="csc")
+    mixed = plain.projected(T, plain.coordinates)
+    assert len(audit(mixed).named(Freedom.STATIC)) == nodes
+    modes = mixed.modes(8)
+    assert (modes.massless, modes.rigid) == (nodes, 3)
+    np.testing.assert_allclose(modes.omega[3:], plain.modes(8).omega[3:], rtol=1e-10)
+
+
 def test_large_sparse_model_with_massless_rotations():
     """1200 freedoms, half of them massless: audited and condensed without a dense n × n step for M."""
     free = s.cantilever(600, EI=1.0, rhoA=1.0, length=600.0)
