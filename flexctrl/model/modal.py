@@ -14,7 +14,7 @@ from flexctrl.model.linear import LinearModel
 from flexctrl.model.massless import solved
 from flexctrl.model.modes import COMPLETE, Modes, modes_of, refuse_unsymmetric
 
-__all__ = ["ModalSystem", "Relaxation", "modal_system", "rayleigh"]
+__all__ = ["ModalSystem", "Relaxation", "modal_damping", "modal_system", "proper", "rayleigh"]
 
 EPS = float(np.finfo(float).eps)
 
@@ -105,7 +105,7 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
         damping = np.diag(fit[0] + fit[1] * chosen.omega_squared)
         relaxation = _relaxation(base, chosen, fit[1])
     else:
-        damping = _damping(linear.C, chosen)
+        damping = modal_damping(linear.C, chosen.shapes)
         relaxation = _relaxation(base, chosen, 0.0)
     circulatory = chosen.shapes.T @ (skew @ chosen.shapes)
     coupled = circulatory.any() or relaxation.drag.any() or relaxation.reaction.any()
@@ -158,10 +158,6 @@ def modal_damping(C: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
     small = np.abs(full) <= np.maximum(noise, 1e-11 * np.outer(own, own))
     np.fill_diagonal(small, np.abs(np.diag(full)) <= np.diag(noise))
     return np.where(small, 0.0, full)
-
-
-def _damping(C: sp.spmatrix, modes: Modes) -> np.ndarray:
-    return modal_damping(C, modes.shapes)
 
 
 def _split_stiffness(linear: LinearModel) -> tuple[LinearModel, sp.csc_matrix]:
