@@ -9,6 +9,8 @@ import numpy as np
 if TYPE_CHECKING:
     import casadi as ca
 
+    from flexctrl.mechanics.kernel import Kernel
+
 
 def rotation_vector(R: ca.SX) -> ca.SX:
     """Return θ with R = exp(θ×), |θ| < π (casadi).
@@ -57,6 +59,18 @@ def inverse_tangent(theta: ca.SX, v: ca.SX) -> ca.SX:
     eta = ca.if_else(small, series, (1.0 - half / ca.tan(half)) / safe)
     turned = ca.cross(theta, v)
     return v + 0.5 * turned + eta * ca.cross(theta, turned)
+
+
+def turn_kernel() -> Kernel:
+    """Return the kernel (R, θ) → exp(θ×) R, row by row, with R's round-off drift from orthonormality removed."""
+    import casadi as ca
+
+    from flexctrl.mechanics.kernel import Kernel
+
+    rows, theta = ca.SX.sym("R", 9), ca.SX.sym("theta", 3)
+    R = rotation_of(theta) @ ca.reshape(rows, 3, 3).T
+    R = R @ (1.5 * ca.DM.eye(3) - 0.5 * R.T @ R)
+    return Kernel("turn", ca.vertcat(rows, theta), ca.SX.sym("p", 0), ca.vec(R.T))
 
 
 def exponential(theta: np.ndarray) -> np.ndarray:

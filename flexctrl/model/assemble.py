@@ -49,9 +49,10 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
     groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
     elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))
-    motion = motion_of(structure, structure.bodies + groups, elastic)
+    runs = backend or best_backend()
+    motion = motion_of(structure, structure.bodies + groups, elastic, runs)
     empty = sp.csr_matrix((motion.n, motion.n))
-    model = Model(structure, parts, motion, backend or best_backend(), empty)
+    model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]
     return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
 

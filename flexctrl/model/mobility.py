@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from flexctrl.errors import StructureError
+from flexctrl.mechanics.kernel import Backend
 from flexctrl.model.linkage import Link, Linkage, Loop, renumbered
 from flexctrl.model.motion import Motion, State
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
@@ -17,7 +18,7 @@ from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import Closure, Copy, Group, Ties, Turn, tie
 
 
-def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...]) -> Motion:
+def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...], backend: Backend) -> Motion:
     """Work out how the nodes of a structure move.
 
     Parameters
@@ -27,6 +28,7 @@ def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str
         Parts that do not deform, rigid bodies included.
     elastic : tuple of str
         Drives with an elastic shaft, whose source angle is a degree of freedom.
+    backend : Backend
 
     Returns
     -------
@@ -38,8 +40,10 @@ def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str
         If rigid parts are asked of a machine that is tied by a table of numbers.
     """
     ties = _ties(structure, rigid)
-    open_loop = _motion(structure, ties, elastic, _Loops((), (), ()))
-    return _motion(structure, ties, elastic, _loops(structure, open_loop, ties)) if ties.closures else open_loop
+    open_loop = _motion(structure, ties, elastic, backend, _Loops((), (), ()))
+    return (
+        _motion(structure, ties, elastic, backend, _loops(structure, open_loop, ties)) if ties.closures else open_loop
+    )
 
 
 def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
@@ -63,7 +67,7 @@ class _Loops:
     notes: tuple[str, ...]
 
 
-def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], loops: _Loops) -> Motion:
+def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], backend: Backend, loops: _Loops) -> Motion:
     names = [*_names(structure, ties), *(f"{name}_source" for name in elastic)]
     kept = [i for i in range(len(names)) if i not in loops.dependent]
     number = np.full(len(names) + 1, len(kept))
@@ -81,6 +85,7 @@ def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], loops: _
         place=number[open_place],
         sources=sources,
         drives=structure.drives,
+        backend=backend,
         linkage=linkage,
         nodes=nodes,
         linked=number[linked],

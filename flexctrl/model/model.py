@@ -261,4 +261,4 @@ class Model:
         -------
         Model
         """
-        return replace(self, backend=backend)
+        return replace(self, backend=backend, motion=replace(self.motion, backend=backend))

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.mechanics.rotation import exponential, orthonormal
+from flexctrl.mechanics.kernel import Backend, Run
+from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.linkage import Linkage
 from flexctrl.structure.drives import Drive, RotaryDrive
 from flexctrl.structure.ties import Closure
@@ -80,6 +81,8 @@ class Motion:
     sources : numpy.ndarray, shape (drives,)
         Number of each source angle's degree of freedom; ``n`` behind a rigid shaft.
     drives : tuple of Drive
+    backend : Backend
+        How rotations are turned.
     linkage : Linkage
         The nodes that follow, lead or are driven.
     nodes : numpy.ndarray of int
@@ -97,6 +100,7 @@ class Motion:
     place: np.ndarray
     sources: np.ndarray
     drives: tuple[Drive, ...]
+    backend: Backend
     linkage: Linkage
     nodes: np.ndarray
     linked: np.ndarray
@@ -171,12 +175,25 @@ class Motion:
         """
         padded = np.append(step, 0.0)
         moved = padded[self.place]
-        x, R = state.x + moved[:, :3], orthonormal(exponential(moved[:, 3:]) @ state.R)
+        x, R = state.x + moved[:, :3], self._turned(state.R, moved[:, 3:])
         if not self.plain:
-            pose = self.linkage.place(self._pose(state.x, state.R), step[self.linked])
+            pose = self.linkage.placed(self._pose(state.x, state.R), step[self.linked])
             x[self.nodes] = pose.reshape(-1, 12)[:, :3]
             R[self.nodes] = orthonormal(pose.reshape(-1, 4, 3)[:, 1:])
         return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t)
+
+    def _turned(self, R: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """Return rotations turned by rotation vectors in space axes."""
+        new = np.zeros_like(R)
+        self._turn(np.concatenate([R.ravel(), theta.ravel()]), new)
+        return new
+
+    @cached_property
+    def _turn(self) -> Run:
+        nodes = np.arange(len(self.place))[:, None]
+        rows = 9 * nodes + np.arange(9)
+        gather = np.hstack([rows, 9 * len(nodes) + 3 * nodes + np.arange(3)])
+        return self.backend.bind(turn_kernel(), gather, np.zeros((len(nodes), 0)), rows)
 
     def unwound(self, x: np.ndarray, R: np.ndarray, before: np.ndarray) -> np.ndarray:
         """Return the driven coordinates of a pose, with the whole turns that bring them next to those before."""
