@@ -52,6 +52,8 @@ _HOMES = {
     "flexctrl.dynamics.run": ("Report", "Run", "Status", "Tolerance"),
     "flexctrl.dynamics.simulate": ("simulate",),
     "flexctrl.design": ("Delayed", "Noisy", "OpenLoop", "Quantised", "RateLimited", "Sampled", "Saturated", "Tracking"),
+    "flexctrl.study.compare": ("Comparison", "compare"),
+    "flexctrl.scene": ("Scene", "Simulation", "Start", "load_scene"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

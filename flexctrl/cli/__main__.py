@@ -1,0 +1,9 @@
+"""``python -m flexctrl.cli``."""
+
+from __future__ import annotations
+
+import sys
+
+from flexctrl.cli.program import main
+
+sys.exit(main())

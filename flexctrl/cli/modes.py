@@ -1,0 +1,74 @@
+"""``flexctrl modes``: the equilibrium and the modes about it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
+from flexctrl.cli.program import Request
+from flexctrl.errors import SceneError
+from flexctrl.model.modes import Modes
+from flexctrl.plots.modes import modes_figure
+from flexctrl.scene import Scene, load_scene
+
+_PICTURES = 9
+
+
+def answer(request: Request) -> Answer:
+    """Return the equilibrium and the lowest modes of a scene."""
+    if request.count < 1:
+        raise SceneError(f"--count {request.count}: ask for at least one mode")
+    scene = load_scene(request.scene)
+    every = scene.linear.modes()
+    modes = every.select(list(range(min(request.count, len(every)))))
+    counts = {"rigid_body_modes": every.rigid, "unstable_modes": every.unstable, "massless_freedoms": every.massless}
+    data = plain(_data(scene, modes) | counts)
+    keys = ("frequencies_hz", "damping", "kinds", "parts", "shares")
+    write_csv(request.out, "modes.csv", {"mode": range(1, len(modes) + 1)} | {key: data[key] for key in keys})
+    write_json(request.out, "modes.json", data)
+    rigid, shown = every.rigid + every.unstable, min(_PICTURES, len(modes))
+    first = max(0, min(rigid, len(modes) - shown))
+
+    def draw(figure: object) -> None:
+        chosen = range(first, first + shown)
+        modes_figure(figure, scene.model, scene.linear, scene.rest.state, modes, chosen)  # type: ignore[arg-type]
+
+    write_picture(request.out, "modes.png", draw, size=(12.0, 10.0))
+    return Answer(_text(scene, data), data)
+
+
+def _data(scene: Scene, modes: Modes) -> dict[str, object]:
+    parts = [modes.dominant_part(k) for k in range(len(modes))]
+    shares = [_share(modes, k, part) for k, part in enumerate(parts)]
+    return {
+        "scene": scene.name,
+        "equilibrium": {"residual": scene.rest.residual, "outputs": scene.rest.outputs},
+        "dofs": scene.model.n,
+        "frequencies_hz": modes.frequencies,
+        "damping": modes.damping,
+        "kinds": modes.kinds,
+        "parts": parts,
+        "shares": shares,
+        "coordinates": [modes.dominant_coordinate(k) for k in range(len(modes))],
+    }
+
+
+def _share(modes: Modes, k: int, part: str) -> float:
+    shares = modes.kinetic_shares if modes.kinds[k] == "rigid" else modes.strain_shares
+    return float(np.clip(shares[part][k], 0.0, 1.0)) if part else 0.0
+
+
+def _text(scene: Scene, data: dict) -> str:
+    rest = data["equilibrium"]
+    head = f"{scene.name}: equilibrium of {data['dofs']} degrees of freedom, residual {rest['residual']:.2g}"
+    outputs = grid(("output", "at rest"), rest["outputs"].items())
+    columns = zip(*(data[k] for k in ("frequencies_hz", "damping", "kinds", "parts", "shares")), strict=True)
+    rows = [(k, f, z, kind, part, f"{100 * share:.0f} %") for k, (f, z, kind, part, share) in enumerate(columns, 1)]
+    modes = grid(("mode", "Hz", "damping", "kind", "part", "its share"), rows)
+    more = f"{data['rigid_body_modes']} rigid-body modes" + (
+        f", {data['unstable_modes']} unstable" if data["unstable_modes"] else ""
+    )
+    return f"{head}\n\n{outputs}\n\n{modes}\n\n{more}"
+
+
+__all__ = ["answer"]

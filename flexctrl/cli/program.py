@@ -1,0 +1,163 @@
+"""Arguments, exit codes and what goes to which stream. Everything heavy is imported by the commands."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import flexctrl
+from flexctrl.errors import FlexctrlError, MechanismError
+
+OK, FAILED, BAD_INPUT = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command: where it lives and what its help says.
+
+    Attributes
+    ----------
+    module : str
+        Has ``answer(request) -> Answer``.
+    gives : str
+    example : str
+    options : tuple of str
+        Which of the options in `_OPTIONS` it takes.
+    """
+
+    module: str
+    gives: str
+    example: str
+    options: tuple[str, ...] = ()
+
+
+COMMANDS = {
+    "table": Command(
+        "flexctrl.cli.table",
+        "join table, element list, audit of freedoms",
+        "flexctrl table examples/ceiling_crane.toml",
+    ),
+    "run": Command(
+        "flexctrl.cli.run",
+        "simulation with the scene's loads and controller; the rigid twin beside it if the scene asks",
+        "flexctrl run examples/ceiling_crane.toml --out results",
+    ),
+    "modes": Command(
+        "flexctrl.cli.modes",
+        "equilibrium, frequencies, damping, which part moves in each mode",
+        "flexctrl modes examples/bridge_crane.toml --count 8 --out results",
+        ("count",),
+    ),
+    "bode": Command(
+        "flexctrl.cli.bode",
+        "frequency responses of the machine and its rigid twin, and the margins of the scene's controller",
+        "flexctrl bode examples/bridge_crane.toml --input left_torque --output left_angle --out results",
+        ("input", "output"),
+    ),
+    "rlocus": Command(
+        "flexctrl.cli.rlocus",
+        "root locus of the machine and its rigid twin",
+        "flexctrl rlocus examples/flexible_arm.toml --input elbow_torque --output elbow_angle --out results",
+        ("input", "output"),
+    ),
+    "compare": Command(
+        "flexctrl.cli.compare",
+        "rigid against flexible: curves and numbers",
+        "flexctrl compare examples/bridge_crane.toml --out results",
+    ),
+}
+
+_OPTIONS: dict[str, dict[str, object]] = {
+    "count": {"type": int, "default": 12, "metavar": "N", "help": "how many modes to show, lowest first (12)"},
+    "input": {"default": "", "metavar": "NAME", "help": "input where the loop is looked at or cut"},
+    "output": {"default": "", "metavar": "NAME", "help": "output of the response"},
+}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked on the command line.
+
+    Attributes
+    ----------
+    scene : str
+        Path of the scene.
+    out : Path or None
+        Directory for pictures and data.
+    count : int
+    input, output : str
+    """
+
+    scene: str
+    out: Path | None = None
+    count: int = 12
+    input: str = ""
+    output: str = ""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; default: those of the process.
+
+    Returns
+    -------
+    int
+        0, 1 for a run that failed or was interrupted, 2 for bad input.
+    """
+    arguments = vars(_parser().parse_args(argv))
+    command, as_json = COMMANDS[arguments.pop("command")], arguments.pop("json")
+    try:
+        request = Request(**arguments)
+        if request.out is not None:
+            request.out.mkdir(parents=True, exist_ok=True)
+        answer = importlib.import_module(command.module).answer(request)
+        print(json.dumps(answer.data, allow_nan=False, ensure_ascii=False) if as_json else answer.text, flush=True)
+    except FlexctrlError as error:
+        return _complain(error, BAD_INPUT if isinstance(error, ValueError | MechanismError) else FAILED)
+    except BrokenPipeError:
+        sys.stdout = None  # the reader has gone; nothing is left to flush
+        return OK
+    except OSError as error:
+        return _complain(error, BAD_INPUT)
+    except KeyboardInterrupt:
+        return _complain("interrupted", FAILED)
+    if answer.problem:
+        return _complain(answer.problem, FAILED)
+    return OK
+
+
+def _complain(problem: object, code: int) -> int:
+    print(f"flexctrl: {problem}", file=sys.stderr)
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="flexctrl",
+        description="Flexible machines and their controllers, from one scene file.",
+        epilog="example: flexctrl run examples/ceiling_crane.toml --out results",
+    )
+    parser.add_argument("--version", action="version", version=f"flexctrl {flexctrl.__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, command in COMMANDS.items():
+        sub = commands.add_parser(
+            name, help=command.gives, description=command.gives, epilog=f"example: {command.example}"
+        )
+        sub.add_argument("scene", metavar="SCENE", help="a .toml scene, or a .py file that defines scene")
+        sub.add_argument("--out", type=Path, metavar="DIR", help="write pictures and data there")
+        sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+        for option in command.options:
+            sub.add_argument(f"--{option}", **_OPTIONS[option])  # type: ignore[arg-type]
+    return parser
+
+
+__all__ = ["COMMANDS", "Command", "Request", "main"]

@@ -1,0 +1,129 @@
+"""``flexctrl run``: the simulation, with the rigid twin beside it if the scene asks."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
+from flexctrl.cli.program import Request
+from flexctrl.cli.progress import progress
+from flexctrl.dynamics.run import Run, Status
+from flexctrl.model.model import Model
+from flexctrl.plots.machine import add_machine_axes, draw_deformed
+from flexctrl.plots.run import comparison_curves, panels, run_curves, units
+from flexctrl.plots.style import FLEXIBLE
+from flexctrl.scene import Scene, load_scene
+from flexctrl.study.compare import Comparison, numbers
+
+
+def answer(request: Request) -> Answer:
+    """Run a scene."""
+    scene = load_scene(request.scene)
+    wanted = scene.simulation is not None and scene.simulation.rigid_twin
+    run, twin = run_both(scene, twin=wanted)
+    data = plain({"scene": scene.name, **told(run)} | ({"rigid": told(twin)} if twin else {}))
+    write_json(request.out, "run.json", data)
+    write_csv(request.out, "run.csv", curves(run))
+    if twin:
+        write_csv(request.out, "rigid.csv", curves(twin))
+    draw(request, scene, run, twin)
+    return Answer(_text(scene, run, twin), data, problem(run, twin))
+
+
+def run_both(scene: Scene, twin: bool) -> tuple[Run, Run | None]:
+    """Run a scene's machine and, unless that was interrupted, its rigid twin.
+
+    Parameters
+    ----------
+    scene : Scene
+    twin : bool
+        Whether the twin is wanted.
+
+    Returns
+    -------
+    tuple of Run and (Run or None)
+    """
+    run = _shown(scene, scene.model, f"{scene.name}")
+    return run, _shown(scene, scene.twin, "rigid twin") if twin and run.status is not Status.INTERRUPTED else None
+
+
+def _shown(scene: Scene, model: Model, what: str) -> Run:
+    with progress(what) as tell:
+        return scene.run(model, tell)
+
+
+def told(run: Run) -> dict[str, Any]:
+    """Return the health and the numbers of a run.
+
+    Parameters
+    ----------
+    run : Run
+
+    Returns
+    -------
+    dict
+    """
+    report = asdict(run.report)
+    measured = {name: asdict(numbers(run.t, run[name])) for name in run.outputs}
+    applied = {name: asdict(numbers(run.t, run[name])) for name in run.inputs}
+    return {"status": run.status.value, "end_s": float(run.t[-1]), **report, "outputs": measured, "inputs": applied}
+
+
+def curves(run: Run) -> dict[str, np.ndarray]:
+    """Return time, outputs and inputs of a run as columns."""
+    return {"t": run.t} | {name: run[name] for name in (*run.outputs, *run.inputs)}
+
+
+def problem(run: Run, twin: Run | None) -> str:
+    """Return why a run did not finish; empty if all did."""
+    for label, one in (("", run), ("rigid twin: ", twin)):
+        if one is not None and one.status is not Status.FINISHED:
+            return f"{label}{one.status.value}: {one.report.message}"
+    return ""
+
+
+def draw(request: Request, scene: Scene, run: Run, twin: Run | None) -> None:
+    """Write the pictures of a run: its curves, and the machine at the end."""
+    unit = units(scene.structure)
+    for name, signals in (("outputs.png", run.outputs), ("inputs.png", run.inputs)):
+        if not signals:
+            continue
+
+        def paint(figure: Any, signals: tuple[str, ...] = signals) -> None:
+            axes = panels(figure, len(signals))
+            if twin:
+                comparison_curves(axes, Comparison.between(run, twin), signals, unit)
+            else:
+                run_curves(axes, run, signals, unit)
+
+        write_picture(request.out, name, paint, size=(9.0, 6.5))
+
+    def final(figure: Any) -> None:
+        title = f"{scene.name} at t = {run.t[-1]:.4g} s"
+        ax = add_machine_axes(figure, scene.structure, [run.final])
+        draw_deformed(ax, scene.structure, run.final, FLEXIBLE, label=title)
+
+    write_picture(request.out, "final.png", final, size=(9.0, 6.5))
+
+
+def _text(scene: Scene, run: Run, twin: Run | None) -> str:
+    r = run.report
+    head = (
+        f"{scene.name}: {run.status.value} at t = {run.t[-1]:.6g} s, {r.steps} steps ({r.rejected_steps} rejected), "
+        f"{r.newton_iterations} Newton iterations, {r.dofs} degrees of freedom, {r.wall_s:.2f} s\n"
+        f"energy residual {r.energy_residual:.2g}"
+    )
+    names = (*run.outputs, *run.inputs)
+    if twin is None:
+        rows = [(name, *asdict(numbers(run.t, run[name])).values()) for name in names]
+        return f"{head}\n\n{grid(('signal', 'final', 'largest', 'rms'), rows)}"
+    both = [(name, numbers(run.t, run[name]), numbers(twin.t, twin[name])) for name in names]
+    rows = [(n, f.final, g.final, f.max_abs, g.max_abs, f.rms, g.rms) for n, f, g in both]
+    heads = ("signal", "final", "rigid", "largest", "rigid", "rms", "rigid")
+    return f"{head}\n\n{grid(heads, rows)}"
+
+
+__all__ = ["answer", "curves", "draw", "problem", "run_both", "told"]

@@ -1,0 +1,81 @@
+"""``flexctrl table``: join table, element list, audit of freedoms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
+from flexctrl.cli.program import Request
+from flexctrl.model.condense import Audit, Freedom
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.model import Model
+from flexctrl.plots.machine import add_machine_axes, draw_machine
+from flexctrl.scene import load_scene
+from flexctrl.structure.elements import Beam, Part, Rope, Spring
+from flexctrl.structure.freedoms import IDENTIFIERS
+from flexctrl.structure.structure import Structure
+
+
+def answer(request: Request) -> Answer:
+    """Return the join table of a scene's machine."""
+    scene = load_scene(request.scene)
+    machine, audit = scene.structure, _audit(scene.model)
+    table = machine.join_table
+    elements = [_element(machine, part) for part in machine.elements]
+    data = plain(
+        {
+            "scene": scene.name,
+            "nodes": len(machine.nodes),
+            "dofs": table.free,
+            "model_dofs": scene.model.n,
+            "join_table": {
+                "columns": IDENTIFIERS,
+                "rows": table.rows,
+                "labels": table.labels,
+                "drives": table.drives,
+                "drive_labels": table.drive_labels,
+                "relative": sorted(table.relative),
+            },
+            "elements": elements,
+            "audit": {kind.name.lower(): audit.named(kind) for kind in Freedom} | {"mechanisms": audit.mechanisms},
+            "notes": [*scene.notes, *scene.model.notes],
+        }
+    )
+    columns = {"node": range(1, len(table.rows) + 1), "label": table.labels}
+    columns |= {name: [row[i] for row in table.rows] for i, name in enumerate(IDENTIFIERS)}
+    write_csv(request.out, "join_table.csv", columns)
+    write_json(request.out, "table.json", data)
+    write_picture(
+        request.out, "machine.png", lambda f: draw_machine(add_machine_axes(f, machine), machine), size=(9.0, 6.5)
+    )
+    heads = ("element", "kind", "nodes", "length (m)", "mass (kg)")
+    parts = grid(heads, [tuple(row.values()) for row in elements], left=2)
+    text = "\n\n".join([f"{scene.name}: {table.free} degrees of freedom", str(table), parts, str(audit)])
+    notes = "".join(f"\nnote: {note}" for note in data["notes"])
+    return Answer(text + notes, data)
+
+
+def _element(machine: Structure, part: Part) -> dict[str, Any]:
+    numbers = [machine.number(n) + 1 for n in part.nodes]
+    mass = part.section.rhoA * part.length if isinstance(part, Beam) else getattr(part, "mass", 0.0)
+    return {
+        "name": part.name,
+        "kind": type(part).__name__,
+        "nodes": f"{numbers[0]}…{numbers[-1]}" if len(numbers) > 1 else str(numbers[0]),
+        "length": part.length if isinstance(part, Beam | Rope | Spring) else 0.0,
+        "mass": mass,
+    }
+
+
+def _audit(model: Model) -> Audit:
+    """The audit of the machine as drawn: masses, stiffness without prestress, damping."""
+    still, n = np.zeros(model.n), model.n
+    C = -model.slope(model.rest, still, still, (0.0, 1.0, 0.0), np.zeros(len(model.inputs)))
+    none = np.zeros((n, 0)), np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, 0))
+    linear = LinearModel(model.mass(), C.tocsc(), model.stiffness(), *none, model.coordinates, (), ())
+    return linear.audit()
+
+
+__all__ = ["answer"]

@@ -1,0 +1,190 @@
+"""Curves over time: one run, or rigid beside flexible."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from flexctrl.dynamics.run import Run
+from flexctrl.plots.style import FLEXIBLE, INK, RIGID, tidy
+from flexctrl.structure.signals import (
+    AngularVelocity,
+    DriveAngle,
+    DriveSpeed,
+    Force,
+    Position,
+    Rotation,
+    SwayAngle,
+    Tension,
+    Velocity,
+)
+from flexctrl.structure.structure import Structure
+from flexctrl.study.compare import Comparison
+
+_UNITS: dict[type, str] = {
+    Position: "m",
+    Velocity: "m/s",
+    Rotation: "rad",
+    AngularVelocity: "rad/s",
+    DriveAngle: "rad",
+    DriveSpeed: "rad/s",
+    SwayAngle: "rad",
+    Tension: "N",
+    Force: "N",
+}
+
+
+def units(structure: Structure) -> dict[str, str]:
+    """Return the unit of every signal of a machine.
+
+    Parameters
+    ----------
+    structure : Structure
+
+    Returns
+    -------
+    dict of str to str
+    """
+    return {s.name: _UNITS.get(type(s), "N m") for s in (*structure.outputs, *structure.inputs)}
+
+
+def plot_run(run: Run, signals: Sequence[str] | None = None) -> np.ndarray:
+    """Draw a run in a new figure of pyplot, one axes a signal.
+
+    Parameters
+    ----------
+    run : Run
+    signals : sequence of str, optional
+        Default: all outputs.
+
+    Returns
+    -------
+    numpy.ndarray of matplotlib.axes.Axes
+    """
+    import matplotlib.pyplot as plt
+
+    names = tuple(signals or run.outputs)
+    return run_curves(panels(plt.figure(), len(names)), run, names)
+
+
+def comparison_figure(comparison: Comparison, signals: Sequence[str] | None = None) -> Figure:
+    """Draw a comparison in a new figure of pyplot.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    signals : sequence of str, optional
+        Default: all outputs.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure()
+    names = tuple(signals or comparison.flexible.outputs)
+    comparison_curves(panels(figure, len(names)), comparison, names)
+    return figure
+
+
+def panels(figure: Figure, count: int) -> np.ndarray:
+    """Lay out axes for so many signals that share their time axis, and size the figure for them.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    count : int
+
+    Returns
+    -------
+    numpy.ndarray of matplotlib.axes.Axes
+    """
+    columns = 1 if count <= 3 else 2
+    rows = -(-count // columns)
+    figure.set_size_inches(8.0 if columns == 1 else 11.0, 1.0 + 2.1 * rows)
+    figure.set_layout_engine("constrained")
+    axes = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    for spare in axes[count:]:
+        spare.set_visible(False)
+    for ax in axes[max(count - columns, 0) : count]:
+        ax.set_xlabel("time (s)")
+        ax.tick_params(labelbottom=True)
+    return axes[:count]
+
+
+def run_curves(
+    axes: Sequence[Axes] | np.ndarray, run: Run, signals: Sequence[str], unit: Mapping[str, str] | None = None
+) -> np.ndarray:
+    """Draw signals of a run, one axes each.
+
+    Parameters
+    ----------
+    axes : sequence of matplotlib.axes.Axes
+    run : Run
+    signals : sequence of str
+        Outputs or inputs.
+    unit : mapping of str to str, optional
+        See `units`.
+
+    Returns
+    -------
+    numpy.ndarray of matplotlib.axes.Axes
+        The same axes.
+    """
+    for ax, name in zip(axes, signals, strict=True):
+        _curve(ax, run, name, color=FLEXIBLE, linewidth=1.5)
+        _label(ax, name, unit)
+    return np.asarray(axes)
+
+
+def comparison_curves(
+    axes: Sequence[Axes] | np.ndarray,
+    comparison: Comparison,
+    signals: Sequence[str],
+    unit: Mapping[str, str] | None = None,
+) -> np.ndarray:
+    """Draw signals of two runs, flexible as a line and rigid dashed, one axes each.
+
+    Parameters
+    ----------
+    axes : sequence of matplotlib.axes.Axes
+    comparison : Comparison
+    signals : sequence of str
+    unit : mapping of str to str, optional
+        See `units`.
+
+    Returns
+    -------
+    numpy.ndarray of matplotlib.axes.Axes
+        The same axes.
+    """
+    for ax, name in zip(axes, signals, strict=True):
+        _curve(ax, comparison.flexible, name, color=FLEXIBLE, linewidth=1.5, label="flexible")
+        _curve(ax, comparison.rigid, name, color=RIGID, linewidth=1.4, linestyle=(0, (5, 2)), label="rigid")
+        _label(ax, name, unit)
+    if len(signals):
+        axes[0].legend(frameon=False, fontsize=9, labelcolor=INK, ncols=2, loc="best")
+    return np.asarray(axes)
+
+
+def _curve(ax: Axes, run: Run, name: str, **style: Any) -> None:
+    """Outputs as curves; inputs as they are, held from instant to instant."""
+    if name in run.inputs:
+        ax.step(run.t, run[name], where="post", **style)
+    else:
+        ax.plot(run.t, run[name], **style)
+
+
+def _label(ax: Axes, name: str, unit: Mapping[str, str] | None) -> None:
+    tidy(ax)
+    ax.set_ylabel(f"{name} ({unit[name]})" if unit and name in unit else name, fontsize=9, color=INK)
+    ax.margins(x=0.0)
+    ax.ticklabel_format(useOffset=False)
+
+
+__all__ = ["comparison_curves", "comparison_figure", "panels", "plot_run", "run_curves", "units"]

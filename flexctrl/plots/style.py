@@ -1,0 +1,41 @@
+"""Colours and habits that all pictures share."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+
+INK = "#1f2937"
+PALE = "#b6bec9"
+FLEXIBLE = "#1d4ed8"
+RIGID = "#d9480f"
+DRIVE = "#b45309"
+ROPE = "#7c6f64"
+GROUND = "#3f7d58"
+
+CYCLE = ("#1d4ed8", "#d9480f", "#3f7d58", "#7048a8", "#b45309", "#0f766e", "#be185d", "#4b5563")
+"""Line colours in order."""
+
+
+def tidy(ax: Axes) -> Axes:
+    """Take away the frame's upper right and lay a fine grid.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The same axes.
+    """
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        ax.spines[side].set_color(PALE)
+    ax.grid(True, color="#e5e7eb", linewidth=0.7)
+    ax.set_axisbelow(True)
+    ax.tick_params(colors=INK, labelsize=9, length=3)
+    return ax
+
+
+__all__ = ["CYCLE", "DRIVE", "FLEXIBLE", "GROUND", "INK", "PALE", "RIGID", "ROPE", "tidy"]

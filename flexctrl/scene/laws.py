@@ -1,0 +1,169 @@
+"""Readers of moves, shapers, feedback laws and hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexctrl.design.feedback import FilteredRate
+from flexctrl.design.piecewise import Constant
+from flexctrl.design.shaper import Shaper, convolve
+from flexctrl.design.shapers import ei, um_zv, um_zvd, zv, zvd, zvdd
+from flexctrl.design.trajectories import (
+    MinimumJerk,
+    Ramp,
+    Spline,
+    Step,
+    Table,
+    TimeOptimalPendulum,
+    TrapezoidalVelocity,
+)
+from flexctrl.scene.control import PID, Controlled, Gains, Hardware, Move, Reference, StateFeedback, Transfer
+from flexctrl.scene.reading import (
+    Kind,
+    Place,
+    Reader,
+    flag,
+    mapping,
+    number,
+    of_kind,
+    one_of,
+    positive,
+    several,
+    table,
+    text,
+    whole,
+)
+
+_MODE = {"omega": positive, "zeta": number}
+SHAPERS = {
+    "zv": Kind(zv, _MODE),
+    "zvd": Kind(zvd, _MODE),
+    "zvdd": Kind(zvdd, _MODE),
+    "ei": Kind(ei, {**_MODE, "tolerance": positive}),
+    "um_zv": Kind(um_zv, _MODE),
+    "um_zvd": Kind(um_zvd, _MODE),
+}
+"""Shapers by the name they have in a scene file."""
+
+_BEGIN = {"at": number, "start": number}
+_POINTS = {"times": several(number), "values": several(number)}
+MOVES = {
+    "constant": Kind(Constant, {"value": number}),
+    "step": Kind(Step, {"size": number, **_BEGIN}),
+    "ramp": Kind(Ramp, {"slope": number, "duration": positive, **_BEGIN}),
+    "trapezoidal_velocity": Kind(
+        TrapezoidalVelocity, {"distance": number, "speed": positive, "acceleration": positive, **_BEGIN}
+    ),
+    "minimum_jerk": Kind(MinimumJerk, {"distance": number, "duration": positive, **_BEGIN}),
+    "table": Kind(Table, _POINTS),
+    "spline": Kind(Spline, _POINTS),
+    "time_optimal_pendulum": Kind(
+        TimeOptimalPendulum, {"distance": number, "acceleration": positive, "omega": positive, **_BEGIN}
+    ),
+}
+"""Commands by the name they have in a scene file."""
+
+
+def move(value: Any, place: Place) -> Move:
+    """Read a command: a number (constant), or a table of its kind, with a shaper if there is one."""
+    if not isinstance(value, Mapping):
+        return Move(Constant(number(value, place)))
+    given = dict(value)
+    shaper = _shaper(given.pop("shaper"), place.at("shaper")) if "shaper" in given else None
+    return Move(of_kind(given, place, MOVES), shaper)
+
+
+def _shaper(value: Any, place: Place) -> Shaper:
+    """Read one shaper, or a list of them, one per mode."""
+    if isinstance(value, list):
+        return convolve(*several(lambda item, where: of_kind(item, where, SHAPERS))(value, place))
+    return of_kind(value, place, SHAPERS)
+
+
+def controller(content: Mapping[str, Any], place: Place) -> Controlled | None:
+    """Read the tables ``moves``, ``controllers`` and ``hardware``.
+
+    Parameters
+    ----------
+    content : mapping of str to object
+        Of the file.
+    place : Place
+        The file.
+
+    Returns
+    -------
+    Controlled or None
+        None if the file has no controllers.
+
+    Raises
+    ------
+    SceneError
+        Naming table, key and what was expected.
+    """
+    moves = mapping(move)(content.get("moves", {}), place.at("moves"))
+    kinds = _law_kinds(moves)
+    read = several(lambda item, where: of_kind(item, where, kinds))
+    laws = read(content.get("controllers", []), place.at("controllers"))
+    if not laws:
+        if "hardware" in content:
+            raise place.at("hardware").refuse("there are no [[controllers]] to put it round")
+        return None
+    return Controlled(laws, HARDWARE.read(table(content.get("hardware", {}), place), place.at("hardware")))
+
+
+HARDWARE = Kind(
+    Hardware,
+    {
+        "sample_time": positive,
+        "noise": mapping(number),
+        "seed": whole,
+        "steps": mapping(positive),
+        "rate_limits": mapping(positive),
+        "limits": mapping(positive),
+        "delay": whole,
+    },
+)
+
+
+def _law_kinds(moves: Mapping[str, Move]) -> dict[str, Kind]:
+    reference = _reference(moves)
+    loop: dict[str, Reader] = {"measured": text, "command": text, "reference": reference}
+    gains = {"kp": number, "ki": number, "kd": number}
+    references = mapping(reference)
+    return {
+        "pid": Kind(PID, {**loop, **gains, "rate": _rate, "limit": positive}),
+        "lqr": Kind(
+            StateFeedback,
+            {
+                "largest": mapping(positive),
+                "effort": mapping(positive),
+                "reads": several(text),
+                "references": references,
+            },
+        ),
+        "gains": Kind(Gains, {"gains": mapping(mapping(number)), "references": references}),
+        "transfer_function": Kind(Transfer, {**loop, "num": several(number), "den": several(number)}),
+    }
+
+
+def _rate(value: Any, place: Place) -> str | FilteredRate:
+    """Read the name of a rate signal, or the time constant of a filter."""
+    return value if isinstance(value, str) else FilteredRate(positive(value, place))
+
+
+def _reference(moves: Mapping[str, Move]) -> Reader:
+    def chosen(value: Any, place: Place) -> Move:
+        return moves[one_of(moves)(value, place)]
+
+    def read(value: Any, place: Place) -> Reference:
+        if isinstance(value, str):
+            return Reference(chosen(value, place))
+        if isinstance(value, Mapping):
+            return Kind(Reference, {"move": chosen, "through": text, "rate": flag}).read(value, place)
+        return Reference(Move(Constant(number(value, place))))
+
+    return read
+
+
+__all__ = ["HARDWARE", "MOVES", "SHAPERS", "controller", "move"]

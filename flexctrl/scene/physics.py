@@ -1,0 +1,66 @@
+"""The effects in a scene file: what is named is simulated, nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexctrl.effects.damping import ModalDamping, RayleighDamping
+from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import BeamFlexibility, Flexible, RopeStretch, ShaftElasticity
+from flexctrl.effects.gravity import Gravity
+from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.errors import did_you_mean
+from flexctrl.scene.reading import Kind, Place, checked, number, one_or_several, positive, table, vector
+
+EFFECTS: dict[str, Kind] = {
+    "gravity": Kind(Gravity, {"g": vector}),
+    "flexible": Kind(Flexible),
+    "beam_flexibility": Kind(BeamFlexibility),
+    "shaft_elasticity": Kind(ShaftElasticity),
+    "rope_stretch": Kind(RopeStretch),
+    "large_rotation": Kind(LargeRotation),
+    "rayleigh_damping": Kind(RayleighDamping, {"alpha": number, "beta": number}),
+    "modal_damping": Kind(ModalDamping, {"ratios": one_or_several(number)}),
+}
+"""Effects by the name they have in a scene file."""
+
+_THROUGH = Kind(RayleighDamping.through, dict.fromkeys(("zeta", "omega1", "omega2"), positive))
+
+
+def effects(value: Any, place: Place) -> tuple[Effect, ...]:
+    """Read the table of effects: ``gravity = true``, or a table of an effect's parameters.
+
+    Parameters
+    ----------
+    value : object
+    place : Place
+
+    Returns
+    -------
+    tuple of Effect
+
+    Raises
+    ------
+    SceneError
+        For an unknown effect or parameter.
+    """
+    for name in table(value, place):
+        if name not in EFFECTS:
+            raise place.refuse(f"there is no effect {name!r}{did_you_mean(name, EFFECTS)}")
+    return tuple(_effect(name, item, place.at(name)) for name, item in value.items() if item is not False)
+
+
+def _effect(name: str, value: Any, place: Place) -> Effect:
+    if value is True:
+        missing = EFFECTS[name].required()
+        if missing:
+            raise place.refuse(f"give its parameters, {name} = {{ {missing[0]} = … }}")
+        return checked(EFFECTS[name].make, place)
+    if not isinstance(value, Mapping):
+        raise place.expected("true, false or a table of its parameters", value)
+    kind = _THROUGH if name == "rayleigh_damping" and "zeta" in value else EFFECTS[name]
+    return kind.read(value, place)
+
+
+__all__ = ["EFFECTS", "effects"]

@@ -1,0 +1,302 @@
+"""A scene: a machine, the physics asked for, its controller, and how it is to be run."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import cached_property
+from typing import Any
+
+from flexctrl.design.controller import Controller, as_controller
+from flexctrl.design.tracking import OpenLoop, Together
+from flexctrl.dynamics.alpha import Integrator
+from flexctrl.dynamics.run import Run, Tolerance
+from flexctrl.dynamics.simulate import simulate
+from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import Flexible
+from flexctrl.effects.gravity import Gravity
+from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.errors import SceneError, did_you_mean
+from flexctrl.model.assemble import assemble, rigid
+from flexctrl.model.equilibrium import Rest, equilibrium
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.linearize import linearize
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+from flexctrl.scene.nodes import node_of
+from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
+from flexctrl.structure.structure import Structure
+
+Signal = Callable[[float], float]
+
+
+class Start(Enum):
+    """The state a run begins in."""
+
+    DRAWN = "drawn"
+    EQUILIBRIUM = "equilibrium"
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How a scene is run through time.
+
+    Attributes
+    ----------
+    until : float
+        End [s].
+    method : Integrator or None
+        A fixed-step method; left out: steps adapt to ``tolerance``.
+    tolerance : Tolerance
+    every : float or None
+        Spacing of the results [s]; left out: every step.
+    start : Start
+    rigid_twin : bool
+        Whether the rigid twin is run beside the machine.
+    """
+
+    until: float
+    method: Integrator | None = None
+    tolerance: Tolerance = field(default_factory=Tolerance)
+    every: float | None = None
+    start: Start = Start.DRAWN
+    rigid_twin: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in (("until", self.until), ("every", self.every)):
+            if value is not None and not value > 0:
+                raise SceneError(f"simulation: {name} = {value!r}; expected a number of seconds > 0")
+
+
+@dataclass(frozen=True)
+class Channel:
+    """The loop that ``bode`` and ``rlocus`` look at.
+
+    Attributes
+    ----------
+    input, output : str
+        Names of signals; left out: the first ones.
+    """
+
+    input: str = ""
+    output: str = ""
+
+
+class Plan(ABC):
+    """A controller that is designed on the scene it is for, when it is first needed."""
+
+    @abstractmethod
+    def build(self, scene: Scene) -> Controller:
+        """Return the controller for a scene."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything a command needs to know.
+
+    Attributes
+    ----------
+    structure : Structure
+    effects : tuple of Effect
+        The physics asked for.
+    controller : Controller, python-control system, Plan or None
+    loads : mapping of str to float or function of time
+        Inputs beside the controller's: constant from t = 0, or functions of time (beside a sampled
+        controller these are held from sample to sample).
+    simulation : Simulation or None
+        Needed by ``run`` and ``compare``.
+    hold : mapping of str to float
+        Freedoms held in the equilibrium, ``"girder.start.u"`` or a coordinate's name, and where.
+    rest_inputs : mapping of str to float
+        Constant inputs the equilibrium is found with.
+    channel : Channel
+    name : str
+    notes : tuple of str
+        Assumptions and sources, shown with the results.
+
+    Raises
+    ------
+    SceneError
+        For a signal that the machine does not have.
+    """
+
+    structure: Structure
+    effects: tuple[Effect, ...] = (Gravity(), Flexible(), LargeRotation())
+    controller: Any = None
+    loads: Mapping[str, float | Signal] = field(default_factory=dict)
+    simulation: Simulation | None = None
+    hold: Mapping[str, float] = field(default_factory=dict)
+    rest_inputs: Mapping[str, float] = field(default_factory=dict)
+    channel: Channel = Channel()
+    name: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(self.effects))
+        object.__setattr__(self, "name", self.name or self.structure.name)
+        inputs = [i.name for i in self.structure.inputs]
+        outputs = [o.name for o in self.structure.outputs]
+        for what, given, known in (
+            ("loads", self.loads, inputs),
+            ("rest_inputs", self.rest_inputs, inputs),
+            ("channel: input", [self.channel.input] if self.channel.input else [], inputs),
+            ("channel: output", [self.channel.output] if self.channel.output else [], outputs),
+        ):
+            for name in given:
+                if name not in known:
+                    raise SceneError(f"{self.name}: {what}: the machine has no {name!r}{did_you_mean(name, known)}")
+
+    @classmethod
+    def from_toml(cls, path: str) -> Scene:
+        """Read a scene file; see `load_scene`."""
+        from flexctrl.scene.files import load_scene
+
+        return load_scene(path)
+
+    def with_(
+        self,
+        *,
+        effects: Sequence[Effect] | None = None,
+        controller: Any = None,
+        loads: Mapping[str, float | Signal] | None = None,
+        simulation: Simulation | None = None,
+    ) -> Scene:
+        """Return a copy with some fields replaced; what is left out stays.
+
+        Parameters
+        ----------
+        effects, controller, loads, simulation
+            As for the constructor.
+
+        Returns
+        -------
+        Scene
+        """
+        given = {"effects": effects, "controller": controller, "loads": loads, "simulation": simulation}
+        return replace(self, **{name: value for name, value in given.items() if value is not None})
+
+    # -- models
+
+    @cached_property
+    def model(self) -> Model:
+        """The machine under its effects."""
+        return assemble(self.structure, self.effects)
+
+    @cached_property
+    def twin(self) -> Model:
+        """The rigid twin."""
+        found = rigid(self.model)
+        assert isinstance(found, Model)
+        return found
+
+    @cached_property
+    def rest(self) -> Rest:
+        """The machine's equilibrium."""
+        return self._equilibrium(self.model)
+
+    @cached_property
+    def twin_rest(self) -> Rest:
+        """The rigid twin's equilibrium."""
+        return self._equilibrium(self.twin)
+
+    @cached_property
+    def linear(self) -> LinearModel:
+        """The machine linearised about its equilibrium."""
+        return linearize(self.model, at=self.rest)
+
+    @cached_property
+    def twin_linear(self) -> LinearModel:
+        """The rigid twin linearised about its equilibrium."""
+        return linearize(self.twin, at=self.twin_rest)
+
+    def _equilibrium(self, model: Model) -> Rest:
+        for name in self.hold:
+            if not _own(self.model, name):
+                hint = did_you_mean(name, self.model.coordinates)
+                raise SceneError(f"{self.name}: hold: the machine has no free coordinate {name!r}{hint}")
+        places = {_own(model, name): at for name, at in self.hold.items()}
+        places.pop("", None)  # the rigid twin may not have it
+        return equilibrium(model, hold=places, inputs=dict(self.rest_inputs))
+
+    # -- runs
+
+    @cached_property
+    def law(self) -> Controller | None:
+        """The controller, designed and with its names checked; None without one."""
+        own = self.controller.build(self) if isinstance(self.controller, Plan) else self.controller
+        return None if own is None else as_controller(own, self.model.inputs, self.model.outputs)
+
+    @cached_property
+    def _commands(self) -> Controller | None:
+        """The law together with loads that change with time."""
+        moving = {name: load for name, load in self.loads.items() if callable(load)}
+        if not moving:
+            return self.law
+        loads = OpenLoop(moving)
+        if self.law is None:
+            return loads
+        return Together(loads.sampled(self.law.sample_time) if self.law.sample_time else loads, self.law)
+
+    def start(self, model: Model) -> State:
+        """Return the state from which a model of this scene (``model`` or ``twin``) is run."""
+        if self._simulation.start is Start.DRAWN:
+            return model.rest
+        if model is self.model:
+            return self.rest.state
+        return self.twin_rest.state if model is self.twin else self._equilibrium(model).state
+
+    def run(self, model: Model | None = None, progress: Callable[[float], None] | None = None) -> Run:
+        """Simulate a model of this scene with its controller and loads.
+
+        Parameters
+        ----------
+        model : Model, optional
+            Left out: `model`; give ``scene.twin`` for the rigid twin.
+        progress : callable, optional
+            Called with the fraction done.
+
+        Returns
+        -------
+        Run
+
+        Raises
+        ------
+        SceneError
+            If the scene does not say how long to run.
+        """
+        plan, chosen = self._simulation, model or self.model
+        return simulate(
+            chosen,
+            self._commands,
+            until=plan.until,
+            start=self.start(chosen),
+            inputs={name: load for name, load in self.loads.items() if not callable(load)},
+            method=plan.method,
+            tolerance=plan.tolerance,
+            every=plan.every,
+            progress=progress,
+        )
+
+    @property
+    def _simulation(self) -> Simulation:
+        if self.simulation is None:
+            raise SceneError(f"{self.name}: has no [simulation]; give at least until = … (seconds)")
+        return self.simulation
+
+
+def _own(model: Model, name: str) -> str:
+    """The coordinate behind a freedom, ``girder.start.u`` or its own name; empty if the model has none of its own."""
+    if "." not in name:
+        return name if name in model.coordinates else ""
+    where, _, freedom = name.rpartition(".")
+    column = {word: i for names in (FREEDOMS, IDENTIFIERS) for i, word in enumerate(names)}
+    if freedom not in column:
+        raise SceneError(f"hold {name!r}: there is no freedom {freedom!r}{did_you_mean(freedom, FREEDOMS)}")
+    node = model.structure.number(node_of(model.structure.elements, where))
+    number = int(model.motion.place[node, column[freedom]])
+    return model.coordinates[number] if number < model.n else ""
+
+
+__all__ = ["Channel", "Plan", "Scene", "Simulation", "Start"]

@@ -1,0 +1,280 @@
+"""The commands: what they print, what they write, how they end."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scenes import TROLLEY
+
+import flexctrl
+from flexctrl.cli import main
+from flexctrl.cli.answer import plain
+from flexctrl.cli.program import COMMANDS
+
+REPORT = {"scene", "status", "steps", "rejected_steps", "newton_iterations", "wall_s", "dofs", "energy_residual"}
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "trolley.toml"
+    path.write_text(TROLLEY, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def call(capsys):
+    def run(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(a) for a in arguments])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+@pytest.fixture
+def told(call, scene):
+    def run(command: str, *arguments: object) -> dict:
+        code, out, err = call(command, scene, "--json", *arguments)
+        assert (code, err) == (0, "")
+        return json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} in JSON"))
+
+    return run
+
+
+# -- what programs read
+
+
+def test_run_reports_the_machine_and_its_twin(told):
+    data = told("run")
+    assert set(data) >= REPORT
+    assert data["status"] == "finished"
+    assert data["scene"] == "trolley"
+    assert data["end_s"] == pytest.approx(0.2)
+    for side in (data, data["rigid"]):
+        assert set(side["outputs"]) == {"travel", "load_z", "sway", "angle", "speed"}
+        assert all(set(numbers) == {"final", "max_abs", "rms"} for numbers in side["outputs"].values())
+    assert data["rigid"]["dofs"] < data["dofs"]
+    # The rigid twin's motor turns with the trolley: ratio/radius = 100 rad/m.
+    rigid = data["rigid"]["outputs"]
+    assert rigid["angle"]["final"] == pytest.approx(100.0 * rigid["travel"]["final"], rel=1e-9)
+    assert data["outputs"]["angle"]["final"] != pytest.approx(100.0 * data["outputs"]["travel"]["final"], rel=1e-6)
+
+
+def test_run_without_a_twin_says_nothing_of_one(call, scene):
+    scene.write_text(TROLLEY.replace("rigid_twin = true", "rigid_twin = false"), encoding="utf-8")
+    assert "rigid" not in json.loads(call("run", scene, "--json")[1])
+
+
+def test_modes_are_those_of_a_trolley_with_a_pendulum(told):
+    data = told("modes", "--count", 4)
+    assert set(data["equilibrium"]) == {"residual", "outputs"}
+    assert data["equilibrium"]["residual"] < 1e-9
+    assert data["rigid_body_modes"] == 1
+    assert len(data["frequencies_hz"]) == len(data["damping"]) == len(data["parts"]) == 4
+    # Motor 10 kg on the rail, so M = 20 kg: ω² = (M + m) g / (M l), the rope stretched by m g l / EA.
+    swing = np.sqrt((20.0 + 5.0) * 9.81 / (20.0 * (2.0 + 5.0 * 9.81 * 2.0 / 2e5))) / (2 * np.pi)
+    bounce = np.sqrt(2e5 / 2.0 / 5.0) / (2 * np.pi)
+    assert data["frequencies_hz"][1] == pytest.approx(swing, rel=1e-3)
+    assert min(abs(f - bounce) for f in data["frequencies_hz"]) < 1e-3 * bounce
+    assert (
+        data["parts"][data["frequencies_hz"].index(min(data["frequencies_hz"], key=lambda f: abs(f - bounce)))]
+        == "rope"
+    )
+
+
+def test_table_holds_the_join_table_and_the_audit(told):
+    data = told("table")
+    assert data["join_table"]["rows"][0] == [1, 0, 0, 0, 0, 0]
+    assert data["dofs"] == 1 + 2 + 1
+    assert data["audit"]["dynamic"] == ["trolley_0_u", "rope_1_u", "rope_1_w", "travel_drive_source"]
+    assert [e["name"] for e in data["elements"]] == ["trolley", "rope", "load"]
+    assert data["notes"] == ["made up"]
+
+
+def test_bode_gives_margins_and_poles_of_both(told):
+    data = told("bode")
+    assert (data["input"], data["output"]) == ("torque", "travel")
+    for side in (data["flexible"], data["rigid"]):
+        assert side["responds"]
+        assert side["margins"]["stable"]
+        assert all(len(pole) == 2 for pole in side["poles"])
+    # The trolley's rigid twin is a double integrator with a pendulum.
+    poles = np.array(data["rigid"]["poles"])
+    assert np.sort(np.hypot(*poles.T)) == pytest.approx([0, 0, *[np.sqrt(25 * 9.81 / 40)] * 2], abs=1e-6)
+
+
+def test_rlocus_finds_where_the_flexible_loop_turns_unstable(told):
+    data = told("rlocus")
+    assert data["controlled"]
+    assert data["sample_time"] == 0.01
+    gains = {side: [c["gain"] for c in data[side]["critical_gains"]] for side in ("flexible", "rigid")}
+    up = data["flexible"]["margins"]["gain"]
+    assert any(g == pytest.approx(up, rel=1e-4) for g in gains["flexible"])
+    assert min(g for g in gains["flexible"] if g > 1) < min(g for g in gains["rigid"] if g > 1)
+    assert data["flexible"]["stable"]
+
+
+def test_signals_of_the_loop_can_be_chosen(told):
+    data = told("bode", "--input", "push", "--output", "load_z")
+    assert data["input"] == "push"
+    assert not data["rigid"]["responds"]  # a push along x does not lift the load of the straight rigid rope
+
+
+def test_compare_holds_both_and_their_difference(told):
+    data = told("compare")
+    assert data["status"] == data["rigid_status"] == "finished"
+    travel = data["signals"]["travel"]
+    assert set(travel) >= {"flexible", "rigid", "max_difference", "rms_difference", "frequency_hz"}
+    assert 0 < travel["rms_difference"] <= travel["max_difference"]
+
+
+# -- what is written
+
+
+@pytest.mark.parametrize(
+    ("command", "files"),
+    [
+        ("table", {"join_table.csv", "table.json", "machine.png"}),
+        ("run", {"run.json", "run.csv", "rigid.csv", "outputs.png", "inputs.png", "final.png"}),
+        ("modes", {"modes.csv", "modes.json", "modes.png"}),
+        ("bode", {"bode.json", "bode_flexible.csv", "bode_rigid.csv", "loop_flexible.csv", "bode.png", "loop.png"}),
+        ("rlocus", {"rlocus.json", "rlocus_flexible.csv", "rlocus_rigid.csv", "rlocus.png"}),
+        ("compare", {"compare.json", "compare.csv", "outputs.png"}),
+    ],
+)
+def test_out_holds_pictures_and_data(call, scene, tmp_path, command, files):
+    out = tmp_path / "deep" / "out"
+    code, text, err = call(command, scene, "--out", out)
+    assert (code, err) == (0, "")
+    assert text.strip()
+    assert {p.name for p in out.iterdir()} >= files
+    for picture in out.glob("*.png"):
+        assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    for table in out.glob("*.csv"):
+        rows = table.read_text(encoding="utf-8").splitlines()
+        assert len({row.count(",") for row in rows}) == 1
+        assert "nan" not in "".join(rows[1:])
+
+
+def test_written_curves_are_the_run(call, scene, tmp_path):
+    _, out, _ = call("run", scene, "--json", "--out", tmp_path)
+    curves = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
+    data = json.loads(out)
+    assert curves["t"][-1] == data["end_s"]
+    assert curves["travel"][-1] == data["outputs"]["travel"]["final"]
+    assert np.abs(curves["sway"]).max() == data["outputs"]["sway"]["max_abs"]
+    assert json.loads((tmp_path / "run.json").read_text(encoding="utf-8")) == data
+
+
+# -- how it ends
+
+
+def test_bad_input_ends_with_2_and_the_message_on_the_error_stream(call, scene):
+    scene.write_text(TROLLEY.replace("mass = 5.0", "weight = 5.0"), encoding="utf-8")
+    for command in COMMANDS:
+        code, out, err = call(command, scene)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"flexctrl: {scene}: [elements.load] weight: unknown key")
+        assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("bode", "--input", "torq"), "the machine has no input 'torq'; did you mean 'torque'?"),
+        (("bode", "--output", "trvel"), "the machine has no output 'trvel'; did you mean 'travel'?"),
+        (("modes", "--count", "0"), "ask for at least one mode"),
+    ],
+)
+def test_bad_options_are_bad_input(call, scene, arguments, said):
+    command, *options = arguments
+    code, out, err = call(command, scene, *options)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_a_directory_that_cannot_be_made_is_bad_input(call, scene):
+    code, _, err = call("table", scene, "--out", scene / "below")
+    assert code == 2
+    assert "flexctrl:" in err
+
+
+def test_no_equilibrium_is_a_failed_run(call, scene):
+    scene.write_text(TROLLEY + "\n[equilibrium]\ninputs = { push = 2.0 }\n", encoding="utf-8")
+    code, out, err = call("modes", scene)
+    assert (code, out) == (1, "")
+    assert "equilibrium" in err
+
+
+INTERRUPTED = """
+import flexctrl as fc
+from flexctrl.cranes import ceiling_crane
+
+class Impatient:
+    inputs, outputs, sample_time = ("travel",), ("push",), 1e-3
+
+    def initial(self):
+        return ()
+
+    def command(self, t, x, y):
+        if t > 4.5e-3:
+            raise KeyboardInterrupt
+        return [500.0]
+
+scene = fc.Scene(
+    ceiling_crane(),
+    controller=Impatient(),
+    simulation=fc.Simulation(until=0.02, method=fc.GeneralizedAlpha(5e-4), every=1e-3, rigid_twin=True),
+)
+"""
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_ctrl_c_keeps_what_was_computed(call, tmp_path, command):
+    path = tmp_path / "impatient.py"
+    path.write_text(INTERRUPTED, encoding="utf-8")
+    code, out, err = call(command, path, "--json", "--out", tmp_path)
+    data = json.loads(out)
+    assert code == 1
+    assert "interrupted" in err
+    assert data["status"] == "interrupted"
+    assert 4e-3 <= data["end_s"] <= 6e-3
+    assert "rigid" not in data
+    if command == "run":
+        assert len((tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()) >= 5
+
+
+def test_help_has_an_example_of_every_command(capsys):
+    for command in COMMANDS:
+        with pytest.raises(SystemExit) as end:
+            main([command, "--help"])
+        assert end.value.code == 0
+        assert f"example: flexctrl {command} examples/" in " ".join(capsys.readouterr().out.split())
+
+
+def test_version_and_wrong_command(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"flexctrl {flexctrl.__version__}\n"
+    with pytest.raises(SystemExit) as end:
+        main(["walk", "scene.toml"])
+    assert end.value.code == 2
+
+
+def test_starting_up_imports_nothing_heavy():
+    code = "import sys, flexctrl.cli; print(sorted({'numpy', 'casadi', 'control', 'matplotlib'} & set(sys.modules)))"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_json_knows_no_nan_and_no_numpy():
+    strange = {"a": np.float64(np.nan), "b": np.array([1.0, np.inf]), "c": 1 + 2j, "d": np.int64(3), "e": (np.True_,)}
+    assert plain(strange) == {"a": None, "b": [1.0, None], "c": [1.0, 2.0], "d": 3, "e": [True]}
+    json.dumps(plain(strange), allow_nan=False)
