@@ -61,7 +61,7 @@ def beam_stiffness(section: Section, length: float) -> np.ndarray:
 
 
 def beam_mass(section: Section, length: float) -> np.ndarray:
-    """Return the consistent M_e (12 × 12) in the element's axes, rotary inertia included (Przemieniecki 1968, §11.3)."""
+    """Return the consistent M_e (12 × 12) in the element's axes, with rotary inertia (Przemieniecki 1968, §11.3)."""
     L = length
     m, j = section.rhoA * L, section.rhoJ * L
     M = np.zeros((12, 12))
