@@ -19,6 +19,7 @@ __all__ = ["Crossing", "Margins", "Peak", "loop_grid", "margins", "peak_gain"]
 
 MOST_POINTS = 20_000
 ON_AXIS = 1e-12
+NOISE = 1e-11
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ class Margins:
     Attributes
     ----------
     stable : bool
-        Whether the closed loop is stable, from its poles. The margins of an unstable loop say nothing.
+        Whether the closed loop is stable, from its poles (see :meth:`Loop.is_stable`). The margins of an
+        unstable loop say nothing.
     gain_up, gain_down : Crossing
         Smallest factor above 1 and largest below 1 that bring the loop to −1; infinite and 0 if there is none.
     phase : Crossing
@@ -114,7 +116,7 @@ def loop_grid(loop: Loop) -> tuple[np.ndarray, np.ndarray]:
         rad/s.
     L : numpy.ndarray of complex, shape (N,)
     """
-    poles = _continuous(loop.poles, loop.dt)
+    poles = _continuous(loop.poles[~loop.at_rest(loop.poles)], loop.dt)
     span = _wide_span(loop, *response_span(poles))
     both = np.concatenate([poles, _continuous(loop.closed_poles(), loop.dt)])
     omega, values = refined(lambda s: loop.at(abs(s))[None, None], peak_grid(both, span), MOST_POINTS)
@@ -203,11 +205,10 @@ def _continuous(poles: np.ndarray, dt: float) -> np.ndarray:
 def _wide_span(loop: Loop, low: float, high: float) -> tuple[float, float]:
     """Stretched until the loop is small at the top and, if it integrates, large at the bottom."""
     nyquist = np.pi / loop.dt if loop.dt else np.inf
-    integrates = bool((abs(_continuous(loop.poles, loop.dt)) < 1e-9 * high).any())
     for _ in range(12):
         if abs(_one(loop, high)) > 0.1:
             high *= 10.0
-        if integrates and abs(_one(loop, low)) < 10.0:
+        if abs(_one(loop, low)) < 10.0 and abs(_one(loop, 0.1 * low)) > 3.0 * abs(_one(loop, low)):
             low *= 0.1
     high = min(high, nyquist)
     return min(low, 1e-3 * high), high
@@ -215,11 +216,17 @@ def _wide_span(loop: Loop, low: float, high: float) -> tuple[float, float]:
 
 def _roots(function: Callable[[np.ndarray], np.ndarray], omega: np.ndarray, values: np.ndarray) -> list[float]:
     """Every sign change between grid points, found to round-off; jumps through a pole are left out."""
+
+    def value(w: float) -> float:
+        return float(function(np.array([w]))[0])
+
     found = []
     for k in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
-        root = brentq(lambda w: float(function(np.array([w]))[0]), omega[k], omega[k + 1], xtol=1e-15 * omega[k])
-        if abs(function(np.array([root]))[0]) < 1e-4:
-            found.append(float(root))
+        left, right = omega[k], omega[k + 1]
+        if value(left) * value(right) < 0 and max(abs(values[k]), abs(values[k + 1])) > NOISE:
+            root = float(brentq(value, left, right, xtol=1e-15 * left))
+            if abs(value(root)) < 1e-4:
+                found.append(root)
     return found + [float(w) for w in omega[values == 0.0]]
 
 

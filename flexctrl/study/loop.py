@@ -14,8 +14,8 @@ from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.reduction import Reduced, ReducedModel, ReducedStates
 from flexctrl.model.reduction.states import states_transfer
-from flexctrl.model.statespace import modal_first_order
 from flexctrl.model.transfer import transfer
+from flexctrl.study.channel import channel_states
 from flexctrl.study.zeros import deflated_zeros, zeros
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Loop", "open_loop"]
 
+AT_REST = 1e-8
 Curve = Callable[[np.ndarray], np.ndarray]
 
 
@@ -78,9 +79,29 @@ class Loop:
         back = gain / (1.0 + gain * self.D[0, 0])
         return np.asarray(eigvals(self.A - back * self.B @ self.C)) if len(self.A) else np.zeros(0, complex)
 
+    @cached_property
+    def rest_radius(self) -> float:
+        """Distance from s = 0 (z = 1) within which a pole is an integrator's, up to rounding."""
+        far = abs(self.poles - (1.0 if self.dt else 0.0))
+        largest = float(far.max(initial=0.0))
+        return max(1e-12 * largest, 30.0 * float(far[far < AT_REST * largest].max(initial=0.0)))
+
+    def at_rest(self, poles: np.ndarray) -> np.ndarray:
+        """Which poles are those of free motion, at s = 0 (z = 1) to rounding; shape of ``poles``."""
+        return np.asarray(abs(poles - (1.0 if self.dt else 0.0)) <= self.rest_radius)
+
     def is_stable(self, gain: float = 1.0) -> bool:
-        """Whether every closed-loop pole is inside the stability region."""
+        """Whether every closed-loop pole is inside the stability region.
+
+        Poles that stay at s = 0 (z = 1) do not count: the loop neither drives nor sees that free motion.
+
+        Parameters
+        ----------
+        gain : float
+            Loop gain k.
+        """
         poles = self.closed_poles(gain)
+        poles = poles[~self.at_rest(poles)]
         return bool((abs(poles) < 1).all() if self.dt else (poles.real < 0).all())
 
     def at(self, omega: np.ndarray) -> np.ndarray:
@@ -167,8 +188,7 @@ class _Path:
 
     @classmethod
     def of_linear(cls, linear: LinearModel) -> _Path:
-        first = modal_first_order(linear)
-        return cls(first.A, first.B, first.C, first.D, _accurate(linear), lambda: zeros(linear).finite, 0.0)
+        return cls(*channel_states(linear), _accurate(linear), lambda: zeros(linear).finite, 0.0)
 
     @classmethod
     def of_lti(cls, system: Any, input: str, output: str) -> _Path:

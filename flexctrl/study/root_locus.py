@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
 from flexctrl.errors import StructureError
-from flexctrl.study.frequency import loop_grid
+from flexctrl.study.frequency import NOISE, loop_grid
 from flexctrl.study.loop import Loop
 
 if TYPE_CHECKING:
@@ -93,14 +93,16 @@ def critical_gains(loop: Loop, locus: control.pzmap.PoleZeroData | None = None) 
     """
     locus = root_locus(loop) if locus is None else locus
     outside = _depth(locus.loci, loop.dt)
+    integrates = loop.at_rest(loop.poles).any()
     found = []
     for i, j in np.argwhere(np.sign(outside[1:-1]) * np.sign(outside[2:]) < 0):
         here, there = locus.loci[i + 1, j], locus.loci[i + 2, j]
-        if here.imag + there.imag >= 0:
+        if here.imag + there.imag >= 0 and not (integrates and loop.at_rest(np.array([here, there])).any()):
             gain, pole = _crossing(loop, (locus.gains[i + 1], locus.gains[i + 2]), (here, there))
             omega = abs(np.angle(pole)) / loop.dt if loop.dt else abs(pole.imag)
             found.append(CriticalGain(gain, omega, bool(outside[i + 2, j] > 0)))
-    return tuple(sorted((_finished(loop, c) for c in found), key=lambda c: c.gain))
+    finished = [_finished(loop, c) for c in found]
+    return tuple(sorted((c for c in finished if _is_crossing(loop, c)), key=lambda c: c.gain))
 
 
 def _checked(gains: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -202,3 +204,13 @@ def _finished(loop: Loop, rough: CriticalGain) -> CriticalGain:
     gain = -1.0 / loop.at(ends[1:]).real[0]
     good = abs(gain - rough.gain) < 1e-4 * rough.gain
     return CriticalGain(float(gain), float(ends[1]), rough.unstable_above) if good else rough
+
+
+def _is_crossing(loop: Loop, found: CriticalGain) -> bool:
+    """Whether L really passes −1/k there: a branch that runs along the boundary only trembles across it."""
+    w, nyquist = found.omega, np.pi / loop.dt if loop.dt else np.inf
+    if w <= loop.rest_radius or w >= nyquist * (1 - 1e-9):
+        return bool(abs(1 + found.gain * loop.at(np.array([w]))[0]) < 1e-4)
+    steps = 10.0 ** np.arange(-10.0, -2.0)
+    before, after = (np.sin(np.angle(loop.at(w * (1 + sign * steps)))) for sign in (-1, 1))
+    return bool(((before * after < 0) & (np.minimum(abs(before), abs(after)) > NOISE)).any())

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
 from flexctrl.model.linear import LinearModel
+from flexctrl.study.channel import Quadruple, channel_states
 
 __all__ = ["SensorChoice", "Zeros", "deflated_zeros", "sensor_choices", "zeros"]
 
-Quadruple = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 EPS = float(np.finfo(float).eps)
 
 
@@ -47,7 +47,9 @@ def zeros(linear: LinearModel, inputs: Sequence[str] | None = None, outputs: Seq
     Zeros are the s at which the Rosenbrock matrix [s²M + sC + K, −B; Cq + s Cv, D] loses rank. Those at
     infinity are deflated in scaled modal coordinates (A. Emami-Naeini, P. Van Dooren, Automatica 18
     (1982) 415–430); the finite ones are then polished on the second-order Rosenbrock matrix itself, in
-    physical coordinates, where they keep the accuracy of the entries of M, C and K.
+    physical coordinates, where they keep the accuracy of the entries of M, C and K. Free rigid-body motion
+    that the channel neither drives nor sees gives no zeros; a flexible mode of that kind gives zeros on its
+    poles.
 
     Parameters
     ----------
@@ -60,8 +62,8 @@ def zeros(linear: LinearModel, inputs: Sequence[str] | None = None, outputs: Seq
     Zeros
     """
     channel = linear.select(inputs, outputs).condense()
-    system = channel.to_ss()
-    rough = deflated_zeros(system.A, system.B, system.C, system.D)
+    A, B, C, D = channel_states(channel)
+    rough = deflated_zeros(A, B, C, D)
     upper = rough[rough.imag >= 0]
     found = np.array([_polished(channel, complex(s)) for s in upper]).reshape(-1, 2)
     finite, doubt = _without_twins(upper, found[:, 0], found[:, 1].real)
@@ -69,7 +71,7 @@ def zeros(linear: LinearModel, inputs: Sequence[str] | None = None, outputs: Seq
     finite = np.concatenate([finite, finite[mirrored].conj()])
     doubt = np.concatenate([doubt, doubt[mirrored]])
     order = np.lexsort([finite.imag, abs(finite)])
-    return Zeros(finite[order], doubt[order], system.A.shape[0] - len(finite))
+    return Zeros(finite[order], doubt[order], len(A) - len(finite))
 
 
 def _unit_gains(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> Quadruple:
@@ -227,8 +229,10 @@ def _label(linear: LinearModel, shapes: np.ndarray, omega: np.ndarray, i: int, j
     row = linear.Cq[j] if linear.Cq[j].any() else linear.Cv[j]
     share = (row @ shapes) * (column @ shapes)
     size = np.linalg.norm(row @ shapes) * np.linalg.norm(column @ shapes)
+    levels, member = np.unique(omega, return_inverse=True)
+    share = np.bincount(member, share, len(levels))  # repeated and rigid-body modes count together
     visible = abs(share) > 1e-9 * size
-    signs, at = np.sign(share[visible]), omega[visible]
+    signs, at = np.sign(share[visible]), levels[visible]
     flipped = np.flatnonzero(signs != signs[0]) if len(signs) else np.zeros(0, int)
     parallel = abs(row @ column) >= (1 - 1e-12) * np.linalg.norm(row) * np.linalg.norm(column) > 0
     mixed = linear.Cq[j].any() and linear.Cv[j].any()

@@ -123,6 +123,17 @@ def test_measured_error_is_that_of_a_dense_scan():
     np.testing.assert_allclose(reduced.error.absolute, gap, rtol=2e-3)
 
 
+def test_a_channel_silenced_by_symmetry_does_not_spoil_the_error():
+    """A force at the middle of a simply supported beam turns nothing there."""
+    beam = s.beam(10, ("w0", "w10"), beta=1e-5)
+    names = beam.coordinates
+    rows = np.eye(len(names))[[names.index("w5"), names.index("theta5")]]
+    seen = replace(beam, B=rows[:1].T, Cq=rows, Cv=0 * rows, D=np.zeros((2, 1)), outputs=("w", "theta"))
+    error = seen.reduce(ModalTruncation(8, static_correction=True)).error
+    assert error.relative[1, 0] < 1e-6
+    assert error.worst == error.relative[0, 0]
+
+
 def test_participation_leaves_out_what_the_sensor_cannot_see():
     """At the middle of a simply supported beam the even modes stand still."""
     beam = s.beam(10, ("w0", "w10"), beta=1e-5)

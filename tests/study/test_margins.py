@@ -81,6 +81,17 @@ def test_flexible_loop_of_a_hundred_and_thirty_states_where_python_control_gives
         ct.stability_margins(linear.select(outputs=["tip"]).to_ss() * controller)
 
 
+def test_free_motion_that_the_loop_does_not_touch_does_not_count():
+    """Sway feedback of a crane: the trolley's double integrator is outside the loop, not an instability."""
+    loop = open_loop(crane(1.0, 0.5, 2.0), ct.tf([-0.3, 0], [1]), "force", "sway")
+    assert len(loop.A) == 2
+    assert margins(loop).stable
+    assert not margins(open_loop(crane(1.0, 0.5, 2.0), ct.tf([0.3, 0], [1]), "force", "sway")).stable
+    # the same through python-control, where the integrators stay in the states
+    states = crane(1.0, 0.5, 2.0).select(outputs=["sway"]).to_ss() * ct.tf([-0.3, 0], [0.01, 1])
+    assert open_loop(states).is_stable()
+
+
 def test_delay_margin_is_where_a_delayed_loop_turns_unstable():
     """A third-order loop with a high-order Padé delay on either side of the margin."""
     plant_ = ct.tf([2.0], [1, 3, 2, 0])

@@ -46,6 +46,20 @@ def test_a_loop_that_must_have_gain_to_be_stable():
     assert not found[0].unstable_above
 
 
+def test_a_branch_along_the_boundary_is_no_crossing():
+    """Double integrator with lead: stable at every gain, tangent to the axis at none but 0."""
+    body = plant([[1.0]], [[0.0]], [[1.0]], [[1.0]])
+    assert critical_gains(open_loop(body, ct.tf([1.0, 1.0], [1]))) == ()
+    assert critical_gains(open_loop(body, ct.tf([1.0, 1.0], [1e-3, 1]))) == ()
+
+
+def test_a_pole_through_the_origin_is_a_crossing():
+    """k/(s + 1) with positive feedback, written as −k: s = k − 1."""
+    found = critical_gains(open_loop(ct.ss(ct.tf([-1.0], [1, 1]))))
+    assert len(found) == 1
+    np.testing.assert_allclose([found[0].gain, found[0].omega], [1.0, 0.0], atol=1e-9)
+
+
 def test_collocated_rate_feedback_never_destabilises():
     linear = cantilever(10, beta=1e-5)
     locus = root_locus(open_loop(linear, ct.tf([1, 0], [1]), "force", "tip"))

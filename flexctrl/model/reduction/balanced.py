@@ -11,7 +11,7 @@ from flexctrl.errors import ReductionError
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.modes import COMPLETE, Modes
 from flexctrl.model.reduction.gramian import balance
-from flexctrl.model.reduction.low_frequency import low_frequency
+from flexctrl.model.reduction.low_frequency import low_frequency, undamped
 from flexctrl.model.reduction.modal import modal_model
 from flexctrl.model.reduction.states import ReducedStates, Triple
 from flexctrl.model.statespace import FirstOrder, modal_first_order
@@ -115,7 +115,9 @@ def _split(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray]:
     first = modal_first_order(full, few)
     missing = np.zeros_like(first.D) if few is None else _missing_static(full, few)
     modes = full.modes() if few is None else few
-    free, rest = _free_motion_apart(first, 2 * modes.unstable + 2 * np.arange(modes.rigid))
+    position = 2 * modes.unstable + 2 * np.arange(modes.rigid)
+    loose = undamped(full, modes.shapes[:, modes.unstable : modes.unstable + modes.rigid])
+    free, rest = _free_motion_apart(first, position[loose], position[~loose])
     integrators, autonomous = _integrators_apart(rest)
     marginal, stable = _marginal_apart(autonomous)
     return _joined(free, integrators, marginal), stable, first.D + missing
@@ -132,15 +134,14 @@ class _Coupled:
     H: np.ndarray
 
 
-def _free_motion_apart(first: FirstOrder, position: np.ndarray) -> tuple[Triple, _Coupled]:
+def _free_motion_apart(first: FirstOrder, free: np.ndarray, dragged: np.ndarray) -> tuple[Triple, _Coupled]:
     """Undamped rigid-body motion, which nothing couples to, apart from the rest."""
     A, B, C = first.A, first.B, first.C
-    free = position[[not A[i + 1].any() and np.count_nonzero(A[:, i + 1]) == 1 for i in position]]
     pairs = np.concatenate([free, free + 1])
-    dragged = np.setdiff1d(position, free)
     z = np.setdiff1d(np.arange(len(A)), np.concatenate([pairs, dragged]))
-    alone = Triple(A[np.ix_(pairs, pairs)], B[pairs], C[:, pairs])
-    return alone, _Coupled(A[np.ix_(z, z)], B[z], C[:, z], A[np.ix_(dragged, z)], C[:, dragged])
+    double = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(len(free)))
+    rest = _Coupled(A[np.ix_(z, z)], B[z], C[:, z], A[np.ix_(dragged, z)], C[:, dragged])
+    return Triple(double, B[pairs] * (np.arange(len(pairs)) >= len(free))[:, None], C[:, pairs]), rest
 
 
 def _integrators_apart(rest: _Coupled) -> tuple[Triple, Triple]:

@@ -13,9 +13,9 @@ from scipy.optimize import minimize_scalar
 from flexctrl.errors import ReductionError
 from flexctrl.model.grid import peak_grid, refined
 from flexctrl.model.linear import LinearModel
-from flexctrl.model.modes import COMPLETE
+from flexctrl.model.modes import COMPLETE, Modes
 from flexctrl.model.poles import second_order_roots
-from flexctrl.model.reduction.low_frequency import low_frequency, rigid_basis
+from flexctrl.model.reduction.low_frequency import low_frequency, rigid_basis, undamped
 from flexctrl.model.transfer import Transfer, transfer
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ __all__ = ["ErrorReport", "RelativeError", "error_report", "smallest"]
 
 DENSE_POLES = 300
 MOST_POINTS = 6000
+SILENT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,8 @@ class ErrorReport:
     absolute : numpy.ndarray, shape (n_outputs, n_inputs)
         max |G − G_r| over the band, output unit per input unit.
     relative : numpy.ndarray, shape (n_outputs, n_inputs)
-        The same over max |G − G₋₂/s² − G₋₁/s|, the peak of the response without its rigid-body motion.
+        The same over max |G − G₋₂/s² − G₋₁/s|, the peak of the response without its rigid-body motion (for a
+        channel that is nearly silent, by symmetry or by place: over 1e-4 of what its input and output could do).
     at : numpy.ndarray, shape (n_outputs, n_inputs)
         Where, rad/s.
     up_to : float
@@ -93,15 +95,18 @@ class Reference:
 
     def __init__(self, full: LinearModel, top: float) -> None:
         self.full, self.top = full, top
-        self.poles = _poles_below(full, top)
-        self.low = 0.01 * min(abs(self.poles[self.poles != 0]), default=1.0)
-        self.low = min(self.low, 0.1 * top)
+        modes = _modes_below(full, top)
+        self.poles = second_order_roots(modes.decay, modes.omega_squared).ravel()
+        if len(full.coordinates) <= DENSE_POLES:
+            self.poles = full.damped_poles()
+        self.low = min(0.1 * _slowest(full, modes), 0.1 * top)
         self.evaluate = transfer(full, 1.001 * top)
         self.omega, self.values = refined(self.evaluate, peak_grid(self.poles, (self.low, top)), MOST_POINTS)
         expansion = low_frequency(full, rigid_basis(full))
         s = 1j * self.omega
         rigid = expansion.double[:, :, None] / s**2 + expansion.single[:, :, None] / s
-        self.peak = abs(self.values - rigid).max(axis=-1)
+        silence = SILENT * _potential(modes)
+        self.peak = np.maximum(abs(self.values - rigid).max(axis=-1), silence)
 
     def compare(self, reduced: Reduced) -> ErrorReport:
         """Measure a reduced model against this response."""
@@ -218,10 +223,25 @@ def _band(full: LinearModel, top: float, kept: float = np.inf) -> float:
     return 3.0 * kept
 
 
-def _poles_below(full: LinearModel, top: float) -> np.ndarray:
-    if len(full.coordinates) <= DENSE_POLES:
-        return full.damped_poles()
+def _modes_below(full: LinearModel, top: float) -> Modes:
     modes = full.modes()
     while len(full.coordinates) > COMPLETE and modes.omega[-1] < top and len(modes) < COMPLETE:
         modes = full.modes(2 * len(modes))
-    return second_order_roots(modes.decay, modes.omega_squared).ravel()
+    return modes
+
+
+def _slowest(full: LinearModel, modes: Modes) -> float:
+    """The lowest frequency, or rate of a damped rigid-body mode, that is not zero."""
+    zero = slice(modes.unstable, modes.unstable + modes.rigid)
+    dragged = ~undamped(full, modes.shapes[:, zero])
+    rates = np.concatenate([np.sqrt(abs(np.delete(modes.omega_squared, zero))), modes.decay[zero][dragged]])
+    return float(rates.min(initial=np.inf)) if rates.size else 1.0
+
+
+def _potential(modes: Modes) -> np.ndarray:
+    """Peak that a channel would have if its input and output met in the modes where each is strongest."""
+    bent = modes.select(np.arange(len(modes))[modes.flexible])
+    sharp = 1.0 / (2 * np.maximum(bent.damping, 1e-4) * np.maximum(bent.omega_squared, np.finfo(float).tiny))
+    seen = (abs(bent.output_gain) ** 2 + abs(bent.omega * bent.output_rate_gain) ** 2) * sharp
+    moved = abs(bent.input_gain.T) ** 2 * sharp
+    return np.sqrt(np.outer(seen.max(axis=1, initial=0.0), moved.max(axis=1, initial=0.0)))

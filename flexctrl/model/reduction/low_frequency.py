@@ -11,7 +11,9 @@ from scipy.sparse.linalg import splu
 
 from flexctrl.model.linear import LinearModel
 
-__all__ = ["LowFrequency", "flexibility", "low_frequency", "rigid_basis"]
+__all__ = ["LowFrequency", "flexibility", "low_frequency", "rigid_basis", "undamped"]
+
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -105,14 +107,37 @@ def rigid_basis(full: LinearModel) -> np.ndarray:
     return modes.shapes[:, modes.unstable : modes.unstable + modes.rigid]
 
 
+def undamped(linear: LinearModel, rigid: np.ndarray) -> np.ndarray:
+    """Which rigid-body modes no damper resists, beyond round-off.
+
+    Parameters
+    ----------
+    linear : LinearModel
+    rigid : numpy.ndarray, shape (n, r)
+        Rigid-body modes with diagonal Rᵀ C R.
+
+    Returns
+    -------
+    numpy.ndarray of bool, shape (r,)
+        Where rᵀ C r is lost in the rounding of its terms, C r = 0 is meant (C is semidefinite). With
+        gyroscopic terms (C not symmetric) C r itself must be lost.
+    """
+    C, size = linear.C, abs(rigid)
+    terms, force = abs(C) @ size, abs(C @ rigid)
+    if abs(C - C.T).max() <= 1e-9 * abs(C).max():
+        return np.asarray(abs((rigid * (C @ rigid)).sum(axis=0)) <= ROUNDING * (size * terms).sum(axis=0))
+    scale = np.sqrt(np.maximum(linear.M.diagonal(), 1e-12 * linear.M.diagonal().max()))[:, None]
+    return np.asarray((force / scale).max(axis=0, initial=0.0) <= ROUNDING * (terms / scale).max(initial=0.0))
+
+
 def _displacement_series(
     linear: LinearModel, rigid: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """X₋₂, X₋₁, X₀, each affine in the rigid amplitudes a₋₂, a₋₁, a₀, a₁ (one block of columns each)."""
     R = _damping_axes(linear, rigid)
     r, m, M, C = R.shape[1], linear.B.shape[1], linear.M, linear.C
-    left = _without_noise(C.T, R, M).T
-    right = _without_noise(C, R, M)
+    resisted = ~undamped(linear, R)
+    left, right = (C.T @ R * resisted).T, C @ R * resisted
     a2, a1, a0, a_next = np.eye(4 * r, 4 * r + m).reshape(4, r, 4 * r + m)
     force = linear.B @ np.eye(m, 4 * r + m, 4 * r)
     e1 = solve(-right @ a2)
@@ -136,14 +161,6 @@ def _damping_axes(linear: LinearModel, rigid: np.ndarray) -> np.ndarray:
     """Rotate the rigid-body modes so that damped and undamped motions are separate."""
     damping = rigid.T @ (linear.C @ rigid)
     return rigid @ np.linalg.eigh(damping + damping.T)[1]
-
-
-def _without_noise(C: sp.spmatrix, R: np.ndarray, M: sp.spmatrix) -> np.ndarray:
-    """C R with zero columns for the motions that no damper resists, beyond round-off."""
-    size = np.sqrt(np.maximum(M.diagonal(), 1e-12 * M.diagonal().max()))[:, None]
-    force = C @ R
-    rounding = 1e-12 * (abs(C) @ abs(R) / size).max(initial=0.0)
-    return np.asarray(np.where(abs(force / size).max(axis=0) > rounding, force, 0.0))
 
 
 def _equilibrated_lstsq(A: np.ndarray, b: np.ndarray) -> np.ndarray:

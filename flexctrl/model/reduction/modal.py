@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from flexctrl.errors import ReductionError
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.modes import COMPLETE, Modes
+from flexctrl.model.reduction.low_frequency import undamped
 from flexctrl.model.reduction.result import ReducedModel, corrected
 from flexctrl.model.reduction.selection import BelowFrequency, Lowest, Selection
 
@@ -92,15 +93,20 @@ def _chosen(modes: Modes, rule: Selection) -> np.ndarray:
 
 
 def modal_model(full: LinearModel, modes: Modes, chosen: np.ndarray) -> LinearModel:
-    """Projection with M = I and K = Ω² put in exactly; a flexible mode keeps its number in the full model."""
+    """Projection with M = I, K = Ω² and free motion exact; a flexible mode keeps its number in the full model."""
     if not len(chosen):
         raise ReductionError("no mode is kept; ask for more modes or a higher frequency")
     first = {"unstable": 0, "rigid": modes.unstable, "flexible": modes.unstable + modes.rigid}
     label = {"unstable": "unstable", "rigid": "rigid", "flexible": "mode"}
     names = [f"{label[modes.kinds[i]]}{i - first[modes.kinds[i]] + 1}" for i in chosen]
+    reduced = full.projected(modes.shapes[:, chosen], names)
+    zero = slice(modes.unstable, modes.unstable + modes.rigid)
+    resisted = np.ones(len(names))
+    resisted[zero] = ~undamped(full, modes.shapes[:, zero])
     return replace(
-        full.projected(modes.shapes[:, chosen], names),
+        reduced,
         M=sp.identity(len(names), format="csc"),
+        C=sp.csc_matrix(reduced.C.multiply(np.outer(resisted, resisted))),
         K=sp.csc_matrix(np.diag(modes.omega_squared[chosen])),
     )
 

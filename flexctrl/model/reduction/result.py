@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.model.linear import LinearModel
-from flexctrl.model.reduction.low_frequency import low_frequency
+from flexctrl.model.reduction.low_frequency import low_frequency, undamped
 from flexctrl.model.transfer import Transfer, transfer
 
 if TYPE_CHECKING:
@@ -199,9 +199,17 @@ def corrected(full: LinearModel, reduced: LinearModel, rigid: np.ndarray, rigid_
 def _with_exact_rigid_motion(
     full: LinearModel, reduced: LinearModel, basis: np.ndarray, rigid: np.ndarray
 ) -> LinearModel:
-    """Take the round-off of the projection out of K R = 0, zeros exact."""
-    rest = np.eye(len(rigid)) - rigid @ (reduced.M @ rigid).T
-    K = rest.T @ (reduced.K @ rest)
-    rounding = np.finfo(float).eps * (abs(basis).T @ (abs(full.K) @ abs(basis)))
-    K = np.where(abs(K) > 1e-3 * rounding, 0.5 * (K + K.T), 0.0)
-    return replace(reduced, K=sp.csc_matrix(K))
+    """Take the round-off of the projection out of K R = 0, and out of C R = 0 where no damper resists."""
+    K = _deflated(full.K, reduced.K, reduced.M, basis, rigid)
+    C = _deflated(full.C, reduced.C, reduced.M, basis, rigid[:, undamped(full, basis @ rigid)])
+    return replace(reduced, C=C, K=K)
+
+
+def _deflated(
+    full: sp.spmatrix, reduced: sp.spmatrix, M: sp.spmatrix, basis: np.ndarray, rigid: np.ndarray
+) -> sp.csc_matrix:
+    """The matrix with A R = 0 exact; what is left of its rounding elsewhere stays."""
+    rest = np.eye(len(rigid)) - rigid @ (M @ rigid).T
+    A = rest.T @ (reduced @ rest)
+    rounding = np.finfo(float).eps * (abs(basis).T @ (abs(full) @ abs(basis)))
+    return sp.csc_matrix(np.where(abs(A) > 1e-3 * rounding, A, 0.0))
