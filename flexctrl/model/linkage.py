@@ -152,6 +152,19 @@ class Linkage:
 
         return _callable("grip", [self._pose], ca.vec(ca.densify(self._loop_slopes(self._pose)[1])))
 
+    @cached_property
+    def gaps(self) -> Callable[..., np.ndarray]:
+        """Pose → how far loops are open [m or rad]."""
+        return _callable("gaps", [self._pose], self._gaps(self._pose))
+
+    def placed(self, pose: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Return the pose after a step of any size, with loops closed as far as round-off lets them be."""
+        new, gap = self.place(pose, step), np.inf
+        floor = 1e-14 * max(1.0, np.abs(self.rest).max(initial=0.0))
+        while self.loops and floor < (now := np.abs(self.gaps(new)).max()) < 0.5 * gap:
+            new, gap = self.place(new, np.zeros(self.free)), now
+        return new
+
     def matrix_at(self, pose: np.ndarray) -> np.ndarray:
         """Return T at a pose."""
         return self.matrix(pose).reshape(self.free, self._raw.shape[0]).T

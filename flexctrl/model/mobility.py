@@ -91,7 +91,6 @@ def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], backend:
         linked=number[linked],
         rest=State(x, R, zero, zero, np.zeros(len(structure.drives))),
         notes=loops.notes,
-        closures=loops.closures,
     )
 
 

@@ -18,7 +18,6 @@ from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.linkage import Linkage
 from flexctrl.structure.drives import Drive, RotaryDrive
-from flexctrl.structure.ties import Closure
 
 DENSE_UP_TO = 60
 """Degrees of freedom up to which matrices are worked as plain arrays."""
@@ -92,8 +91,6 @@ class Motion:
     rest : State
     notes : tuple of str
         How loops of rigid parts are closed.
-    closures : tuple of Closure
-        The conditions that close them; watched during a run.
     """
 
     names: tuple[str, ...]
@@ -106,7 +103,6 @@ class Motion:
     linked: np.ndarray
     rest: State
     notes: tuple[str, ...]
-    closures: tuple[Closure, ...]
 
     @property
     def n(self) -> int:
@@ -290,14 +286,9 @@ class Motion:
 
     def closure_error(self, state: State) -> float:
         """Return how far the conditions that close rigid loops are violated [m or rad]."""
-        worst = 0.0
-        for c in self.closures:
-            if c.freedom < 3:
-                gap = state.x[c.node, c.freedom] - self.rest.x[c.node, c.freedom]
-                if c.other >= 0:
-                    gap -= state.x[c.other, c.freedom] - self.rest.x[c.other, c.freedom]
-                worst = max(worst, abs(float(gap)))
-        return worst
+        if not self.linkage.loops:
+            return 0.0
+        return float(np.abs(self.linkage.gaps(self._pose(state.x, state.R))).max())
 
 
 def _select(numbers: np.ndarray, n: int) -> sp.csr_matrix:
