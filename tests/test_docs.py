@@ -52,15 +52,6 @@ def test_the_readmes_tour_prints_what_it_says(tmp_path: Path) -> None:
     assert _printed_by(script) == shown
 
 
-@pytest.mark.slow
-def test_the_tutorial_prints_what_it_says() -> None:
-    printed = _printed_by(ROOT / "examples" / "cantilever.py")
-    shown = _blocks((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"), "text")
-    assert len(shown) == 6
-    for block in shown:
-        assert block in printed
-
-
 @pytest.mark.parametrize("page", ["README.md", "docs/command_line.md"])
 def test_the_commands_are_listed_where_they_are_described(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
