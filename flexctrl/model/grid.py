@@ -11,6 +11,7 @@ __all__ = ["peak_grid", "refined"]
 OFFSETS = np.array([0, 0.2, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3, 4, 5, 7, 10, 14, 20])
 PER_DECADE = 40
 UNDAMPED = 1e-6
+SHARP = 1e-9
 CLOSEST = 1e-7
 
 
@@ -27,17 +28,18 @@ def peak_grid(poles: np.ndarray, span: tuple[float, float]) -> np.ndarray:
     Returns
     -------
     numpy.ndarray
-        Ascending, rad/s. An undamped pole itself is left out, its flanks are in.
+        Ascending, rad/s. A pole without damping (or with a mere rounding of it) is left out, its flanks are in.
     """
     low, high = span
     count = max(2, int(np.ceil(PER_DECADE * np.log10(high / low))) + 1)
     points = [np.geomspace(low, high, count)]
     for pole in poles[poles.imag > 0]:
         width = max(abs(pole.real), UNDAMPED * abs(pole))
-        offsets = OFFSETS[1:] if pole.real == 0.0 else OFFSETS
+        sharp = abs(pole.real) <= SHARP * abs(pole)
+        offsets = OFFSETS[1:] if sharp else OFFSETS
         points += [pole.imag + width * offsets, pole.imag - width * offsets]
         crest = pole.imag**2 - pole.real**2
-        if pole.real != 0.0 and crest > 0.0:
+        if not sharp and crest > 0.0:
             points.append(np.array([np.sqrt(crest)]))
     grid = np.unique(np.concatenate(points))
     return grid[(grid >= low) & (grid <= high)]
@@ -66,7 +68,8 @@ def refined(evaluate: Transfer, omega: np.ndarray, most: int, tolerance: float =
     open_left = np.arange(omega.size - 1)
     while open_left.size and omega.size + open_left.size <= most:
         left, right = omega[open_left], omega[open_left + 1]
-        middle = np.sqrt(left * right)
+        # off the middle where the interval is narrow: between the flanks of an undamped pole lies the pole itself
+        middle = np.where(right - left < 1e-5 * left, left + 0.47 * (right - left), np.sqrt(left * right))
         new = evaluate(1j * middle)
         rough = _misread(H[..., open_left], new, H[..., open_left + 1]) > tolerance
         rough &= (right - left) > CLOSEST * left
