@@ -21,6 +21,7 @@ from flexctrl.model.motion import Motion, State
 from flexctrl.model.signals import Signals, signals_of
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
+from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
 
@@ -138,11 +139,13 @@ class Model:
         StructureError
             For an unknown name.
         """
+        if not isinstance(inputs, Mapping):
+            raise StructureError(f"model: inputs = {inputs!r}; expected a mapping of input names to values")
         u = np.zeros(len(self.inputs))
         for name, value in inputs.items():
             if name not in self.inputs:
                 raise StructureError(f"model has no input {name!r}{did_you_mean(name, self.inputs)}")
-            u[self.inputs.index(name)] = value
+            u[self.inputs.index(name)] = check_finite(value, f"input {name!r}", "model")
         return u
 
     def loads(self, state: State, u: np.ndarray) -> np.ndarray:
@@ -220,14 +223,16 @@ class Model:
         Raises
         ------
         StructureError
-            For an unknown coordinate.
+            For an unknown coordinate, or what is no finite number.
         """
         step = np.zeros(self.n)
         if isinstance(q, Mapping):
             for name, value in q.items():
-                step[self.coordinate(name)] = value
-        else:
+                step[self.coordinate(name)] = check_finite(value, f"coordinate {name!r}", "model")
+        elif np.shape(q) == step.shape and np.isfinite(q).all():
             step[:] = q
+        else:
+            raise StructureError(f"displace: expected {self.n} finite numbers, one a coordinate, got {q!r}")
         return self.advance(self.rest, step, np.zeros(self.n), 0.0)
 
     def coordinate(self, name: str) -> int:
