@@ -90,7 +90,7 @@ def test_noncollocated_zeros_and_their_uncertainty(elements, output):
 
 def test_python_control_misses_what_is_found_here():
     """Design fact: in [q; q'] form SLICOT's non-collocated zeros of a stiff beam are wrong, without a word."""
-    pytest.importorskip("slycot", reason="scipy's zeros, which control takes without the extra [slicot], are right here")
+    pytest.importorskip("slycot", reason="without the extra [slicot] control takes scipy's zeros, which are right")
     from flexctrl.model.statespace import PhysicalForm
 
     linear = cantilever(20).select(outputs=["middle"])
