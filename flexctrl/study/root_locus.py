@@ -23,6 +23,7 @@ START = 50
 TURN = 0.35
 SHORT = 0.02
 CLOSEST = 1e-4
+TREMBLE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,8 @@ def critical_gains(loop: Loop, locus: control.pzmap.PoleZeroData | None = None) 
     """
     locus = root_locus(loop) if locus is None else locus
     outside = _depth(locus.loci, loop.dt)
+    # poles of an undamped machine run along the boundary and only tremble by their rounding
+    outside = np.where(abs(outside) > TREMBLE * abs(locus.loci), outside, 0.0)
     integrates = loop.at_rest(loop.poles).any()
     found = []
     for i, j in np.argwhere(np.sign(outside[1:-1]) * np.sign(outside[2:]) < 0):
