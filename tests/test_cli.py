@@ -278,3 +278,26 @@ def test_json_knows_no_nan_and_no_numpy():
     strange = {"a": np.float64(np.nan), "b": np.array([1.0, np.inf]), "c": 1 + 2j, "d": np.int64(3), "e": (np.True_,)}
     assert plain(strange) == {"a": None, "b": [1.0, None], "c": [1.0, 2.0], "d": 3, "e": [True]}
     json.dumps(plain(strange), allow_nan=False)
+
+
+def test_progress_is_shown_on_a_terminal_and_wiped_away(monkeypatch, capsys):
+    from flexctrl.cli.progress import progress
+
+    with progress("crane") as tell:
+        assert tell is None  # the error stream of a test is no terminal
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with progress("crane") as tell:
+        tell(0.25)
+    shown = capsys.readouterr().err
+    assert "crane" in shown
+    assert "25 %" in shown
+    assert shown.endswith("\r\033[K")
+
+
+def test_a_reader_that_leaves_early_is_no_error(scene):
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-m", "flexctrl.cli", "table", str(scene)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0

@@ -115,7 +115,7 @@ def write_picture(out: Path | None, name: str, draw: Callable[[Figure], object],
     if out is not None:
         figure = Figure(figsize=size)
         draw(figure)
-        figure.savefig(out / name, dpi=150)
+        figure.savefig(out / name, dpi=150, bbox_inches="tight", pad_inches=0.15)
 
 
 __all__ = ["Answer", "grid", "plain", "write_csv", "write_json", "write_picture"]

@@ -168,6 +168,7 @@ def comparison_curves(
         _curve(ax, comparison.rigid, name, color=RIGID, linewidth=1.4, linestyle=(0, (5, 2)), label="rigid")
         _label(ax, name, unit)
     if len(signals):
+        axes[0].figure.align_ylabels()
         axes[0].legend(frameon=False, fontsize=9, labelcolor=INK, ncols=2, loc="best")
     return np.asarray(axes)
 

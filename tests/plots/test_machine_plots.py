@@ -1,0 +1,114 @@
+"""Pictures of machines, modes and runs show what they should."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import flexctrl as fc
+from flexctrl.cranes import bridge_crane, ceiling_crane, flexible_arm
+from flexctrl.plots.machine import add_machine_axes, best_plane, draw_machine
+from flexctrl.plots.modes import mode_label, mode_pose, modes_figure
+from flexctrl.plots.run import comparison_curves, panels, run_curves, units
+from flexctrl.study.compare import Comparison
+
+EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation())
+
+
+def written(ax) -> set[str]:
+    return {text.get_text() for text in ax.texts}
+
+
+def test_nodes_at_one_place_share_their_numbers():
+    ax = draw_machine(add_machine_axes(Figure(), ceiling_crane()), ceiling_crane())
+    assert written(ax) == {"1", "2", "3", "4, 8", "5", "6", "7", "9, 10", "11, 12", "13"}
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == ["support", "pin"]
+
+
+def test_drives_are_named():
+    ax = draw_machine(add_machine_axes(Figure(), flexible_arm()), flexible_arm(), numbers=False)
+    assert written(ax) == {"shoulder_drive", "elbow_drive"}
+
+
+def test_the_plane_of_a_machine():
+    assert best_plane(ceiling_crane()) == (1, 2)
+    assert best_plane(flexible_arm()) == (0, 1)  # a line, looked at along its joints' axes
+    model = fc.assemble(bridge_crane(), EFFECTS)
+    assert best_plane(bridge_crane(), [model.displace({"girder_0_u": 2.0})]) is None
+
+
+def test_a_machine_that_moves_out_of_its_plane_is_drawn_in_space():
+    model = fc.assemble(bridge_crane(), EFFECTS)
+    moved = model.displace({"girder_0_u": 2.0})
+    ax = add_machine_axes(Figure(), bridge_crane(), [moved])
+    assert ax.name == "3d"
+    draw_machine(ax, bridge_crane(), moved)
+    sizes = np.diff([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1)[:, 0]
+    np.testing.assert_allclose(ax._box_aspect / ax._box_aspect.max(), sizes / sizes.max())  # equal scales
+
+
+def test_a_beam_is_drawn_along_its_turned_ends():
+    beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), fc.Section(1e6, 10, 10, 8, 1, 1e-3))
+    clamped = fc.Structure([beam], [fc.Support(beam.start)], inputs=[fc.Torque("bend", beam.end, "z")])
+    model = fc.assemble(clamped, EFFECTS[1:])
+    state = fc.equilibrium(model, inputs={"bend": 10 * 0.6}).state  # κ L = 0.6: a circular arc
+    ax = Figure().add_subplot()
+    draw_machine(ax, clamped.with_(name="arc"), state, numbers=False, symbols=False)
+    x, z = ax.lines[0].get_xdata(), ax.lines[0].get_ydata()
+    assert best_plane(clamped) == (0, 2)
+    assert np.ptp(z) == 0.0  # the picture's plane is that of the machine as drawn
+    assert x[-1] == pytest.approx(state.x[1, 0])
+
+
+def test_mode_shapes_are_as_large_as_asked_and_small_turns():
+    model = fc.assemble(ceiling_crane(), EFFECTS)
+    rest = fc.equilibrium(model)
+    linear = fc.linearize(model, at=rest)
+    modes = linear.modes()
+    for k in (0, 6, 12):
+        pose = mode_pose(model, linear, rest.state, modes.shapes[:, k], fraction=0.1)
+        moved = np.abs(pose.x - rest.state.x).max()
+        assert moved == pytest.approx(0.1 * 6.0, rel=1e-9) or moved < 1e-9  # a link spins about itself
+    axes = modes_figure(Figure(), model, linear, rest.state, modes, (5, 6))
+    assert [ax.get_title() for ax in axes] == [mode_label(modes, 5), mode_label(modes, 6)]
+    assert "Hz" in mode_label(modes, 6)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    models = fc.assemble(ceiling_crane(), EFFECTS), fc.assemble(ceiling_crane(), fc.rigid(EFFECTS))
+    method = fc.GeneralizedAlpha(1e-3)
+    return [fc.simulate(m, until=0.01, inputs={"push": 500.0}, method=method, every=1e-3) for m in models]
+
+
+def test_curves_are_the_runs(runs):
+    flexible, rigid = runs
+    axes = panels(Figure(), 2)
+    comparison_curves(axes, Comparison.between(flexible, rigid), ("travel", "push"), units(ceiling_crane()))
+    solid, dashed = axes[0].lines
+    np.testing.assert_array_equal(solid.get_ydata(), flexible["travel"])
+    np.testing.assert_array_equal(dashed.get_ydata(), rigid["travel"])
+    assert (solid.get_linestyle(), dashed.get_linestyle()) == ("-", "--")
+    assert axes[0].get_ylabel() == "travel (m)"
+    assert axes[1].get_ylabel() == "push (N)"
+    assert [t.get_text() for t in axes[0].get_legend().get_texts()] == ["flexible", "rigid"]
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 7])
+def test_panels_are_as_many_as_asked(count):
+    figure = Figure()
+    axes = panels(figure, count)
+    assert len(axes) == count
+    assert sum(ax.get_visible() for ax in figure.axes) == count
+
+
+def test_a_run_draws_itself(runs):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    axes = runs[0].plot()
+    assert [ax.get_ylabel() for ax in axes] == ["x1_minus_x4", "load_z", "travel"]
+    run_curves(axes[:1], runs[0], ("load_z",))
+    figure = Comparison.between(*runs).plot(("load_z",))
+    assert len(figure.axes) == 1

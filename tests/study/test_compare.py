@@ -1,0 +1,82 @@
+"""Numbers of curves, dominant frequencies, and rigid against flexible."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.errors import StructureError
+from flexctrl.study.compare import Comparison, compare, dominant_frequency, numbers
+
+
+def test_numbers_of_a_sine_on_uneven_instants():
+    t = np.sort(np.random.default_rng(1).uniform(0.0, 2.0, 4000))
+    t[0], t[-1] = 0.0, 2.0
+    found = numbers(t, 3.0 * np.sin(2 * np.pi * 2.0 * t))
+    assert found.rms == pytest.approx(3.0 / np.sqrt(2.0), rel=1e-4)
+    assert found.max_abs == pytest.approx(3.0, rel=1e-4)
+    assert found.final == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [1.7, 5.03, 12.4, 31.7])
+@pytest.mark.parametrize("drift", [0.0, 4.0])
+def test_the_dominant_frequency_of_an_oscillation_on_a_slope(frequency, drift):
+    t = np.linspace(0.0, 3.0, 900)
+    y = 2.0 + drift * t + 0.3 * np.cos(2 * np.pi * frequency * t + 0.4) + 0.05 * np.sin(2 * np.pi * 3.1 * frequency * t)
+    assert dominant_frequency(t, y) == pytest.approx(frequency, rel=5e-3)
+
+
+@pytest.mark.parametrize("curve", [np.zeros(50), np.linspace(0, 3, 50), np.linspace(0, 1, 50) ** 2, np.ones(2)])
+def test_what_does_not_oscillate_has_no_frequency(curve):
+    assert dominant_frequency(np.linspace(0.0, 1.0, len(curve)), curve) == 0.0
+
+
+def bouncing() -> fc.Structure:
+    """A mass on a rope: rigid it stays, flexible it bounces at √(k/m) under a step of its weight."""
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -2), EA=4e4)
+    load = fc.PointMass("load", rope.end, 5.0)
+    joints = [fc.Support(rope.start), fc.Pin(rope.end, load.node)]
+    outputs = [fc.Position("height", load.node, "z")]
+    return fc.Structure([rope, load], joints, outputs=outputs, name="bouncing")
+
+
+EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation())
+
+
+def test_a_dropped_load_bounces_by_twice_its_static_sink():
+    model = fc.assemble(bouncing(), EFFECTS)
+    told = []
+    found = compare(model, until=0.6, method=fc.GeneralizedAlpha(5e-4, 1.0), every=1e-3, progress=told.append)
+    height, sink, hertz = found["height"], 5.0 * 9.81 * 2.0 / 4e4, np.sqrt(4e4 / 2.0 / 5.0) / (2 * np.pi)
+    assert height.rigid.final == -2.0
+    assert height.max_difference == pytest.approx(2.0 * sink, rel=1e-3)
+    assert height.frequency_hz == pytest.approx(hertz, rel=5e-3)
+    assert height.rigid_frequency_hz == 0.0
+    assert found.finished
+    assert told == sorted(told)
+    assert "height" in str(found)
+
+
+def test_a_model_that_starts_at_rest_has_a_twin_that_does():
+    model = fc.assemble(bouncing(), EFFECTS)
+    found = compare(model, until=0.02, start=fc.equilibrium(model), method=fc.GeneralizedAlpha(1e-3))
+    assert found["height"].max_difference == pytest.approx(5.0 * 9.81 * 2.0 / 4e4, rel=1e-6)
+    assert found["height"].frequency_hz == 0.0
+
+
+def test_runs_of_different_machines_are_not_compared():
+    model = fc.assemble(bouncing(), EFFECTS)
+    run = fc.simulate(model, until=1e-3)
+    other = fc.assemble(bouncing().with_(outputs=[]), EFFECTS)
+    with pytest.raises(StructureError, match="different signals"):
+        Comparison.between(run, fc.simulate(other, until=1e-3))
+
+
+def test_saved_columns_are_both_runs(tmp_path):
+    model = fc.assemble(bouncing(), EFFECTS)
+    found = compare(model, until=0.05, method=fc.GeneralizedAlpha(1e-3), every=1e-3)
+    found.save_csv(tmp_path / "both.csv")
+    columns = np.genfromtxt(tmp_path / "both.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(columns["height"], found.flexible["height"])
+    np.testing.assert_allclose(columns["height_rigid"], -2.0)
