@@ -58,12 +58,14 @@ def _data(
             data[name] = {"responds": False}
             continue
         loop, locus = loops[name], loci[name]
+        marginal = loop.is_marginal()
         data[name] = {
             "responds": True,
             "poles": in_s(locus.poles, loop.dt),
             "zeros": in_s(locus.zeros, loop.dt),
             "closed_loop_poles": in_s(loop.closed_poles(), loop.dt),
-            "stable": loop.is_stable(),
+            "stable": loop.is_stable() and not marginal,
+            "marginal": marginal,
             "critical_gains": [
                 {"gain": c.gain, "hz": c.omega / (2 * np.pi), "unstable_above": c.unstable_above}
                 for c in critical[name]
@@ -129,7 +131,7 @@ def _text(cut: Cut, data: Mapping[str, Any]) -> str:
         if not side["responds"]:
             lines.append(f"\n{name}: {cut.input} does not move {cut.output}")
             continue
-        state = "stable" if side["stable"] else "UNSTABLE"
+        state = "stable" if side["stable"] else "on the verge (undamped)" if side["marginal"] else "UNSTABLE"
         lines.append(f"\n{name}: closed loop {state} at gain 1, {len(side['poles'])} poles, {len(side['zeros'])} zeros")
         rows = [(c["gain"], c["hz"], "above" if c["unstable_above"] else "below") for c in side["critical_gains"]]
         if rows:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Loop", "open_loop"]
 
 AT_REST = 1e-8
+BOUNDARY = 1e-10
 Curve = Callable[[np.ndarray], np.ndarray]
 
 
@@ -103,6 +104,21 @@ class Loop:
         poles = self.closed_poles(gain)
         poles = poles[~self.at_rest(poles)]
         return bool((abs(poles) < 1).all() if self.dt else (poles.real < 0).all())
+
+    def is_marginal(self, gain: float = 1.0) -> bool:
+        """Whether closed-loop poles lie on the stability boundary to round-off, and none beyond it.
+
+        So it is for a machine without damping: its oscillations neither die nor grow.
+
+        Parameters
+        ----------
+        gain : float
+            Loop gain k.
+        """
+        poles = self.closed_poles(gain)
+        poles = poles[~self.at_rest(poles)]
+        outside = (abs(poles) - 1.0 if self.dt else poles.real) / np.maximum(abs(poles), 1e-300)
+        return bool((outside < BOUNDARY).all() and (outside > -BOUNDARY).any())
 
     def at(self, omega: np.ndarray) -> np.ndarray:
         """L on the stability boundary.
