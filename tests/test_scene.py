@@ -351,6 +351,10 @@ def test_bad_files_are_told_where_and_what(written, old, new, said):
         ("scene = 5", "its 'scene' is a int"),
         ("import flexctrl\nscene = 1 / 0", "line 2: ZeroDivisionError"),
         ("scene = (", "line 1:"),
+        (
+            "import flexctrl as fc\n\nload = fc.PointMass('load', (0, 0, 0), -1.0)",
+            "line 3: PointMass 'load': mass = -1.0",
+        ),
     ],
 )
 def test_bad_python_scenes(written, text, said):

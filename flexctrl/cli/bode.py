@@ -141,7 +141,7 @@ def _text(cut: Cut, data: Mapping[str, Any], found: Mapping[str, Margins]) -> st
             peak = data[name]["resonance"]
             lines.append(f"{name}: highest resonance {peak['magnitude']:.4g} at {peak['hz']:.5g} Hz")
         else:
-            lines.append(f"{name}: no resonance")
+            lines.append(f"{name}: no damped resonance")
     if found:
         keys = ("stable", "gain_db", "phase_deg", "delay_s", "modulus", "Ms", "Mt")
         rows = [(key, *(told(m)[key] for m in found.values())) for key in keys]

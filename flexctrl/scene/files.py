@@ -60,14 +60,15 @@ def _parsed(file: Path) -> dict[str, Any]:
 def _from_python(file: Path) -> Scene:
     try:
         found = runpy.run_path(str(file), run_name="flexctrl_scene").get("scene")
-    except FlexctrlError:
-        raise
     except SyntaxError as error:
         raise SceneError(f"{file}: line {error.lineno}: {error.msg}") from error
     except Exception as error:
+        if isinstance(error, FlexctrlError) and not isinstance(error, ValueError):
+            raise  # a computation in the file that failed: the scene itself may be right
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]
         where = f"line {lines[-1]}: " if lines else ""
-        raise SceneError(f"{file}: {where}{type(error).__name__}: {error}") from error
+        kind = "" if isinstance(error, FlexctrlError) else f"{type(error).__name__}: "
+        raise SceneError(f"{file}: {where}{kind}{error}") from error
     if not isinstance(found, Scene):
         got = "defines no 'scene'" if found is None else f"its 'scene' is a {type(found).__name__}"
         raise SceneError(f"{file}: {got}; expected scene = flexctrl.Scene(structure, …)")
