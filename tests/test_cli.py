@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from scenes import TROLLEY
+from scenes import EXAMPLES, TROLLEY
 
 import flexctrl
 from flexctrl.cli import main
@@ -301,3 +301,19 @@ def test_a_reader_that_leaves_early_is_no_error(scene):
         process.stdout.close()
         assert process.stderr.read() == b""
     assert process.returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["table", "bode", "rlocus"])
+@pytest.mark.parametrize("name", ["ceiling_crane", "bridge_crane", "flexible_arm"])
+def test_shipped_scenes_answer(call, command, name):
+    code, out, err = call(command, EXAMPLES / f"{name}.toml", "--json")
+    assert (code, err) == (0, "")
+    data = json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} in JSON"))
+    assert data["scene"] == name
+    if command == "table":
+        assert data["dofs"] == {"ceiling_crane": 65, "bridge_crane": 30, "flexible_arm": 40}[name]
+    elif name != "ceiling_crane":  # the machines with a controller are stable under it, flexible and rigid
+        for side in (data["flexible"], data["rigid"]):
+            assert max(re for re, _ in side["closed_loop_poles"]) < 0.0
+            assert side["margins"]["stable"]
