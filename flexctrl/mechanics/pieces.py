@@ -78,10 +78,14 @@ def spring_energy(m: LineMotion) -> ca.SX:
 
 
 def unilateral(m: LineMotion, pull: ca.SX) -> ca.SX:
-    """Return what a rope makes of a pull [N]: the pull while taut and not negative, else zero."""
+    """Return what a rope makes of a pull [N]: the pull while taut and not negative, else zero.
+
+    A rope drawn just taut counts as taut, round-off or not, so that its tangent at rest is its stiffness.
+    """
     import casadi as ca
 
-    return ca.if_else(m.length > m.p["length"], ca.fmax(pull, 0.0), 0.0)
+    slight = 1e-12 * m.p["length"]
+    return ca.if_else(m.length > m.p["length"] - slight, ca.fmax(pull, -slight * m.p["stiffness"]), 0.0)
 
 
 def rope_energy(m: LineMotion) -> ca.SX:

@@ -169,19 +169,21 @@ def _tension(s: Structure, output: Tension) -> Measure:
     cells, k, rest, c = _pair(start, end), line.stiffness, line.length, line.damping
     slack = isinstance(line, Rope)
 
-    def parts(state: State, rates: np.ndarray) -> tuple[float, float, np.ndarray, np.ndarray]:
+    def parts(state: State, rates: np.ndarray) -> tuple[float, float, float, np.ndarray, np.ndarray]:
         d = state.x[end] - state.x[start]
         length = float(np.linalg.norm(d))
         n, dv = d / length, rates[cells[:3]] - rates[cells[3:]]
         force = k * (length - rest) + c * float(n @ dv)
-        return (0.0 if slack and (length <= rest or force < 0.0) else force), length, n, dv
+        # as in the kernel, just taut counts as taut
+        taut = not slack or (length > rest * (1.0 - 1e-12) and force >= -1e-12 * k * rest)
+        return float(taut), force, length, n, dv
 
     def value(state: State, rates: np.ndarray) -> float:
-        return parts(state, rates)[0]
+        on, force, *_ = parts(state, rates)
+        return max(force, 0.0) * on if slack else force
 
     def slope(state: State, rates: np.ndarray) -> tuple:
-        force, length, n, dv = parts(state, rates)
-        on = 0.0 if slack and force == 0.0 else 1.0
+        on, _, length, n, dv = parts(state, rates)
         g = on * (k * n + c * (dv - n * (n @ dv)) / length)
         return (cells, np.concatenate([g, -g]), cells, on * c * np.concatenate([n, -n]))
 
