@@ -120,8 +120,12 @@ def _text(scene: Scene, run: Run, twin: Run | None) -> str:
     if twin is None:
         rows = [(name, *asdict(numbers(run.t, run[name])).values()) for name in names]
         return f"{head}\n\n{grid(('signal', 'final', 'largest', 'rms'), rows)}"
-    both = [(name, numbers(run.t, run[name]), numbers(twin.t, twin[name])) for name in names]
-    rows = [(n, f.final, g.final, f.max_abs, g.max_abs, f.rms, g.rms) for n, f, g in both]
+    beside = (*twin.outputs, *twin.inputs)
+    rows = []
+    for name in names:
+        f, g = numbers(run.t, run[name]), numbers(twin.t, twin[name]) if name in beside else None
+        pairs = ((f.final, g and g.final), (f.max_abs, g and g.max_abs), (f.rms, g and g.rms))
+        rows.append((name, *("–" if value is None else value for pair in pairs for value in pair)))
     heads = ("signal", "final", "rigid", "largest", "rigid", "rms", "rigid")
     return f"{head}\n\n{grid(heads, rows)}"
 

@@ -18,6 +18,7 @@ from flexctrl.model.mobility import motion_of
 from flexctrl.model.model import Model
 from flexctrl.structure.elements import Beam, Rope
 from flexctrl.structure.freedoms import listed
+from flexctrl.structure.signals import Tension
 from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import Group
 
@@ -30,7 +31,8 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     structure : Structure
     effects : sequence of Effect
         What the scene asks for, e.g. ``[Gravity(), Flexible(), LargeRotation()]``. What no effect
-        bends is rigid; an effect left out costs nothing.
+        bends is rigid; an effect left out costs nothing. The tension of a rigid rope is not an output
+        of the model (`Model.notes` says so).
     backend : Backend, optional
         How the kernels run; default: compiled if the extra ``[fast]`` is installed.
 
@@ -49,8 +51,16 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
     groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
     elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))
+    stiff = {p.name for p in rigid if isinstance(p, Rope)}
+    unmeasured = tuple(o.name for o in structure.outputs if isinstance(o, Tension) and o.line in stiff)
+    if unmeasured:
+        structure = structure.with_(outputs=[o for o in structure.outputs if o.name not in unmeasured])
     runs = backend or best_backend()
     motion = motion_of(structure, structure.bodies + groups, elastic, runs)
+    left_out = tuple(
+        f"output {name} is left out: a rope that does not stretch measures no tension" for name in unmeasured
+    )
+    motion = replace(motion, notes=motion.notes + left_out)
     empty = sp.csr_matrix((motion.n, motion.n))
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]

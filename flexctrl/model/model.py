@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +24,11 @@ from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
+
+if TYPE_CHECKING:
+    import control
+
+    from flexctrl.model.equilibrium import Rest
 
 
 @dataclass(frozen=True)
@@ -254,6 +260,18 @@ class Model:
         if name not in self.coordinates:
             raise StructureError(f"model has no coordinate {name!r}{did_you_mean(name, self.coordinates)}")
         return self.coordinates.index(name)
+
+    def to_nlsys(self, at: Rest | State | None = None) -> control.NonlinearIOSystem:
+        """Return the model as a state space for python-control; see :func:`flexctrl.model.nlsys.to_nlsys`.
+
+        Parameters
+        ----------
+        at : Rest or State, optional
+            Where the coordinates are zero; default: the shape as drawn.
+        """
+        from flexctrl.model.nlsys import to_nlsys
+
+        return to_nlsys(self, at)
 
     def with_(self, *, backend: Backend) -> Model:
         """Return the same model on another backend.

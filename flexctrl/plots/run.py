@@ -165,7 +165,8 @@ def comparison_curves(
     """
     for ax, name in zip(axes, signals, strict=True):
         _curve(ax, comparison.flexible, name, color=FLEXIBLE, linewidth=1.5, label="flexible")
-        _curve(ax, comparison.rigid, name, color=RIGID, linewidth=1.4, linestyle=(0, (5, 2)), label="rigid")
+        if name in (*comparison.rigid.outputs, *comparison.rigid.inputs):
+            _curve(ax, comparison.rigid, name, color=RIGID, linewidth=1.4, linestyle=(0, (5, 2)), label="rigid")
         _label(ax, name, unit)
     if len(signals):
         axes[0].figure.align_ylabels()

@@ -131,7 +131,7 @@ class Comparison:
     ----------
     flexible, rigid : Run
     signals : tuple of Difference
-        All outputs, then the inputs.
+        All outputs that both have, then the inputs.
     """
 
     flexible: Run
@@ -145,7 +145,7 @@ class Comparison:
         Parameters
         ----------
         flexible, rigid : Run
-            With the same signals.
+            With the same signals; what only the flexible one has (the tension of a rope) is left out.
 
         Returns
         -------
@@ -156,8 +156,9 @@ class Comparison:
         StructureError
             If their signals differ.
         """
-        names = (*flexible.outputs, *flexible.inputs)
-        if names != (*rigid.outputs, *rigid.inputs):
+        known = (*rigid.outputs, *rigid.inputs)
+        names = [name for name in (*flexible.outputs, *flexible.inputs) if name in known]
+        if flexible.inputs != rigid.inputs or set(names) != set(known):
             raise StructureError("compare: the runs have different signals; give two runs of the same machine")
         return cls(flexible, rigid, tuple(_difference(flexible, rigid, name) for name in names))
 
