@@ -87,7 +87,8 @@ def cut_of(scene: Scene, request: Request) -> Cut:
     first = commanded or scene.model.inputs
     input = _chosen("input", request.input or scene.channel.input, scene.model.inputs, first, scene.name)
     outputs = scene.model.outputs
-    output = _chosen("output", request.output or scene.channel.output, outputs, outputs, scene.name)
+    seen = tuple(name for name in outputs if name in scene.twin.outputs)
+    output = _chosen("output", request.output or scene.channel.output, outputs, seen or outputs, scene.name)
     return Cut(scene, input, output, input in commanded)
 
 
