@@ -41,6 +41,7 @@ _HOMES = {
     "flexctrl.model.equilibrium": ("Rest", "equilibrium"),
     "flexctrl.model.linearize": ("linearize",),
     "flexctrl.model.linear": ("LinearModel",),
+    "flexctrl.model.audit": ("Audit", "audit"),
     "flexctrl.model.reduction": (
         "BalancedTruncation",
         "CraigBampton",
@@ -51,6 +52,7 @@ _HOMES = {
     "flexctrl.dynamics.alpha": ("AdaptiveAlpha", "GeneralizedAlpha"),
     "flexctrl.dynamics.run": ("Report", "Run", "Status", "Tolerance"),
     "flexctrl.dynamics.simulate": ("simulate",),
+    "flexctrl.dynamics.sampled": ("sampled_response",),
     "flexctrl.design": ("Delayed", "Noisy", "OpenLoop", "Quantised", "RateLimited", "Sampled", "Saturated", "Tracking"),
     "flexctrl.study.compare": ("Comparison", "compare"),
     "flexctrl.scene": ("Scene", "Simulation", "Start", "load_scene"),

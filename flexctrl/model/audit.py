@@ -1,0 +1,41 @@
+"""Audit of a machine's freedoms before anything is computed with it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexctrl.model.condense import Audit, Freedom
+from flexctrl.model.condense import audit as audit_linear
+from flexctrl.model.equilibrium import Rest
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Audit", "Freedom", "audit"]
+
+
+def audit(model: Model, at: Rest | State | None = None) -> Audit:
+    """Label every freedom of a machine dynamic, massless but stiff, massless but damped, or mechanism.
+
+    Mass, damping and stiffness (geometric stiffness included) are those of the given shape, which need not
+    be an equilibrium.
+
+    Parameters
+    ----------
+    model : Model
+    at : Rest or State, optional
+        Default: the shape as drawn.
+
+    Returns
+    -------
+    Audit
+        Names of the freedoms by label; ``mechanisms`` lists what moves in each motion that has neither mass
+        nor stiffness. Never raises for one; `linearize` and `simulate` do.
+    """
+    state = model.rest if at is None else at.state if isinstance(at, Rest) else at
+    still, n = np.zeros(model.n), model.n
+    u = at.inputs if isinstance(at, Rest) else np.zeros(len(model.inputs))
+    seeds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    M, C, K = ((-model.slope(state, still, still, seed, u)).tocsc() for seed in seeds)
+    none = np.zeros((n, 0)), np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, 0))
+    return audit_linear(LinearModel(0.5 * (M + M.T), C, 0.5 * (K + K.T), *none, model.coordinates, (), ()))
