@@ -102,7 +102,16 @@ class Model:
         return Forces(self.motion, families_of(self.structure, self.effects, rigid), self.backend)
 
     def bends(self, part: Part | Drive) -> bool:
-        """Tell whether some effect lets a part deform."""
+        """Tell whether some effect lets a part deform.
+
+        Parameters
+        ----------
+        part : Part or Drive
+
+        Returns
+        -------
+        bool
+        """
         return any(e.bends(part) for e in self.effects)
 
     def mass(self) -> sp.csc_matrix:
@@ -155,7 +164,17 @@ class Model:
         return u
 
     def loads(self, state: State, u: np.ndarray) -> np.ndarray:
-        """Return Tᵀ B u, the generalised forces of the inputs."""
+        """Return Tᵀ B u, the generalised forces of the inputs.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
         return self.motion.collect(state if self.large else self.rest, self.signals.loads @ u)
 
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -180,7 +199,23 @@ class Model:
     def slope(
         self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float], u: np.ndarray
     ) -> sp.csr_matrix:
-        """Return ∂(balance + loads)/∂(own motion) for a motion that adds ``seeds`` × increment to (place, v, a)."""
+        """Return ∂(balance + loads)/∂(own motion) for a motion that adds ``seeds`` × increment to (place, v, a).
+
+        Exact at rest; in motion the turning of followers' levers is left out of the rates.
+
+        Parameters
+        ----------
+        state : State
+        v, a : numpy.ndarray, shape (n,)
+            Rates and accelerations of the degrees of freedom.
+        seeds : tuple of 3 floats
+            (1, 0, 0) gives −K, (0, 1, 0) gives −C, (0, 0, 1) gives −M; an integrator mixes them.
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        scipy.sparse.csr_matrix, shape (n, n)
+        """
         if self.large:
             slope = self.forces.slope(state, v, a, seeds, self.signals.loads @ u)
             return slope - seeds[1] * self.viscous if self.viscous.nnz else slope
@@ -188,7 +223,22 @@ class Model:
         return -(seeds[0] * self._stiffness + seeds[1] * damping + seeds[2] * self._mass).tocsr()
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
-        """Return the state after a step of the degrees of freedom."""
+        """Return the state after a step of the degrees of freedom.
+
+        Parameters
+        ----------
+        state : State
+        step : numpy.ndarray, shape (n,)
+            Displacements; rotation vectors in space axes for rotations.
+        v : numpy.ndarray, shape (n,)
+            New rates.
+        t : float
+            New time.
+
+        Returns
+        -------
+        State
+        """
         if self.large:
             return self.motion.advance(state, step, v, t)
         q = state.q + step
@@ -197,15 +247,42 @@ class Model:
         return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t)
 
     def rates(self, state: State) -> np.ndarray:
-        """Return the raw rates of a state."""
+        """Return the raw rates of a state: velocities and spins of all nodes, then the speeds of the motors.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        numpy.ndarray, shape (raw,)
+        """
         return self.motion.rates(state if self.large else self.rest, state.v)
 
     def measure(self, state: State) -> np.ndarray:
-        """Return the outputs of a state, shape (outputs,)."""
+        """Return the outputs of a state.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        numpy.ndarray, shape (outputs,)
+        """
         return self.signals.outputs(state, self.rates(state))
 
     def energy(self, state: State) -> tuple[float, float, float]:
-        """Return kinetic energy [J], stored energy [J] and dissipated power [W] of a state."""
+        """Return kinetic energy [J], stored energy [J] and dissipated power [W] of a state.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        tuple of 3 floats
+        """
         if self.large:
             kinetic, stored, power = self.forces.energy(state, state.v)
             return kinetic, stored, power + float(state.v @ (self.viscous @ state.v))
