@@ -332,9 +332,9 @@ def _check_coincidence(s: Structure) -> None:
                 f"{joint}: the nodes are {gap:.6g} m apart, at {a.position} and {b.position}; joined nodes coincide. "
                 "Move a part, or put a RigidBody with two points or a Beam between them"
             )
-        if isinstance(joint, Weld | Slide) and a.freedoms != b.freedoms:
-            poor = a if len(a.freedoms) < 6 else b
-            raise StructureError(f"{joint}: {poor} has no rotations to share; use Pin")
+        poor = [n for n in (a, b) if len(n.freedoms) < 6]
+        if poor and (isinstance(joint, Slide) or (isinstance(joint, Weld) and len(poor) == 1)):
+            raise StructureError(f"{joint}: {poor[0]} has no rotations to share; use Pin")
 
 
 def _check_drives(s: Structure) -> None:

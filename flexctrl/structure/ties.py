@@ -138,7 +138,6 @@ class _Tying:
         self.closures: list[Closure] = []
         self.lines: list[tuple[int, Vector]] = []
         self.unit = {i: g.nodes[0] for g in groups for i in g.nodes}
-        self.grouped = {i for g in groups for i in g.nodes}
         self.moving = self._unite(joints)
         self.depth = self._depths(joints)
         self.at_cell: dict[int, set[int]] = {}
@@ -193,7 +192,7 @@ class _Tying:
                     self.same.unite(cells[0] + f, cells[1] + f)
         for group in self.groups:
             for node in group.nodes[1:]:
-                for f in range(3, 6):
+                for f in () if group.line else range(3, 6):
                     self.same.unite(6 * group.nodes[0] + f, 6 * node + f)
         return self._settle(moving)
 
@@ -235,8 +234,7 @@ class _Tying:
 
     def _group(self, group: Group) -> None:
         root = min(group.nodes, key=self._rank)
-        turning = [f for f in range(3, 6) if self.cell(root, f) not in self.definer and not self.held(root, f)]
-        if group.line and len(turning) == 3:
+        if group.line:
             end = next(n for n in group.nodes if n != root)
             d = [b - a for a, b in zip(self.nodes[root].position, self.nodes[end].position, strict=True)]
             length = math.hypot(*d)
@@ -307,7 +305,7 @@ class _Tying:
                     row.append(-1)
                 elif cell in numbers:
                     row.append(numbers[cell])
-                elif f not in node.freedoms and i not in self.grouped:
+                elif f not in node.freedoms and i not in lines:
                     row.append(0)
                 elif i in lines and f == 3 + main_axis(lines[i]):
                     row.append(numbers.setdefault(cell, 0))

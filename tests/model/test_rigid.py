@@ -114,6 +114,13 @@ def test_a_load_on_a_rigid_rope_is_a_spherical_pendulum():
     assert frequencies(model) == pytest.approx(np.sqrt(G / 2.5) * np.ones(2), rel=1e-12)
 
 
+def test_a_rope_may_be_drawn_from_its_load_upwards():
+    load = fc.PointMass("load", (0, 0, -2.5), 3.0)
+    rope = fc.Rope("rope", load.node, (0, 0, 0), EA=1e5)
+    model = rigid(fc.Structure([rope, load], [fc.Support(rope.end), fc.Pin(rope.start, load.node)]))
+    assert frequencies(model) == pytest.approx(np.sqrt(G / 2.5) * np.ones(2), rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("l1", "l2", "ratio", "omega1", "omega2"),
     [

@@ -103,6 +103,7 @@ def test_the_node_of_an_equal_part_is_as_good():
         ),
         ([A, ROPE], [CLAMP, fc.Weld(A.end, ROPE.start)], {}, "node 0 of rope has no rotations to share; use Pin"),
         ([A, ROPE], [CLAMP, fc.Slide(A.end, ROPE.start, "x")], {}, "no rotations to share; use Pin"),
+        ([ROPE, LOAD], [fc.Slide(ROPE.end, LOAD.node, "x")], {}, "node 1 of rope has no rotations to share; use Pin"),
         ([A], [CLAMP], {"drives": [motor(A.start)]}, "drive 'motor': its joint holds the rotation.*the ground; free"),
         (
             [A, B],
