@@ -158,7 +158,8 @@ class Comparison:
         """
         known = (*rigid.outputs, *rigid.inputs)
         names = [name for name in (*flexible.outputs, *flexible.inputs) if name in known]
-        if flexible.inputs != rigid.inputs or set(names) != set(known):
+        seen = bool(rigid.outputs) or not flexible.outputs
+        if flexible.inputs != rigid.inputs or set(names) != set(known) or not seen:
             raise StructureError("compare: the runs have different signals; give two runs of the same machine")
         return cls(flexible, rigid, tuple(_difference(flexible, rigid, name) for name in names))
 

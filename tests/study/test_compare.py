@@ -80,3 +80,13 @@ def test_saved_columns_are_both_runs(tmp_path):
     columns = np.genfromtxt(tmp_path / "both.csv", delimiter=",", names=True)
     np.testing.assert_allclose(columns["height"], found.flexible["height"])
     np.testing.assert_allclose(columns["height_rigid"], -2.0)
+
+
+def test_what_only_the_flexible_machine_measures_is_left_out():
+    machine = bouncing()
+    rope = next(part for part in machine.elements if isinstance(part, fc.Rope))
+    model = fc.assemble(machine.with_(outputs=[*machine.outputs, fc.Tension("pull", rope)]), EFFECTS)
+    found = compare(model, until=0.01, method=fc.GeneralizedAlpha(1e-3), every=1e-3)
+    assert "pull" in found.flexible.outputs
+    assert "pull" not in [s.name for s in found.signals]
+    assert any("pull" in note for note in found.rigid.report.notes)
