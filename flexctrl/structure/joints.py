@@ -22,8 +22,8 @@ from flexctrl.structure.freedoms import (
 def _check_nodes(kind: str, *nodes: Node) -> None:
     for node in nodes:
         check_node(node, kind)
-    if len(nodes) == 2 and (nodes[0].part, nodes[0].index) == (nodes[1].part, nodes[1].index):
-        raise StructureError(f"{kind}: ties {nodes[0]} to itself; give two nodes of different parts")
+    if len(nodes) == 2 and nodes[0].part == nodes[1].part:
+        raise StructureError(f"{kind}: ties {nodes[0]} to {nodes[1]}; give nodes of two different parts")
 
 
 @dataclass(frozen=True)
