@@ -16,6 +16,7 @@ from flexctrl.model.reduction.selection import BelowFrequency, Lowest, Selection
 
 __all__ = ["ModalTruncation"]
 
+GAP = 1e-5
 POOL = 8
 
 
@@ -63,10 +64,23 @@ class ModalTruncation:
         chosen = _chosen(modes, rule)
         reduced = modal_model(full, modes, chosen)
         if self.static_correction:
-            zero = slice(modes.unstable, modes.unstable + modes.rigid)
+            zero = slice(modes.unstable, modes.unstable + modes.rigid + _soft(modes, chosen))
             reduced = corrected(full, reduced, modes.shapes[:, zero], np.eye(len(chosen))[:, zero])
         bound = _bound(full, modes, chosen, self.static_correction)
         return ReducedModel(full, self, reduced, modes.shapes[:, chosen], modes.rigid, bound)
+
+
+def _soft(modes: Modes, chosen: np.ndarray) -> int:
+    """Count flexible modes, all kept, that lie so far below the next that K⁻¹ would drown the others in their rounding.
+
+    A bent girder that spins about its own axis is one: free but for its mesh. They count as free motion here; the
+    full and the reduced model share what that leaves out.
+    """
+    first = modes.unstable + modes.rigid
+    squared = modes.omega_squared[first:]
+    gaps = np.flatnonzero(squared[:-1] < GAP * squared[1:])
+    count = int(gaps[-1]) + 1 if gaps.size else 0
+    return count if np.array_equal(chosen[first : first + count], np.arange(first, first + count)) else 0
 
 
 def _enough_modes(full: LinearModel, rule: Selection) -> Modes:
