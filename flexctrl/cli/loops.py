@@ -35,8 +35,9 @@ class Cut:
 
     @property
     def machines(self) -> dict[str, LinearModel]:
-        """The machine and its rigid twin, linearised about their equilibria."""
-        return {"flexible": self.scene.linear, "rigid": self.scene.twin_linear}
+        """The machine and its rigid twin, linearised about their equilibria; a twin that cannot move is left out."""
+        twin = {"rigid": self.scene.twin_linear} if self.scene.twin.n else {}
+        return {"flexible": self.scene.linear} | twin
 
     @property
     def title(self) -> str:

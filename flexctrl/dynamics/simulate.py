@@ -119,6 +119,7 @@ class _Journey:
         except KeyboardInterrupt:
             self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
         except StepError as error:
+            self.stepper.counts.worst = error.worst
             worst = self.model.coordinates[error.worst]
             self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
         if self.t[-1] < self.point.state.t:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import EquilibriumError
+from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.solve import SingularMatrixError, factorise
@@ -80,8 +80,10 @@ def equilibrium(
         If none is found: with the residual, the worst freedom by name, what to try, and the best
         state reached.
     StructureError
-        For an unknown coordinate or input.
+        For an unknown coordinate or input, or something that is no model.
     """
+    if not isinstance(model, Model):
+        raise StructureError(f"equilibrium: {model!r} is no Model; give what flexctrl.assemble returns")
     u = model.input_vector(inputs or {})
     held = {model.coordinate(name): value for name, value in (hold or {}).items()}
     state = _place(model, start or model.rest, held)

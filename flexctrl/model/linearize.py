@@ -38,11 +38,16 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     Raises
     ------
     LinearizationError
-        If the state is not an equilibrium (says by how much and where), or another point of the
-        certificate fails.
+        If the state is not an equilibrium (says by how much and where), another point of the
+        certificate fails, or nothing in the machine can move.
     EquilibriumError
         If none was given and none is found.
     """
+    if not model.n:
+        raise LinearizationError(
+            "linearize: the machine has no degrees of freedom, so there is nothing to linearise: its supports hold all "
+            "that no effect lets bend"
+        )
     rest = equilibrium(model, inputs=inputs) if at is None else at
     state = rest.state if isinstance(rest, Rest) else rest
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})

@@ -103,6 +103,8 @@ def factorise(A: sp.spmatrix, known: Plan | None = None) -> Solve:
 
 
 def _dense(A: np.ndarray) -> Solve:
+    if not A.size:
+        return lambda b: b
     lu, pivots, info = lapack.dgetrf(A)
     if info:
         raise SingularMatrixError(info - 1)

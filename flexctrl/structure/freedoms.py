@@ -65,7 +65,7 @@ def parse_point(point: Sequence[float], owner: str) -> Vector:
     """Read three finite numbers."""
     values = numbers(point)
     if len(values) != 3 or not all(abs(p) < HUGE for p in values):
-        raise StructureError(f"{owner}: expected three finite numbers (x, y, z) in m, got {point!r}")
+        raise StructureError(f"{owner}: expected three finite numbers (x, y, z), got {point!r}")
     return (values[0], values[1], values[2])
 
 
@@ -77,6 +77,13 @@ def check_name(name: str, kind: str) -> str:
             "(python-control allows no dots or blanks)"
         )
     return name
+
+
+def check_signal(name: str, kind: str) -> str:
+    """Return ``name`` if it can name a signal: an identifier other than ``t``, which is the time in every table."""
+    if name == "t":
+        raise StructureError(f"{kind} 't': t is the time in every run and table; give the signal another name")
+    return check_name(name, kind)
 
 
 def listed(items: Iterable, owner: str) -> list:

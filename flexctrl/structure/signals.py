@@ -9,7 +9,7 @@ from typing import TypeAlias
 from flexctrl.errors import StructureError
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
 from flexctrl.structure.elements import Node, Rope, Spring, check_node
-from flexctrl.structure.freedoms import ROTATIONS, Vector, check_name, parse_direction
+from flexctrl.structure.freedoms import ROTATIONS, Vector, check_signal, parse_direction
 
 _DRIVES = (RotaryDrive, LinearDrive)
 
@@ -54,7 +54,7 @@ class Force:
     direction: Vector
 
     def __init__(self, name: str, at: Node | Sequence[Node], direction: str | Sequence[float]) -> None:
-        owner = f"Force {check_name(name, 'Force')!r}"
+        owner = f"Force {check_signal(name, 'Force')!r}"
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "at", _nodes(at, owner, rotations=False))
         object.__setattr__(self, "direction", parse_direction(direction, owner))
@@ -76,7 +76,7 @@ class Torque:
     direction: Vector
 
     def __init__(self, name: str, at: Node | Sequence[Node], axis: str | Sequence[float]) -> None:
-        owner = f"Torque {check_name(name, 'Torque')!r}"
+        owner = f"Torque {check_signal(name, 'Torque')!r}"
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "at", _nodes(at, owner, rotations=True))
         object.__setattr__(self, "direction", parse_direction(axis, owner))
@@ -97,7 +97,7 @@ class MotorTorque:
     drive: str
 
     def __init__(self, name: str, drive: Drive | str) -> None:
-        object.__setattr__(self, "name", check_name(name, "MotorTorque"))
+        object.__setattr__(self, "name", check_signal(name, "MotorTorque"))
         object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"MotorTorque {name!r}: drive"))
 
 
@@ -109,7 +109,7 @@ def _set_measure(
     minus: Node | None,
     rotations: bool,
 ) -> None:
-    owner = f"{type(signal).__name__} {check_name(name, type(signal).__name__)!r}"
+    owner = f"{type(signal).__name__} {check_signal(name, type(signal).__name__)!r}"
     _node(at, owner, rotations)
     if minus is not None and _node(minus, owner, rotations) == at:
         raise StructureError(f"{owner}: {at} less itself is always zero; give another node as minus")
@@ -221,7 +221,7 @@ class DriveAngle:
     drive: str
 
     def __init__(self, name: str, drive: Drive | str) -> None:
-        object.__setattr__(self, "name", check_name(name, "DriveAngle"))
+        object.__setattr__(self, "name", check_signal(name, "DriveAngle"))
         object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"DriveAngle {name!r}: drive"))
 
 
@@ -239,7 +239,7 @@ class DriveSpeed:
     drive: str
 
     def __init__(self, name: str, drive: Drive | str) -> None:
-        object.__setattr__(self, "name", check_name(name, "DriveSpeed"))
+        object.__setattr__(self, "name", check_signal(name, "DriveSpeed"))
         object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"DriveSpeed {name!r}: drive"))
 
 
@@ -274,7 +274,7 @@ class SwayAngle:
         direction: str | Sequence[float],
         down: str | Sequence[float] = "-z",
     ) -> None:
-        owner = f"SwayAngle {check_name(name, 'SwayAngle')!r}"
+        owner = f"SwayAngle {check_signal(name, 'SwayAngle')!r}"
         if check_node(top, owner) == check_node(load, owner):
             raise StructureError(f"{owner}: top and load are both {top}; give the suspension point and the load")
         object.__setattr__(self, "name", name)
@@ -301,7 +301,7 @@ class Tension:
     line: str
 
     def __init__(self, name: str, line: Rope | Spring | str) -> None:
-        object.__setattr__(self, "name", check_name(name, "Tension"))
+        object.__setattr__(self, "name", check_signal(name, "Tension"))
         object.__setattr__(self, "line", _name_of(line, (Rope, Spring), f"Tension {name!r}: line"))
 
 

@@ -86,6 +86,7 @@ class Structure:
         _check_table(self)
         _check_coincidence(self)
         _check_drives(self)
+        _check_loads(self)
         _check_pieces(self)
 
     @cached_property
@@ -362,6 +363,20 @@ def _held(s: Structure, drive: Drive) -> bool:
                 axis = joint.axis if isinstance(joint, Hinge) else joint.along
                 return abs(sum(a * b for a, b in zip(axis, drive.direction, strict=True))) < 1.0 - 1e-9
     return any(mine[c] == other[c] for c, d in zip(columns, drive.direction, strict=True) if abs(d) > 1e-9)
+
+
+def _check_loads(s: Structure) -> None:
+    """A force or torque that only acts on held freedoms does nothing: surely not what was meant."""
+    rows = s.join_table.rows
+    for load in s.inputs:
+        if isinstance(load, Force | Torque):
+            offset = 0 if isinstance(load, Force) else 3
+            cells = [rows[s.number(n)][offset + i] for n in load.at for i in range(3) if abs(load.direction[i]) > 1e-9]
+            if not any(cells):
+                raise StructureError(
+                    f"{type(load).__name__} {load.name!r}: acts on {load.at[0]} along {load.direction}, where every "
+                    "freedom is held, so it moves nothing; choose another node or direction, or free the support"
+                )
 
 
 def _check_pieces(s: Structure) -> None:

@@ -68,6 +68,20 @@ class Closure:
 
 
 @dataclass(frozen=True)
+class Fit:
+    """A ride or turn of a node whose place is told already: one condition on where it is against the master.
+
+    ``across``, carried by the master, keeps its product with the arm between the two (a ride or slide), or
+    stays square to ``axis`` as the node carries it (a turn).
+    """
+
+    node: int
+    master: int
+    across: Vector
+    axis: Vector | None = None
+
+
+@dataclass(frozen=True)
 class Ties:
     """Where each nodal freedom gets its value.
 
@@ -77,7 +91,7 @@ class Ties:
         Number of the degree of freedom (from 1), 0 for held, -1 for one that follows.
     follows : tuple of Ride, Turn or Copy
         In an order in which they can be evaluated.
-    closures : tuple of Closure
+    closures : tuple of Closure or Fit
         Conditions on followers that close a loop of rigid parts.
     lines : tuple of (int, Vector)
         Nodes whose rotation is the direction of a line: turned about body axes across it only.
@@ -86,7 +100,7 @@ class Ties:
 
     cells: tuple[tuple[int, ...], ...]
     follows: tuple[Follow, ...]
-    closures: tuple[Closure, ...]
+    closures: tuple[Closure | Fit, ...]
     lines: tuple[tuple[int, Vector], ...]
     free: int
 
@@ -135,7 +149,8 @@ class _Tying:
         self.definer: dict[int, int] = {}
         self.anchored: set[int] = set()
         self.follows: list[Follow] = []
-        self.closures: list[Closure] = []
+        self.closures: list[Closure | Fit] = []
+        self.writers: dict[tuple[int, bool], Follow] = {}
         self.lines: list[tuple[int, Vector]] = []
         self.unit = {i: g.nodes[0] for g in groups for i in g.nodes}
         self.moving = self._unite(joints)
@@ -241,8 +256,7 @@ class _Tying:
             self.lines.append((root, (d[0] / length, d[1] / length, d[2] / length)))
         for node in group.nodes:
             if node != root:
-                self.follows.append(Ride(node, root))
-                self._define(node, range(3))
+                self._follow(Ride(node, root))
         self.anchored |= {self.cell(root, f) for f in range(6)}
 
     def _rank(self, node: int) -> tuple[int, int]:
@@ -263,11 +277,36 @@ class _Tying:
             return (-self._known(self.place[n.part, n.index], freedoms), self.depth[self._unit(n)])
 
         master, node = (self.place[n.part, n.index] for n in sorted(joint.nodes, key=rank))
+        if all(self.cell(master, f) == self.cell(node, f) for f in freedoms):
+            return
         if isinstance(joint, Hinge):
-            self.follows.append(Turn(node, master, joint.axis))
+            self._follow(Turn(node, master, joint.axis))
         else:
-            self.follows.append(Ride(node, master, along=joint.along))
-        self._define(node, freedoms)
+            self._follow(Ride(node, master, along=joint.along))
+
+    def _follow(self, follow: Follow) -> None:
+        """Let a node follow; if its place is told already, or the master's hangs on it, demand that it fits."""
+        if _write(follow) in self.writers or self._hangs(follow):
+            self.closures += _fits(follow)
+            return
+        self.follows.append(follow)
+        self.writers[_write(follow)] = follow
+        self._define(follow.node, range(3, 6) if isinstance(follow, Turn) else range(3))
+
+    def _hangs(self, follow: Follow) -> bool:
+        """Tell whether what a follower reads hangs on what it writes."""
+        todo, seen = list(_reads(follow)), set()
+        while todo:
+            value = todo.pop()
+            if value == _write(follow):
+                return True
+            if value not in seen:
+                seen.add(value)
+                node, turns = value
+                cells = (self.cell(node, f) for f in (range(3, 6) if turns else range(3)))
+                todo += [(self.definer[c], turns) for c in cells if self.definer.get(c, node) != node]
+                todo += _reads(self.writers[value]) if value in self.writers else ()
+        return False
 
     def _define(self, node: int, freedoms: range) -> None:
         for f in freedoms:
@@ -320,6 +359,23 @@ class _Tying:
         return follow if isinstance(follow, Copy) else replace(follow, own=owns.get(_write(follow), 0))
 
 
+def _fits(follow: Follow) -> list[Fit]:
+    axis = follow.axis if isinstance(follow, Turn) else follow.along if isinstance(follow, Ride) else None
+    unit: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    if axis is None:
+        return [Fit(follow.node, follow.master, e) for e in unit]
+    first = _square(axis, unit[(main_axis(axis) + 1) % 3])
+    both = (first, _square(axis, first))
+    return [Fit(follow.node, follow.master, e, axis if isinstance(follow, Turn) else None) for e in both]
+
+
+def _square(a: Vector, b: Vector) -> Vector:
+    """Return the direction of a × b."""
+    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    size = math.hypot(x, y, z)
+    return (x / size, y / size, z / size)
+
+
 def _own_column(follow: Follow) -> int:
     if isinstance(follow, Turn):
         return 3 + main_axis(follow.axis)
@@ -349,4 +405,4 @@ def _sorted(follows: Sequence[Follow]) -> tuple[Follow, ...]:
     return tuple(done)
 
 
-__all__ = ["Closure", "Copy", "Follow", "Group", "Ride", "Ties", "Turn", "tie"]
+__all__ = ["Closure", "Copy", "Fit", "Follow", "Group", "Ride", "Ties", "Turn", "tie"]

@@ -143,6 +143,7 @@ def margins(loop: Loop) -> Margins:
     through_axis = _roots(lambda w: np.sin(np.angle(loop.at(w))), omega, np.sin(np.angle(L)))
     gains = tuple(Crossing(w, _wrapped(np.angle(_one(loop, w)) + np.pi)) for w in through_one)
     phases = tuple(Crossing(w, -1.0 / value.real) for w in through_axis if (value := _one(loop, w)).real < 0)
+    phases += _at_nyquist(loop)
     lags = [Crossing(g.omega, (g.margin % (2 * np.pi)) / g.omega) for g in gains]
     nothing = Crossing(np.inf, np.inf)
     distance = _lowest(lambda w: abs(1 + loop.at(w)), omega, abs(1 + L))
@@ -159,6 +160,15 @@ def margins(loop: Loop) -> Margins:
         gain_crossings=gains,
         phase_crossings=phases,
     )
+
+
+def _at_nyquist(loop: Loop) -> tuple[Crossing, ...]:
+    """The crossing of a sampled loop at z = −1, where L is real and the grid ends."""
+    if not loop.dt:
+        return ()
+    end = np.pi / loop.dt
+    value = _one(loop, end)
+    return (Crossing(end, -1.0 / value.real),) if value.real < 0 and abs(value.imag) < 1e-6 * abs(value) else ()
 
 
 def peak_gain(system: LinearModel | Reduced) -> Peak:
