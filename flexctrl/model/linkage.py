@@ -19,7 +19,7 @@ from flexctrl.mechanics.pieces import DriveMotion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
 from flexctrl.structure.drives import Drive, RotaryDrive
 from flexctrl.structure.freedoms import Vector
-from flexctrl.structure.ties import Copy, Follow, Ride, Turn
+from flexctrl.structure.ties import Copy, Fit, Follow, Ride, Turn
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -65,8 +65,8 @@ class Linkage:
     lines : tuple of (int, numpy.ndarray)
         Nodes that turn about body axes (columns).
     links : tuple of Link
-    loops : tuple of Loop
-        Independent ones.
+    loops : tuple of Loop or Fit
+        Independent conditions.
     free : int
         Independent freedoms.
     """
@@ -76,7 +76,7 @@ class Linkage:
     follows: tuple[Follow, ...]
     lines: tuple[tuple[int, np.ndarray], ...]
     links: tuple[Link, ...]
-    loops: tuple[Loop, ...]
+    loops: tuple[Loop | Fit, ...]
     free: int
 
     @property
@@ -221,14 +221,9 @@ class Linkage:
 
         every = ca.SX.sym("every", self.free + len(self.loops))
         motion = self._open_rates(pose, every)
-        opening = [self._between(loop, [ca.vertcat(v, w) for v, w in motion]) for loop in self.loops]
+        opening = [_opening(loop, pose, motion) for loop in self.loops]
         G = ca.jacobian(ca.vertcat(*opening), every)
         return G[:, : self.free], G[:, self.free :]
-
-    def _between(self, loop: Loop, values: Sequence[ca.SX]) -> ca.SX:
-        """Return a value of a loop's node less that of the other, or of the ground."""
-        value = values[loop.node][loop.freedom]
-        return value if loop.other < 0 else value - values[loop.other][loop.freedom]
 
     def _open_rates(self, pose: ca.SX, every: ca.SX) -> list[tuple[ca.SX, ca.SX]]:
         """Return velocities and spins of all nodes, loops left open."""
@@ -281,15 +276,27 @@ class Linkage:
         return self._open_place(old, ca.vertcat(step, dependent))
 
     def _gaps(self, pose: ca.SX) -> ca.SX:
-        """Return how far loops are open, from positions and rotation vectors since rest."""
+        """Return how far loops are open [m or rad]."""
         import casadi as ca
 
         shaped = ca.reshape(pose, 12, self.count)
-        since = [
-            ca.vertcat(shaped[:3, i] - ca.DM(self.rest[i]), rotation_vector(_rotation(shaped[:, i])))
-            for i in range(self.count)
-        ]
-        return ca.vertcat(*[self._between(loop, since) for loop in self.loops])
+        return ca.vertcat(*[self._gap(loop, shaped) for loop in self.loops])
+
+    def _gap(self, loop: Loop | Fit, pose: ca.SX) -> ca.SX:
+        import casadi as ca
+
+        x, R = pose[:3, loop.node], _rotation(pose[:, loop.node])
+        if isinstance(loop, Fit):
+            across = _rotation(pose[:, loop.master]) @ ca.DM(loop.across)
+            if loop.axis is not None:
+                return ca.dot(across, R @ ca.DM(loop.axis))
+            arm = self.rest[loop.node] - self.rest[loop.master]
+            return ca.dot(across, x - pose[:3, loop.master]) - float(np.dot(loop.across, arm))
+        moved = x - ca.DM(self.rest[loop.node])
+        if loop.other >= 0:
+            moved = moved - (pose[:3, loop.other] - ca.DM(self.rest[loop.other]))
+            R = R @ _rotation(pose[:, loop.other]).T
+        return moved[loop.freedom] if loop.freedom < 3 else rotation_vector(R)[loop.freedom - 3]
 
     def _open_place(self, old: ca.SX, step: ca.SX) -> ca.SX:
         import casadi as ca
@@ -343,6 +350,22 @@ class Linkage:
         if isinstance(d, RotaryDrive):
             return rotary_motion(node(link.node), node(link.base), ca.SX.zeros(3), ca.SX(0), p)
         return linear_motion(node(link.node), node(link.base), ca.SX.zeros(3), p)
+
+
+def _opening(loop: Loop | Fit, pose: ca.SX, motion: Sequence[tuple[ca.SX, ca.SX]]) -> ca.SX:
+    """Return the rate of a loop's gap."""
+    import casadi as ca
+
+    v, w = motion[loop.node]
+    if isinstance(loop, Loop):
+        rate = ca.vertcat(v, w)[loop.freedom]
+        return rate if loop.other < 0 else rate - ca.vertcat(*motion[loop.other])[loop.freedom]
+    mv, mw = motion[loop.master]
+    across = _rotation(pose[:, loop.master]) @ ca.DM(loop.across)
+    if loop.axis is not None:
+        return ca.dot(w - mw, ca.cross(_rotation(pose[:, loop.node]) @ ca.DM(loop.axis), across))
+    arm = pose[:3, loop.node] - pose[:3, loop.master]
+    return ca.dot(across, v - mv) + ca.dot(mw, ca.cross(across, arm))
 
 
 def _own(number: int, values: ca.SX) -> ca.SX:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg import qr
 
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.kernel import Backend
+from flexctrl.mechanics.rotation import cross
 from flexctrl.model.linkage import Link, Linkage, Loop, renumbered
 from flexctrl.model.motion import Motion, State
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis
 from flexctrl.structure.structure import Structure
-from flexctrl.structure.ties import Closure, Copy, Group, Ties, Turn, tie
+from flexctrl.structure.ties import Closure, Copy, Fit, Group, Ties, Turn, tie
 
 
 def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...], backend: Backend) -> Motion:
@@ -62,7 +64,7 @@ def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
 class _Loops:
     """Independent closures, the degrees of freedom that depend on the others through them, and what to say of it."""
 
-    closures: tuple[Closure, ...]
+    closures: tuple[Closure | Fit, ...]
     dependent: tuple[int, ...]
     notes: tuple[str, ...]
 
@@ -103,6 +105,7 @@ def _linkage(
     used = {n for f in ties.follows for n in (f.node, f.master)} | {n for n, _ in ties.lines}
     used |= {n for pair in sides for n in pair}
     used |= set(np.flatnonzero(np.isin(place, loops.dependent).any(axis=1)).tolist())
+    used |= {n for c in loops.closures for n in _sides(c) if n >= 0}
     nodes = sorted(used)
     local = {n: i for i, n in enumerate(nodes)}
     owns = {f.own - 1 for f in ties.follows if not isinstance(f, Copy) and f.own}
@@ -119,10 +122,21 @@ def _linkage(
             Link(d, local[a], local[b], tuple((x[a] - x[b]).tolist()), d.name not in elastic)
             for d, (a, b) in zip(s.drives, sides, strict=True)
         ),
-        loops=tuple(Loop(local[c.node], c.freedom, local.get(c.other, -1)) for c in loops.closures),
+        loops=tuple(_local(c, local) for c in loops.closures),
         free=len(independent),
     )
     return linkage, np.array(nodes, dtype=int), np.array(independent, dtype=int)
+
+
+def _sides(c: Closure | Fit) -> tuple[int, int]:
+    """The two nodes of a condition; −1 for the ground."""
+    return (c.node, c.master if isinstance(c, Fit) else c.other)
+
+
+def _local(c: Closure | Fit, local: dict[int, int]) -> Loop | Fit:
+    """Return a condition in the node numbers of a linkage."""
+    node, other = (local.get(n, -1) for n in _sides(c))
+    return replace(c, node=node, master=other) if isinstance(c, Fit) else Loop(node, c.freedom, other)
 
 
 def _line_axes(along: Vector) -> np.ndarray:
@@ -172,15 +186,20 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
     return _Loops(tuple(ties.closures[i] for i in chosen), tuple(dependent), tuple(notes))
 
 
-def _openings(motion: Motion, state: State, closures: tuple[Closure, ...]) -> np.ndarray:
+def _openings(motion: Motion, state: State, closures: tuple[Closure | Fit, ...]) -> np.ndarray:
     """Return how fast each loop opens with each degree of freedom."""
     T = motion.jacobian(state)
-    rows = T[[6 * c.node + c.freedom for c in closures]].toarray()
-    others = [6 * c.other + c.freedom if c.other >= 0 else -1 for c in closures]
-    for row, other in zip(rows, others, strict=True):
-        if other >= 0:
-            row -= T[other].toarray().ravel()
-    return rows
+    return np.array([_opening(T, state, c) for c in closures])
+
+
+def _opening(T: sp.csr_matrix, state: State, c: Closure | Fit) -> np.ndarray:
+    node, other = (T[6 * n : 6 * n + 6].toarray() if n >= 0 else np.zeros((6, T.shape[1])) for n in _sides(c))
+    if isinstance(c, Closure):
+        return node[c.freedom] - other[c.freedom]
+    across = state.R[c.master] @ c.across
+    if c.axis is not None:
+        return cross(state.R[c.node] @ c.axis, across) @ (node[3:] - other[3:])
+    return across @ (node[:3] - other[:3]) + cross(across, state.x[c.node] - state.x[c.master]) @ other[3:]
 
 
 def _independent(A: np.ndarray, tolerance: float) -> list[int]:
@@ -192,5 +211,6 @@ def _independent(A: np.ndarray, tolerance: float) -> list[int]:
     return sorted(int(i) for i in order[:rank])
 
 
-def _label(structure: Structure, c: Closure) -> str:
-    return f"{FREEDOMS[c.freedom]} of {structure.nodes[c.node]}"
+def _label(structure: Structure, c: Closure | Fit) -> str:
+    node = structure.nodes[c.node]
+    return f"{node} on {structure.nodes[c.master]}" if isinstance(c, Fit) else f"{FREEDOMS[c.freedom]} of {node}"
