@@ -50,13 +50,13 @@ def _data(
     return data
 
 
-def _peak(cut: Cut, linear: LinearModel) -> dict[str, float]:
-    """The highest resonance: |H| at the damped frequencies of the modes; 0 where none oscillates or none is damped."""
+def _peak(cut: Cut, linear: LinearModel) -> dict[str, float | None]:
+    """The highest resonance: |H| at the damped frequencies of the modes; nothing where none is damped."""
     modes = linear.modes()
     omega, damping = modes.omega[modes.flexible], modes.damping[modes.flexible]
     heard = (omega > 1e-6 * omega.max(initial=0.0)) & (damping > 1e-9) & (damping < 1.0)
     if not heard.any():
-        return {"hz": 0.0, "magnitude": 0.0}
+        return {"hz": None, "magnitude": None}
     damped = omega[heard] * np.sqrt(1.0 - damping[heard] ** 2)
     response = linear.select([cut.input], [cut.output]).frequency_response(np.sort(damped))
     best = int(np.argmax(response.magnitude[0, 0]))

@@ -86,7 +86,6 @@ class Structure:
         _check_table(self)
         _check_coincidence(self)
         _check_drives(self)
-        _check_loads(self)
         _check_pieces(self)
 
     @cached_property
@@ -340,6 +339,12 @@ def _check_coincidence(s: Structure) -> None:
 
 def _check_drives(s: Structure) -> None:
     for drive in s.drives:
+        gap = 0.0 if drive.against is None else math.dist(drive.node.position, drive.against.position)
+        if isinstance(drive, RotaryDrive) and gap > _COINCIDE * s.size:
+            raise StructureError(
+                f"drive {drive.name!r}: {drive.node} and {drive.against} are {gap:.6g} m apart; a rotary drive sits "
+                "in a joint, between two nodes that coincide"
+            )
         if _held(s, drive):
             rotary = isinstance(drive, RotaryDrive)
             against = "the ground" if drive.against is None else str(drive.against)
@@ -362,21 +367,15 @@ def _held(s: Structure, drive: Drive) -> bool:
             if sorted(sides) == sorted(tuple(row[c] for c in columns) for row in (mine, other)):
                 axis = joint.axis if isinstance(joint, Hinge) else joint.along
                 return abs(sum(a * b for a, b in zip(axis, drive.direction, strict=True))) < 1.0 - 1e-9
-    return any(mine[c] == other[c] for c, d in zip(columns, drive.direction, strict=True) if abs(d) > 1e-9)
+    if drive.against is None or drive.node.part != drive.against.part:
+        columns = _told(s, drive, columns)
+    return any(mine[c] == other[c] for c in columns if abs(drive.direction[c % 3]) > 1e-9)
 
 
-def _check_loads(s: Structure) -> None:
-    """A force or torque that only acts on held freedoms does nothing: surely not what was meant."""
-    rows = s.join_table.rows
-    for load in s.inputs:
-        if isinstance(load, Force | Torque):
-            offset = 0 if isinstance(load, Force) else 3
-            cells = [rows[s.number(n)][offset + i] for n in load.at for i in range(3) if abs(load.direction[i]) > 1e-9]
-            if not any(cells):
-                raise StructureError(
-                    f"{type(load).__name__} {load.name!r}: acts on {load.at[0]} along {load.direction}, where every "
-                    "freedom is held, so it moves nothing; choose another node or direction, or free the support"
-                )
+def _told(s: Structure, drive: Drive, columns: Iterable[int]) -> list[int]:
+    """The columns in which equal numbers say it all: neither side rides on a lever."""
+    rows = [s.number(n) for n in (drive.node, drive.against) if n is not None]
+    return [c for c in columns if not any((row, c) in s.join_table.relative for row in rows)]
 
 
 def _check_pieces(s: Structure) -> None:

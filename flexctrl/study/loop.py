@@ -119,7 +119,7 @@ class Loop:
         poles = poles[~self.at_rest(poles)]
         outside = abs(poles) - 1.0 if self.dt else poles.real
         # a pole that is double at rest splits by the root of its rounding
-        split = AT_REST * float(abs(poles).max(initial=0.0))
+        split = 10.0 * AT_REST * float(abs(poles).max(initial=0.0))
         allowed = np.maximum(BOUNDARY * abs(poles), split)
         return bool((outside < allowed).all() and (outside > -allowed).any())
 

@@ -62,6 +62,16 @@ def test_ropes_and_point_masses_may_be_pinned_or_welded_to_each_other():
         assert table.rows == ((0,) * 6, (1, 2, 3, 0, 0, 0), (1, 2, 3, 0, 0, 0))
 
 
+def test_forces_and_drives_may_act_on_levers():
+    """The point of a body that is held at another point moves, although its row shows the held one."""
+    pinned = fc.Support(BODY.point("foot"), "u v w")
+    push = fc.Force("push", BODY.point("head"), "x")
+    ram = mover(BODY.point("head"))
+    structure = fc.Structure([BODY], [pinned], [ram], [push])
+    assert structure.join_table.rows[2][:3] == (0, 0, 0)
+    assert {(2, c) for c in range(3)} <= structure.join_table.relative
+
+
 def test_a_drive_may_work_between_nodes_of_one_beam():
     fc.Structure([B], [fc.Support(B.start)], [motor(B.end, B.node(1))])
 
@@ -137,12 +147,18 @@ def test_the_node_of_an_equal_part_is_as_good():
         ([BODY], [], {"drives": [motor(BODY.point("foot"), BODY.node)]}, "holds the rotation"),
         ([A], [CLAMP], {"drives": [motor(A.end, A.end)]}, "holds the rotation"),
         ([A], [CLAMP], {"drives": [motor(B.end)]}, "drive 'motor': node 2 of b at .* is not in structure"),
-        ([A], [CLAMP], {"inputs": [fc.MotorTorque("t", "motor")]}, "MotorTorque 't': there is no 'motor'"),
+        ([A], [CLAMP], {"inputs": [fc.MotorTorque("pull", "motor")]}, "MotorTorque 'pull': there is no 'motor'"),
         (
             [A],
             [CLAMP],
             {"drives": [motor(A.end)], "outputs": [fc.DriveAngle("angle", "moter")]},
             "there is no 'moter'; did you mean 'motor'",
+        ),
+        (
+            [A],
+            [fc.Support(A.start, "v w")],
+            {"inputs": [fc.Force("f", A.start, "z")]},
+            "Force 'f': acts on node 0 of a along .*, where every freedom is held.*or free the support",
         ),
         ([A], [CLAMP], {"outputs": [fc.Tension("pull", "a")]}, "Tension 'pull': there is no 'a'"),
         ([A], [CLAMP], {"inputs": [fc.Force("f", B.end, "x")]}, "Force 'f': node 2 of b"),
@@ -199,3 +215,14 @@ def test_planar_holds_the_three_freedoms_out_of_the_plane():
     rows = fc.planar(fc.Structure([A, ROPE], [fc.Pin(A.end, ROPE.start)]), "y").join_table.rows
     assert all(row[1] == row[3] == row[5] == 0 for row in rows)
     assert fc.planar(fc.Structure([A]), "-y") == fc.planar(fc.Structure([A]), "y")
+
+
+def test_a_signal_is_not_called_t():
+    with pytest.raises(StructureError, match="t is the time"):
+        fc.Force("t", A.end, "x")
+
+
+def test_a_rotary_drive_sits_in_a_joint():
+    far = fc.Beam("far", A.end, (3.0, 1.0, 0.0), A.section)
+    with pytest.raises(StructureError, match="apart"):
+        fc.Structure([A, far], [CLAMP, fc.Weld(A.end, far.start)], [fc.RotaryDrive("d", far.end, A.end, stiffness=1.0)])
