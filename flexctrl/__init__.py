@@ -55,6 +55,7 @@ _HOMES = {
     "flexctrl.dynamics.sampled": ("sampled_response",),
     "flexctrl.design": ("Delayed", "Noisy", "OpenLoop", "Quantised", "RateLimited", "Sampled", "Saturated", "Tracking"),
     "flexctrl.study.compare": ("Comparison", "compare"),
+    "flexctrl.study.spillover": ("Spillover", "spillover"),
     "flexctrl.scene": ("Scene", "Simulation", "Start", "load_scene"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -46,7 +46,16 @@ class Audit:
     mechanisms: tuple[tuple[str, ...], ...]
 
     def named(self, kind: Freedom) -> tuple[str, ...]:
-        """Names of the coordinates with this label."""
+        """Names of the coordinates with this label.
+
+        Parameters
+        ----------
+        kind : Freedom
+
+        Returns
+        -------
+        tuple of str
+        """
         return tuple(name for name, label in zip(self.coordinates, self.labels, strict=True) if label is kind)
 
     def __str__(self) -> str:

@@ -1,0 +1,248 @@
+"""The spillover certificate: which gain of a controller destabilises which part of a flexible machine."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexctrl.design.controller import LinearController
+from flexctrl.errors import StructureError
+from flexctrl.model.assemble import rigid
+from flexctrl.model.equilibrium import Rest, equilibrium
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.linearize import linearize
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+from flexctrl.study.broken_loop import linear_law
+from flexctrl.study.critical_mode import CriticalMode, critical_mode
+from flexctrl.study.gain_family import Crossing, GainFamily, first_crossing, gain_family
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from flexctrl.study.confirm import Confirmation
+
+__all__ = ["Spillover", "spillover"]
+
+_DOWN = 1.4
+_BRANCH = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Spillover:
+    """How much of its gain a controller may have on a machine, and what goes unstable beyond.
+
+    Attributes
+    ----------
+    gain : float
+        Critical factor k* on the loop gain: stable below, unstable just above. Infinite if the loop stays
+        stable up to ``searched[1]``, 0 if it is unstable at all gains down to ``searched[0]``.
+    mode : CriticalMode or None
+        None if nothing goes unstable. At gain 0 the worst mode at the controller's own gain.
+    rigid_gain : float or None
+        The same critical gain on the rigid twin; None if the plant was a linear model.
+    searched : tuple of float
+        Range of gains.
+    gains : numpy.ndarray, shape (m,)
+        Gains along the branch of the critical mode.
+    branch : numpy.ndarray of complex, shape (m,)
+        Its poles s there [1/s].
+    linear : LinearModel
+    law : LinearController
+        The controller without references, limits, rounding and noise.
+    plant : Model or None
+    at : State or None
+        The equilibrium the linear model belongs to.
+    inputs : numpy.ndarray
+        Its constant inputs.
+    """
+
+    gain: float
+    mode: CriticalMode | None
+    rigid_gain: float | None
+    searched: tuple[float, float]
+    gains: np.ndarray
+    branch: np.ndarray
+    linear: LinearModel = field(repr=False)
+    law: LinearController = field(repr=False)
+    plant: Model | None = field(repr=False)
+    at: State | None = field(repr=False)
+    inputs: np.ndarray = field(repr=False)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the machine is stable under the controller as it is."""
+        return self.gain > 1.0
+
+    def confirm(self, margin: float = 0.02) -> Confirmation:
+        """Run the nonlinear machine just below and above the critical gain; see `flexctrl.study.confirm.confirm`.
+
+        Parameters
+        ----------
+        margin : float
+            Relative distance from the critical gain.
+        """
+        from flexctrl.study.confirm import confirm
+
+        return confirm(self, margin)
+
+    def plot(self, confirmation: Confirmation | None = None) -> Figure:
+        """Draw the critical mode's damping over the gain, and where its energy is.
+
+        Parameters
+        ----------
+        confirmation : Confirmation, optional
+            From `confirm`: its runs are drawn too.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        return importlib.import_module("flexctrl.plots.spillover").spillover_figure(self, confirmation)
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.linear.name} {self._verdict()}", *self._twin()])
+
+    def _verdict(self) -> str:
+        if self.mode is None:
+            return f"stays stable up to {self.searched[1]:.4g} × the controller's gain"
+        where = _where(self.mode)
+        if self.gain == 0.0:
+            return f"is unstable at every gain down to {self.searched[0]:.3g} × the controller's, {where}"
+        if self.gain < 1.0:
+            return f"is unstable: it bears only {self.gain:.4g} × the controller's gain; beyond, it oscillates {where}"
+        return f"goes unstable at {self.gain:.4g} × the controller's gain, {where}"
+
+    def _twin(self) -> list[str]:
+        if self.rigid_gain is None:
+            return []
+        if self.rigid_gain == np.inf:
+            return [f"its rigid twin stays stable up to {self.searched[1]:.4g} ×"]
+        return [f"its rigid twin {'is never stable' if not self.rigid_gain else f'bears {self.rigid_gain:.4g} ×'}"]
+
+
+def _where(mode: CriticalMode) -> str:
+    how = f"at {mode.frequency_hz:.4g} Hz" if mode.frequency_hz else "without oscillating"
+    if not mode.lives_in:
+        return f"{how}, out of mode {mode.origin.number}"
+    kinetic, at_kinetic = _home(mode.kinetic_shares)
+    if not any(mode.strain_shares.values()):
+        return f"{how}, in the mode that lives in {kinetic} ({at_kinetic} of kinetic energy)"
+    strained, at_strained = _home(mode.strain_shares)
+    there = "" if kinetic == strained else f" in {kinetic}"
+    return (
+        f"{how}, in the mode that lives in {strained} ({at_strained} of strain energy, {at_kinetic} of kinetic{there})"
+    )
+
+
+def _home(shares: Mapping[str, float]) -> tuple[str, str]:
+    """The part with the largest share, with all that have the same; and how much each has."""
+    most = max(shares.values())
+    names = [name for name, share in shares.items() if share > 0.99 * most]
+    return " and ".join(names), f"{100 * most:.0f} %" + (" each" if len(names) > 1 else "")
+
+
+def spillover(
+    plant: Model | LinearModel,
+    controller: Any,
+    at: Rest | State | None = None,
+    least: float = 1e-3,
+    most: float = 1e3,
+) -> Spillover:
+    """Find the gain at which a controller destabilises a flexible machine, and the part that gives way.
+
+    The loop gain is scaled from the controller's own (1) up until an eigenvalue of the closed loop leaves the
+    stable half plane (the unit circle under a sampled controller, with the machine sampled exactly); if the loop
+    is unstable at 1, from the first stable gain below. Modes are followed from gain to gain by their eigenvalues
+    and slopes, and the critical gain is finished by Newton's method.
+
+    Parameters
+    ----------
+    plant : Model or LinearModel
+    controller : Controller or python-control system
+        Typically designed on the rigid twin; continuous or sampled; signals by name, its minus sign inside.
+        References, limits, rounding and noise in it play no part.
+    at : Rest or State, optional
+        Equilibrium of a model; default: found from the drawn shape. The twin is balanced under the same inputs.
+    least, most : float
+        Range of gains to search, ``least < 1 < most``.
+
+    Returns
+    -------
+    Spillover
+
+    Raises
+    ------
+    StructureError
+        For an empty range, an unknown signal, or an output that depends directly on an input.
+    ControllerError
+        If the controller is not linear.
+    """
+    if not 0.0 < least < 1.0 < most:
+        raise StructureError(f"spillover: gains from {least} to {most}; expected 0 < least < 1 < most")
+    law = linear_law(controller)
+    if isinstance(plant, LinearModel):
+        return _certificate(plant, law, (least, most), None, None, np.zeros(len(plant.inputs)), None)
+    rest = equilibrium(plant) if at is None else at
+    u = rest.inputs if isinstance(rest, Rest) else np.zeros(len(plant.inputs))
+    linear = linearize(plant, at=rest)
+    state = rest.state if isinstance(rest, Rest) else rest
+    twin = _rigid_gain(plant, law, u, (least, most))
+    return _certificate(linear, law, (least, most), plant, state, u, twin)
+
+
+def _rigid_gain(model: Model, law: LinearController, u: np.ndarray, searched: tuple[float, float]) -> float:
+    twin = rigid(model)
+    assert isinstance(twin, Model)
+    rest = equilibrium(twin, inputs=dict(zip(model.inputs, u.tolist(), strict=True)))
+    return _critical(gain_family(linearize(twin, at=rest), law), searched)[0]
+
+
+def _critical(family: GainFamily, searched: tuple[float, float]) -> tuple[float, Crossing | None]:
+    """Critical gain and its crossing; for a loop that is never stable, its worst pole at gain 1."""
+    least, most = searched
+    gain, first = 1.0, family.at(1.0)
+    while not family.at(gain).stable:
+        gain /= _DOWN
+        if gain < least:
+            return 0.0, Crossing(first, first.worst)
+    found = first_crossing(family, gain, most)
+    return (np.inf, None) if found is None else (found.gain, found)
+
+
+def _certificate(
+    linear: LinearModel,
+    law: LinearController,
+    searched: tuple[float, float],
+    plant: Model | None,
+    at: State | None,
+    u: np.ndarray,
+    twin: float | None,
+) -> Spillover:
+    family = gain_family(linear, law)
+    gain, crossing = _critical(family, searched)
+    empty = np.zeros(0)
+    if crossing is None:
+        return Spillover(gain, None, twin, searched, empty, empty, linear, law, plant, at, u)
+    gains, branch = _branch(family, crossing, searched)
+    mode = critical_mode(linear, law, family, crossing, complex(np.interp(1.0, gains, branch)))
+    return Spillover(gain, mode, twin, searched, gains, branch, linear, law, plant, at, u)
+
+
+def _branch(family: GainFamily, crossing: Crossing, searched: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Follow the critical pole to lower gains, at least to 1, and a little beyond."""
+    center = crossing.gain
+    low, high = max(searched[0], min(0.03 * center, 0.3)), max(1.3 * center, 1.001)
+    wanted = np.unique([*np.geomspace(low, center, _BRANCH), *np.geomspace(center, high, _BRANCH // 3), 1.0])
+    found = {center: complex(crossing.spectrum.poles[crossing.pole])}
+    for way in (wanted[wanted < center][::-1], wanted[wanted > center]):
+        here, pole = crossing.spectrum, crossing.pole
+        for gain in way:
+            here, pole = family.followed(here, pole, float(gain))
+            found[float(gain)] = complex(here.poles[pole])
+    gains = np.array(sorted(found))
+    return gains, np.array([family.continuous(found[gain]) for gain in gains])
