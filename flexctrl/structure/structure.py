@@ -367,9 +367,9 @@ def _held(s: Structure, drive: Drive) -> bool:
             if sorted(sides) == sorted(tuple(row[c] for c in columns) for row in (mine, other)):
                 axis = joint.axis if isinstance(joint, Hinge) else joint.along
                 return abs(sum(a * b for a, b in zip(axis, drive.direction, strict=True))) < 1.0 - 1e-9
-    if drive.against is None or drive.node.part != drive.against.part:
-        columns = _told(s, drive, columns)
-    return any(mine[c] == other[c] for c in columns if abs(drive.direction[c % 3]) > 1e-9)
+    apart = drive.against is None or drive.node.part != drive.against.part
+    told = _told(s, drive, columns) if apart else columns
+    return any(mine[c] == other[c] for c in told if abs(drive.direction[c % 3]) > 1e-9)
 
 
 def _told(s: Structure, drive: Drive, columns: Iterable[int]) -> list[int]:
