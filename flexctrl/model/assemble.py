@@ -18,9 +18,9 @@ from flexctrl.model.mobility import motion_of
 from flexctrl.model.model import Model
 from flexctrl.structure.elements import Beam, Rope
 from flexctrl.structure.freedoms import listed
+from flexctrl.structure.relations import Group
 from flexctrl.structure.signals import Tension
 from flexctrl.structure.structure import Structure
-from flexctrl.structure.ties import Group
 
 
 def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend | None = None) -> Model:

@@ -19,7 +19,7 @@ from flexctrl.mechanics.pieces import DriveMotion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
 from flexctrl.structure.drives import Drive, RotaryDrive
 from flexctrl.structure.freedoms import Vector
-from flexctrl.structure.ties import Copy, Fit, Follow, Ride, Turn
+from flexctrl.structure.relations import Copy, Fit, Follow, Ride, Turn
 
 if TYPE_CHECKING:
     import casadi as ca

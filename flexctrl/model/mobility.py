@@ -16,8 +16,9 @@ from flexctrl.model.motion import Motion, State
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis
+from flexctrl.structure.relations import Closure, Copy, Fit, Group, Ties, Turn
 from flexctrl.structure.structure import Structure
-from flexctrl.structure.ties import Closure, Copy, Fit, Group, Ties, Turn, tie
+from flexctrl.structure.ties import tie
 
 
 def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...], backend: Backend) -> Motion:

@@ -11,7 +11,8 @@ from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector, check_whole, listed, numbers
 from flexctrl.structure.joints import Joint, main_axis
-from flexctrl.structure.ties import Copy, Follow, Group, Ride, Turn, tie
+from flexctrl.structure.relations import Copy, Follow, Group, Ride, Turn
+from flexctrl.structure.ties import tie
 
 Row = tuple[int, int, int, int, int, int]
 

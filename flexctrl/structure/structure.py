@@ -14,6 +14,7 @@ from flexctrl.structure.elements import Node, Part, RigidBody, Rope, Spring, che
 from flexctrl.structure.freedoms import FREEDOMS, check_name, listed, parse_direction
 from flexctrl.structure.join_table import JoinTable, Row, drive_row, join
 from flexctrl.structure.joints import Hinge, Joint, Slide, Support, Weld, main_axis
+from flexctrl.structure.relations import Group
 from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
@@ -29,7 +30,6 @@ from flexctrl.structure.signals import (
     Torque,
     Velocity,
 )
-from flexctrl.structure.ties import Group
 
 _COINCIDE = 1e-6
 

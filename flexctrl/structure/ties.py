@@ -8,101 +8,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from dataclasses import replace
 
-from flexctrl.errors import StructureError
 from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import Vector
 from flexctrl.structure.joints import Hinge, Joint, Slide, Support, main_axis
-
-
-@dataclass(frozen=True)
-class Group:
-    """Nodes of one part that keep their distances; ``line`` if they have no rotations of their own."""
-
-    part: str
-    nodes: tuple[int, ...]
-    line: bool = False
-
-
-@dataclass(frozen=True)
-class Ride:
-    """x_node = x_master + R_master (arm + s·along): a point of a body, or a slide in its axes."""
-
-    node: int
-    master: int
-    along: Vector | None = None
-    own: int = 0
-
-
-@dataclass(frozen=True)
-class Turn:
-    """R_node = R_master exp(φ·axis): a hinge whose axis rides with the master; ``own`` numbers ω_node·axis."""
-
-    node: int
-    master: int
-    axis: Vector
-    own: int = 0
-
-
-@dataclass(frozen=True)
-class Copy:
-    """Freedom ``freedom`` (0…2; 3 stands for all rotations) of ``node`` is that of ``master``."""
-
-    node: int
-    freedom: int
-    master: int
-
-
-Follow: TypeAlias = Ride | Turn | Copy
-
-
-@dataclass(frozen=True)
-class Closure:
-    """A freedom that a follower may not have: held (``other`` = -1) or equal to that of ``other``."""
-
-    node: int
-    freedom: int
-    other: int
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A ride or turn of a node whose place is told already: one condition on where it is against the master.
-
-    ``across``, carried by the master, keeps its product with the arm between the two (a ride or slide), or
-    stays square to ``axis`` as the node carries it (a turn).
-    """
-
-    node: int
-    master: int
-    across: Vector
-    axis: Vector | None = None
-
-
-@dataclass(frozen=True)
-class Ties:
-    """Where each nodal freedom gets its value.
-
-    Attributes
-    ----------
-    cells : tuple of 6-tuples
-        Number of the degree of freedom (from 1), 0 for held, -1 for one that follows.
-    follows : tuple of Ride, Turn or Copy
-        In an order in which they can be evaluated.
-    closures : tuple of Closure or Fit
-        Conditions on followers that close a loop of rigid parts.
-    lines : tuple of (int, Vector)
-        Nodes whose rotation is the direction of a line: turned about body axes across it only.
-    free : int
-    """
-
-    cells: tuple[tuple[int, ...], ...]
-    follows: tuple[Follow, ...]
-    closures: tuple[Closure | Fit, ...]
-    lines: tuple[tuple[int, Vector], ...]
-    free: int
+from flexctrl.structure.relations import (
+    Closure,
+    Copy,
+    Fit,
+    Follow,
+    Group,
+    Ride,
+    Ties,
+    Turn,
+    fits,
+    in_order,
+    own_column,
+    reads,
+    writes,
+)
 
 
 def tie(nodes: Sequence[Node], joints: Sequence[Joint], groups: Sequence[Group]) -> Ties:
@@ -286,26 +211,26 @@ class _Tying:
 
     def _follow(self, follow: Follow) -> None:
         """Let a node follow; if its place is told already, or the master's hangs on it, demand that it fits."""
-        if _write(follow) in self.writers or self._hangs(follow):
-            self.closures += _fits(follow)
+        if writes(follow) in self.writers or self._hangs(follow):
+            self.closures += fits(follow)
             return
         self.follows.append(follow)
-        self.writers[_write(follow)] = follow
+        self.writers[writes(follow)] = follow
         self._define(follow.node, range(3, 6) if isinstance(follow, Turn) else range(3))
 
     def _hangs(self, follow: Follow) -> bool:
         """Tell whether what a follower reads hangs on what it writes."""
-        todo, seen = list(_reads(follow)), set()
+        todo, seen = list(reads(follow)), set()
         while todo:
             value = todo.pop()
-            if value == _write(follow):
+            if value == writes(follow):
                 return True
             if value not in seen:
                 seen.add(value)
                 node, turns = value
                 cells = (self.cell(node, f) for f in (range(3, 6) if turns else range(3)))
                 todo += [(self.definer[c], turns) for c in cells if self.definer.get(c, node) != node]
-                todo += _reads(self.writers[value]) if value in self.writers else ()
+                todo += reads(self.writers[value]) if value in self.writers else ()
         return False
 
     def _define(self, node: int, freedoms: range) -> None:
@@ -335,9 +260,9 @@ class _Tying:
                 cell = self.cell(i, f)
                 follow = computed.get((i, f))
                 if follow is not None:
-                    if f == _own_column(follow):
+                    if f == own_column(follow):
                         free += 1
-                        owns[_write(follow)] = free
+                        owns[writes(follow)] = free
                     row.append(-1)
                 elif cell in self.definer:
                     copies.append(Copy(i, min(f, 3), self.definer[cell]))
@@ -353,56 +278,10 @@ class _Tying:
                     row.append(numbers.setdefault(cell, free))
             cells.append(tuple(row))
         follows = [self._numbered(f, owns) for f in self.follows] + list(dict.fromkeys(copies))
-        return Ties(tuple(cells), _sorted(follows), tuple(self.closures), tuple(self.lines), free)
+        return Ties(tuple(cells), in_order(follows), tuple(self.closures), tuple(self.lines), free)
 
     def _numbered(self, follow: Follow, owns: dict[tuple[int, bool], int]) -> Follow:
-        return follow if isinstance(follow, Copy) else replace(follow, own=owns.get(_write(follow), 0))
+        return follow if isinstance(follow, Copy) else replace(follow, own=owns.get(writes(follow), 0))
 
 
-def _fits(follow: Follow) -> list[Fit]:
-    axis = follow.axis if isinstance(follow, Turn) else follow.along if isinstance(follow, Ride) else None
-    unit: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
-    if axis is None:
-        return [Fit(follow.node, follow.master, e) for e in unit]
-    first = _square(axis, unit[(main_axis(axis) + 1) % 3])
-    both = (first, _square(axis, first))
-    return [Fit(follow.node, follow.master, e, axis if isinstance(follow, Turn) else None) for e in both]
-
-
-def _square(a: Vector, b: Vector) -> Vector:
-    """Return the direction of a × b."""
-    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    size = math.hypot(x, y, z)
-    return (x / size, y / size, z / size)
-
-
-def _own_column(follow: Follow) -> int:
-    if isinstance(follow, Turn):
-        return 3 + main_axis(follow.axis)
-    return main_axis(follow.along) if isinstance(follow, Ride) and follow.along else -1
-
-
-def _write(follow: Follow) -> tuple[int, bool]:
-    return (follow.node, isinstance(follow, Turn) or (isinstance(follow, Copy) and follow.freedom == 3))
-
-
-def _reads(follow: Follow) -> tuple[tuple[int, bool], ...]:
-    if isinstance(follow, Ride):
-        return ((follow.master, False), (follow.master, True))
-    return ((follow.master, isinstance(follow, Turn) or follow.freedom == 3),)
-
-
-def _sorted(follows: Sequence[Follow]) -> tuple[Follow, ...]:
-    """Order the followers so that every master is known before its follower."""
-    left, done = list(follows), []
-    while left:
-        waiting = {_write(f) for f in left}
-        ready = [f for f in left if waiting.isdisjoint(_reads(f))]
-        if not ready:
-            raise StructureError("rigid parts follow each other in a circle; make one of them flexible")
-        done += ready
-        left = [f for f in left if not waiting.isdisjoint(_reads(f))]
-    return tuple(done)
-
-
-__all__ = ["Closure", "Copy", "Fit", "Follow", "Group", "Ride", "Ties", "Turn", "tie"]
+__all__ = ["tie"]

@@ -1,0 +1,150 @@
+"""What the nodes of a machine may be to each other: followers, and conditions that close loops of rigid parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from flexctrl.errors import StructureError
+from flexctrl.structure.freedoms import Vector
+from flexctrl.structure.joints import main_axis
+
+
+@dataclass(frozen=True)
+class Group:
+    """Nodes of one part that keep their distances; ``line`` if they have no rotations of their own."""
+
+    part: str
+    nodes: tuple[int, ...]
+    line: bool = False
+
+
+@dataclass(frozen=True)
+class Ride:
+    """x_node = x_master + R_master (arm + s·along): a point of a body, or a slide in its axes."""
+
+    node: int
+    master: int
+    along: Vector | None = None
+    own: int = 0
+
+
+@dataclass(frozen=True)
+class Turn:
+    """R_node = R_master exp(φ·axis): a hinge whose axis rides with the master; ``own`` numbers ω_node·axis."""
+
+    node: int
+    master: int
+    axis: Vector
+    own: int = 0
+
+
+@dataclass(frozen=True)
+class Copy:
+    """Freedom ``freedom`` (0…2; 3 stands for all rotations) of ``node`` is that of ``master``."""
+
+    node: int
+    freedom: int
+    master: int
+
+
+Follow: TypeAlias = Ride | Turn | Copy
+
+
+@dataclass(frozen=True)
+class Closure:
+    """A freedom that a follower may not have: held (``other`` = -1) or equal to that of ``other``."""
+
+    node: int
+    freedom: int
+    other: int
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A ride or turn of a node whose place is told already: one condition on where it is against the master.
+
+    ``across``, carried by the master, keeps its product with the arm between the two (a ride or slide), or
+    stays square to ``axis`` as the node carries it (a turn).
+    """
+
+    node: int
+    master: int
+    across: Vector
+    axis: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Ties:
+    """Where each nodal freedom gets its value.
+
+    Attributes
+    ----------
+    cells : tuple of 6-tuples
+        Number of the degree of freedom (from 1), 0 for held, -1 for one that follows.
+    follows : tuple of Ride, Turn or Copy
+        In an order in which they can be evaluated.
+    closures : tuple of Closure or Fit
+        Conditions on followers that close a loop of rigid parts.
+    lines : tuple of (int, Vector)
+        Nodes whose rotation is the direction of a line: turned about body axes across it only.
+    free : int
+    """
+
+    cells: tuple[tuple[int, ...], ...]
+    follows: tuple[Follow, ...]
+    closures: tuple[Closure | Fit, ...]
+    lines: tuple[tuple[int, Vector], ...]
+    free: int
+
+
+def fits(follow: Follow) -> list[Fit]:
+    """Return what a follower's place must meet where it is told already."""
+    axis = follow.axis if isinstance(follow, Turn) else follow.along if isinstance(follow, Ride) else None
+    unit: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    if axis is None:
+        return [Fit(follow.node, follow.master, e) for e in unit]
+    first = _square(axis, unit[(main_axis(axis) + 1) % 3])
+    both = (first, _square(axis, first))
+    return [Fit(follow.node, follow.master, e, axis if isinstance(follow, Turn) else None) for e in both]
+
+
+def _square(a: Vector, b: Vector) -> Vector:
+    """Return the direction of a × b."""
+    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    size = math.hypot(x, y, z)
+    return (x / size, y / size, z / size)
+
+
+def own_column(follow: Follow) -> int:
+    """Return the join table's column of a follower's own freedom, −1 if it has none."""
+    if isinstance(follow, Turn):
+        return 3 + main_axis(follow.axis)
+    return main_axis(follow.along) if isinstance(follow, Ride) and follow.along else -1
+
+
+def writes(follow: Follow) -> tuple[int, bool]:
+    """Return the node a follower places, and whether it is its rotation."""
+    return (follow.node, isinstance(follow, Turn) or (isinstance(follow, Copy) and follow.freedom == 3))
+
+
+def reads(follow: Follow) -> tuple[tuple[int, bool], ...]:
+    """Return what a follower needs of its master: position, rotation or both."""
+    if isinstance(follow, Ride):
+        return ((follow.master, False), (follow.master, True))
+    return ((follow.master, isinstance(follow, Turn) or follow.freedom == 3),)
+
+
+def in_order(follows: Sequence[Follow]) -> tuple[Follow, ...]:
+    """Order the followers so that every master is known before its follower."""
+    left, done = list(follows), []
+    while left:
+        waiting = {writes(f) for f in left}
+        ready = [f for f in left if waiting.isdisjoint(reads(f))]
+        if not ready:
+            raise StructureError("rigid parts follow each other in a circle; make one of them flexible")
+        done += ready
+        left = [f for f in left if not waiting.isdisjoint(reads(f))]
+    return tuple(done)
