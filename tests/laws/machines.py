@@ -182,6 +182,34 @@ def bridle() -> fc.Structure:
     return _signalled([trolley, *ropes, load], joints, [drive], load.node, outputs)
 
 
+def double_girder() -> fc.Structure:
+    """Two girders on end carriages with wheels, a trolley that slides on both, a load under it: loops on loops."""
+    ends = {"near": -1.5, "far": 1.5}
+    rails = {"left": -0.4, "right": 0.4}
+    carriages = [
+        fc.RigidBody(end, (0, y, 0), 2.0, (0.3, 0.4, 0.3), {rail: (x, y, 0) for rail, x in rails.items()})
+        for end, y in ends.items()
+    ]
+    girders = [fc.Beam(f"{rail}_girder", (x, -1.5, 0), (x, 1.5, 0), SECTION, 2) for rail, x in rails.items()]
+    trolley = fc.RigidBody("trolley", (0, 0, 0.2), 1.5, (0.2, 0.2, 0.3), {rail: (x, 0, 0) for rail, x in rails.items()})
+    rope = fc.Rope("rope", trolley.node, (0, 0, -1.0), EA=500.0)
+    load = fc.PointMass("load", rope.end, 2.0)
+    joints = [fc.Support(c.point(rail), "w") for c in carriages for rail in rails]
+    joints += [fc.Support(carriages[0].point(rail), "v") for rail in rails]
+    for rail, girder in zip(rails, girders, strict=True):
+        joints += [fc.Weld(carriages[0].point(rail), girder.start), fc.Weld(girder.end, carriages[1].point(rail))]
+        joints.append(fc.Slide(girder.node(1), trolley.point(rail), "y"))
+    joints += [fc.Pin(trolley.node, rope.start), fc.Pin(rope.end, load.node)]
+    drives = [
+        fc.LinearDrive("travel", carriages[0].node, direction="x", radius=0.2, stiffness=8.0, inertia=0.05),
+        fc.LinearDrive(
+            "cross", trolley.point("left"), girders[0].node(1), direction="y", radius=0.1, stiffness=8.0, inertia=0.05
+        ),
+    ]
+    outputs = [fc.SwayAngle("sway", trolley.node, load.node, "y")]
+    return _signalled([*carriages, *girders, trolley, rope, load], joints, drives, load.node, outputs)
+
+
 def _signalled(elements: list, joints: list, drives: list, node: fc.Node, outputs: list) -> fc.Structure:
     inputs = [fc.Force("push", node, (1.0, 0.5, -0.3)), *(fc.MotorTorque(f"{d.name}_torque", d) for d in drives)]
     outputs += [fc.DriveAngle(f"{d.name}_angle", d) for d in drives]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from machines import bridle, four_bar, machine
+from machines import bridle, double_girder, four_bar, machine
 from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
@@ -23,7 +23,7 @@ EFFECTS = {
 }
 FEW = [("flexible", s) for s in (1, 2, 4, 6, 15)] + [("rigid", s) for s in (1, 2, 3, 4, 6, 15, 23)]
 FEW += [("beams", 10), ("shafts", 7)]
-LOOPS = {"four_bar": four_bar, "bridle": bridle}
+LOOPS = {"four_bar": four_bar, "bridle": bridle, "double_girder": double_girder}
 MANY = [(kind, s) for s in range(24, 60) for kind in ("flexible", "rigid")]
 CASES = [(*case, s % 3 > 0) for case in FEW for s in case[1:]]
 CASES += [(kind, name, True) for name in LOOPS for kind in ("rigid", "shafts", "beams")]
