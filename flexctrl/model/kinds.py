@@ -194,17 +194,27 @@ def _spring(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.S
     import casadi as ca
 
     m = pieces.line_motion(nodes[0], nodes[1], parameters)
-    tension = sum((e.spring(m) for e in effects), pieces.spring_tension(m))
-    return Shares(ca.SX(6, 1), pieces.line_force(m, tension), ca.SX(1, 1), pieces.spring_energy(m))
+    return Shares(ca.SX(6, 1), pieces.line_force(m, spring_pull(effects, m)), ca.SX(1, 1), pieces.spring_energy(m))
+
+
+def spring_pull(effects: tuple[Effect, ...], m: pieces.LineMotion) -> ca.SX:
+    """Return the tension in a spring under some effects."""
+    return sum((e.spring(m) for e in effects), pieces.spring_tension(m))
 
 
 def _rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
     import casadi as ca
 
     m = pieces.line_motion(nodes[0], nodes[1], parameters)
-    pull = sum((e.rope(m) for e in effects), ca.SX(1, 1))
     stored = sum((e.rope_energy(m) for e in effects), ca.SX(1, 1))
-    return Shares(ca.SX(6, 1), pieces.line_force(m, pieces.unilateral(m, pull)), ca.SX(1, 1), stored)
+    return Shares(ca.SX(6, 1), pieces.line_force(m, rope_pull(effects, m)), ca.SX(1, 1), stored)
+
+
+def rope_pull(effects: tuple[Effect, ...], m: pieces.LineMotion) -> ca.SX:
+    """Return the tension in a rope under some effects."""
+    import casadi as ca
+
+    return pieces.unilateral(m, sum((e.rope(m) for e in effects), ca.SX(1, 1)))
 
 
 def _body(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:

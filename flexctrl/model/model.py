@@ -93,7 +93,7 @@ class Model:
     @cached_property
     def signals(self) -> Signals:
         """Inputs and outputs, ready to be evaluated."""
-        return signals_of(self.structure, self.motion)
+        return signals_of(self.structure, self.effects, self.motion)
 
     @cached_property
     def forces(self) -> Forces:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.effects.effect import Effect
+from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.pieces import line_motion
+from flexctrl.model.kinds import rope_pull, spring_pull
 from flexctrl.model.motion import Motion, State
 from flexctrl.structure.elements import Rope, Spring
 from flexctrl.structure.signals import (
@@ -25,6 +30,9 @@ from flexctrl.structure.signals import (
     Velocity,
 )
 from flexctrl.structure.structure import Structure
+
+if TYPE_CHECKING:
+    import casadi as ca
 
 Gauge = Callable[[State, np.ndarray], float]
 Slope = Callable[[State, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
@@ -71,15 +79,15 @@ def _matrix(entries: list, rows: int, columns: int) -> sp.csr_matrix:
     return sp.csr_matrix((v, (r, c)), shape=(rows, columns), dtype=float)
 
 
-def signals_of(structure: Structure, motion: Motion) -> Signals:
-    """Return the signals of a structure."""
+def signals_of(structure: Structure, effects: tuple[Effect, ...], motion: Motion) -> Signals:
+    """Return the signals of a structure under some effects."""
     entries = [
         (cell, i, value)
         for i, signal in enumerate(structure.inputs)
         for cell, value in _load(structure, motion, signal)
     ]
     loads = _matrix(entries, motion.raw, len(structure.inputs))
-    return Signals(loads, tuple(_measure(structure, motion, o) for o in structure.outputs))
+    return Signals(loads, tuple(_measure(structure, effects, motion, o) for o in structure.outputs))
 
 
 def _load(s: Structure, motion: Motion, signal: Input) -> list[tuple[int, float]]:
@@ -93,7 +101,7 @@ def _drive(s: Structure, name: str) -> int:
     return [d.name for d in s.drives].index(name)
 
 
-def _measure(s: Structure, motion: Motion, output: Output) -> Measure:
+def _measure(s: Structure, effects: tuple[Effect, ...], motion: Motion, output: Output) -> Measure:
     if isinstance(output, DriveAngle):
         return _drive_angle(motion, _drive(s, output.drive))
     if isinstance(output, DriveSpeed):
@@ -102,7 +110,7 @@ def _measure(s: Structure, motion: Motion, output: Output) -> Measure:
     if isinstance(output, SwayAngle):
         return _sway(s, output)
     if isinstance(output, Tension):
-        return _tension(s, output)
+        return _tension(s, effects, output)
     if isinstance(output, Rotation):
         return _rotation(s, motion, output)
     return _linear(s, output)
@@ -162,32 +170,35 @@ def _sway(s: Structure, output: SwayAngle) -> Measure:
     return Measure(value, slope)
 
 
-def _tension(s: Structure, output: Tension) -> Measure:
+def _tension(s: Structure, effects: tuple[Effect, ...], output: Tension) -> Measure:
     line = s.part(output.line)
     assert isinstance(line, Rope | Spring)
     start, end = s.number(line.start), s.number(line.end)
-    cells, k, rest, c = _pair(start, end), line.stiffness, line.length, line.damping
-    slack = isinstance(line, Rope)
+    cells, pull = _pair(start, end), _pull(line, effects)
 
-    def parts(state: State, rates: np.ndarray) -> tuple[float, float, float, np.ndarray, np.ndarray]:
-        d = state.x[end] - state.x[start]
-        length = float(np.linalg.norm(d))
-        n, dv = d / length, rates[cells[:3]] - rates[cells[3:]]
-        force = k * (length - rest) + c * float(n @ dv)
-        # as in the kernel, just taut counts as taut
-        taut = not slack or (length > rest * (1.0 - 1e-12) and force >= -1e-12 * k * rest)
-        return float(taut), force, length, n, dv
+    def evaluated(state: State, rates: np.ndarray) -> np.ndarray:
+        return pull(np.concatenate([state.x[end], state.x[start], rates[cells]])).full().ravel()
 
     def value(state: State, rates: np.ndarray) -> float:
-        on, force, *_ = parts(state, rates)
-        return max(force, 0.0) * on if slack else force
+        tension = float(evaluated(state, rates)[0])
+        return max(tension, 0.0) if isinstance(line, Rope) else tension
 
     def slope(state: State, rates: np.ndarray) -> tuple:
-        on, _, length, n, dv = parts(state, rates)
-        g = on * (k * n + c * (dv - n * (n @ dv)) / length)
-        return (cells, np.concatenate([g, -g]), cells, on * c * np.concatenate([n, -n]))
+        g = evaluated(state, rates)[1:]
+        return (cells, g[:6], cells, g[6:])
 
     return Measure(value, slope)
+
+
+def _pull(line: Rope | Spring, effects: tuple[Effect, ...]) -> ca.Function:
+    """Return tension and its slope from places and velocities of end and start (12)."""
+    import casadi as ca
+
+    z, still = ca.SX.sym("z", 12), ca.SX(3, 1)
+    end, start = (NodeMotion(z[k : k + 3], ca.SX.eye(3), z[6 + k : 9 + k], still, still, still) for k in (0, 3))
+    m = line_motion(start, end, ca.SX([line.stiffness, line.length, line.damping]))
+    tension = rope_pull(effects, m) if isinstance(line, Rope) else spring_pull(effects, m)
+    return ca.Function("pull", [z], [ca.vertcat(tension, ca.densify(ca.gradient(tension, z)))])
 
 
 def _rotation(s: Structure, motion: Motion, output: Rotation) -> Measure:

@@ -136,8 +136,9 @@ def test_a_rope_pulls_by_stretch_and_damping_and_never_pushes():
     assert measured(model, model.displace(np.array([0.0, 0.0, 0.1])))["pull"] == 0.0
 
 
-def test_the_tension_measured_is_the_force_that_acts():
-    model = hanging(FLEXIBLE, length=1.8)
+@pytest.mark.parametrize("effects", [FLEXIBLE, [*FLEXIBLE, fc.RayleighDamping(0.0, 0.05)]], ids=["plain", "damped"])
+def test_the_tension_measured_is_the_force_that_acts(effects):
+    model = hanging(effects, length=1.8)
     state = model.displace(np.array([0.4, -0.2, 0.1])).with_(v=np.array([0.3, 0.1, -0.2]))
     force = model.balance(state, state.v, np.zeros(3))
     assert np.linalg.norm(force) == pytest.approx(measured(model, state)["pull"])
