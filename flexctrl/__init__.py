@@ -56,6 +56,9 @@ _HOMES = {
     "flexctrl.design": ("Delayed", "Noisy", "OpenLoop", "Quantised", "RateLimited", "Sampled", "Saturated", "Tracking"),
     "flexctrl.study.compare": ("Comparison", "compare"),
     "flexctrl.study.spillover": ("Spillover", "spillover"),
+    "flexctrl.study.amplitudes": ("ConstantLoad", "InitialDisplacement", "InitialMode", "InitialSpeed"),
+    "flexctrl.study.predictions": ("CurveDifference", "Deflection", "FinalValue", "Frequency", "Peak", "Period"),
+    "flexctrl.study.envelope": ("Envelope", "validity_envelope"),
     "flexctrl.scene": ("Scene", "Simulation", "Start", "load_scene"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

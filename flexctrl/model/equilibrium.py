@@ -118,6 +118,8 @@ class Search:
         heaviest = mass[~turning].max(initial=0.0) or mass.max(initial=0.0) or 1.0
         self.kept = np.zeros(len(free))
         self.inertia = np.maximum(mass, 1e-6 * heaviest * np.where(turning, self.size**2, 1.0))
+        turned = self.inertia.max(initial=1e-300) / self.size**2
+        self.heaviest = float(turned if turning.all() else self.inertia[~turning].max())
 
     def force(self, state: State) -> np.ndarray:
         force = self.model.balance(state, self.zero, self.zero) + self.model.loads(state, self.u)
@@ -167,7 +169,7 @@ class Search:
         force = self.force(state)
         scale = self.scale(state)
         load = max(np.abs(force / self.lever[self.free]).max(initial=0.0), 1e-300)
-        shift = 10.0 * load / (self.inertia[~self.turning].max(initial=1e-300) * self.size) if force.size else 0.0
+        shift = 10.0 * load / (self.heaviest * self.size) if force.size else 0.0
         floor, here = 1e-7 * shift, self.relative(force, scale)
         best, least, stalled = state, here, 0
         for iteration in range(iterations):
