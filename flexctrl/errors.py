@@ -6,13 +6,18 @@ import difflib
 from collections.abc import Iterable
 
 __all__ = [
+    "ChartError",
+    "ControllerError",
+    "DesignError",
     "EquilibriumError",
     "FlexctrlError",
+    "KernelError",
     "LinearizationError",
     "MechanismError",
     "MissingExtraError",
     "ReductionError",
     "SceneError",
+    "SingularMatrixError",
     "StructureError",
     "did_you_mean",
 ]
@@ -57,6 +62,36 @@ class LinearizationError(FlexctrlError, RuntimeError):
 
 class ReductionError(FlexctrlError, ValueError):
     """A reduction that was asked for more than it can give."""
+
+
+class ControllerError(FlexctrlError, ValueError):
+    """A controller, wrapper or signal that cannot be: names it, what was expected and the remedy."""
+
+
+class DesignError(FlexctrlError, RuntimeError):
+    """A design that fails its own check: says which mode or equation, and what to change."""
+
+
+class KernelError(FlexctrlError, ValueError):
+    """A kernel, index table or vector of the wrong shape, type or range; says which and what was expected."""
+
+
+class ChartError(FlexctrlError, ArithmeticError):
+    """A shape too far from the reference for coordinates that start there."""
+
+
+class SingularMatrixError(FlexctrlError, ArithmeticError):
+    """A matrix that cannot be factorised.
+
+    Attributes
+    ----------
+    where : int
+        The row of its zero pivot.
+    """
+
+    def __init__(self, where: int) -> None:
+        super().__init__(f"the matrix is singular at row {where}")
+        self.where = where
 
 
 class MissingExtraError(FlexctrlError, ImportError):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from flexctrl.design.controller import Controller, ControllerError, as_controller
+from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.feedback import FilteredRate, observer, observer_feedback, pd, pi, pid, state_feedback
 from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
-from flexctrl.design.optimal import DesignError, Estimator, Regulator, bryson, kalman, lqg, lqr
+from flexctrl.design.optimal import Estimator, Regulator, bryson, kalman, lqg, lqr
 from flexctrl.design.piecewise import Constant, PiecewisePolynomial, Sum, Trajectory
 from flexctrl.design.shaper import Mode, Shaper, convolve
 from flexctrl.design.shapers import ei, um_zv, um_zv_fit, um_zvd, um_zvd_fit, zv, zvd, zvdd
@@ -20,6 +20,7 @@ from flexctrl.design.trajectories import (
     TimeOptimalPendulum,
     TrapezoidalVelocity,
 )
+from flexctrl.errors import ControllerError, DesignError
 
 __all__ = [
     "AntiWindup",

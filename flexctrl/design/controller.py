@@ -9,13 +9,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from flexctrl.errors import FlexctrlError, did_you_mean
+from flexctrl.errors import ControllerError, did_you_mean
 
-__all__ = ["Controller", "ControllerError", "IOSystemController", "LinearController", "as_controller"]
-
-
-class ControllerError(FlexctrlError, ValueError):
-    """A controller, wrapper or signal that cannot be: names it, what was expected and the remedy."""
+__all__ = ["Controller", "IOSystemController", "LinearController", "as_controller"]
 
 
 @runtime_checkable

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.design.controller import ControllerError
+from flexctrl.errors import ControllerError
 
 __all__ = ["FilteredRate", "observer", "observer_feedback", "pd", "pi", "pid", "state_feedback"]
 

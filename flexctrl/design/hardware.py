@@ -12,8 +12,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from flexctrl.design.controller import Controller, ControllerError, LinearController
+from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.wrapping import Wrapper, by_name, check_names, discretised
+from flexctrl.errors import ControllerError
 
 __all__ = ["AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated"]
 

@@ -8,18 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.design.controller import ControllerError
 from flexctrl.design.feedback import observer_feedback
 from flexctrl.design.wrapping import by_name
-from flexctrl.errors import FlexctrlError
+from flexctrl.errors import ControllerError, DesignError
 
-__all__ = ["DesignError", "Estimator", "Regulator", "bryson", "kalman", "lqg", "lqr"]
+__all__ = ["Estimator", "Regulator", "bryson", "kalman", "lqg", "lqr"]
 
 _TOLERANCE = 1e-8  # largest Riccati residual accepted, relative to the terms of the equation
-
-
-class DesignError(FlexctrlError, RuntimeError):
-    """A design that fails its own check: says which mode or equation, and what to change."""
 
 
 @dataclass(frozen=True, eq=False)

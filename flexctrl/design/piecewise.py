@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from flexctrl.design.controller import ControllerError
+from flexctrl.errors import ControllerError
 
 __all__ = ["Constant", "PiecewisePolynomial", "Sum", "Trajectory"]
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from flexctrl.design.controller import ControllerError
+from flexctrl.errors import ControllerError
 
 __all__ = ["Mode", "Shaper", "check_mode", "convolve"]
 

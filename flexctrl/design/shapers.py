@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.design.controller import ControllerError
 from flexctrl.design.shaper import Mode, Shaper, check_mode
+from flexctrl.errors import ControllerError
 
 __all__ = ["ei", "um_zv", "um_zv_fit", "um_zvd", "um_zvd_fit", "zv", "zvd", "zvdd"]
 

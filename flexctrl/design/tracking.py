@@ -9,10 +9,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from flexctrl.design.controller import Controller, ControllerError, as_controller
+from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.piecewise import distinct
 from flexctrl.design.shaping import check_grid
 from flexctrl.design.wrapping import Stateless, Wrapper, breaks_of, check_names, discretised
+from flexctrl.errors import ControllerError
 
 __all__ = ["Commanded", "FeedForward", "OpenLoop", "Together", "Tracking"]
 

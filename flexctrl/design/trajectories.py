@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from flexctrl.design.controller import ControllerError
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, require_finite
+from flexctrl.errors import ControllerError
 
 __all__ = [
     "MinimumJerk",

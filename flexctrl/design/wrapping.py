@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.design.controller import Controller, ControllerError, as_controller
-from flexctrl.errors import did_you_mean
+from flexctrl.design.controller import Controller, as_controller
+from flexctrl.errors import ControllerError, did_you_mean
 
 __all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised"]
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexctrl.design.controller import Controller, ControllerError, as_controller
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.design.controller import Controller, as_controller
+from flexctrl.errors import ControllerError, StructureError, did_you_mean
 
 if TYPE_CHECKING:
     import control

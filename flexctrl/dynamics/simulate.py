@@ -13,11 +13,10 @@ import numpy as np
 from flexctrl.dynamics.alpha import AdaptiveAlpha, Coefficients, GeneralizedAlpha, Integrator, Point, StepError, Stepper
 from flexctrl.dynamics.feed import Feed, feed_of
 from flexctrl.dynamics.run import Report, Run, Status, Tolerance
-from flexctrl.errors import MechanismError, StructureError
+from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-from flexctrl.model.solve import SingularMatrixError
 
 _NEWTON = 1e-10
 _FRAMES = 120

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from flexctrl.errors import FlexctrlError, MissingExtraError
+from flexctrl.errors import KernelError, MissingExtraError
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 FLOAT = np.dtype(np.float64)
 _INDEX_LIMIT = 2**31
 _OLDEST_LLVMLITE = (0, 45)
-
-
-class KernelError(FlexctrlError, ValueError):
-    """A kernel, index table or vector of the wrong shape, type or range; says which and what was expected."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import TYPE_CHECKING
 
+from flexctrl.errors import KernelError
 from flexctrl.mechanics import llvm_math
-from flexctrl.mechanics.kernel import KernelError
 from flexctrl.mechanics.llvm_writer import Writer
 
 if TYPE_CHECKING:

@@ -19,20 +19,16 @@ from functools import cached_property
 
 import numpy as np
 
-from flexctrl.errors import FlexctrlError
+from flexctrl.errors import ChartError
 from flexctrl.mechanics.rotation import cross, logarithm
 from flexctrl.model.model import Model
 from flexctrl.model.motion import Motion, State
 
-__all__ = ["Chart", "ChartError", "Follower", "LeaningRope", "TurningNode", "inverse_tangents"]
+__all__ = ["Chart", "Follower", "LeaningRope", "TurningNode", "inverse_tangents"]
 
 _CLOSINGS = 3
 _SMALL = 1e-6
 _FULL_TURN, _HALF_TURN = 6.1, 3.05
-
-
-class ChartError(FlexctrlError, ArithmeticError):
-    """A shape too far from the reference for coordinates that start there."""
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import EquilibriumError, StructureError
+from flexctrl.errors import EquilibriumError, SingularMatrixError, StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-from flexctrl.model.solve import SingularMatrixError, factorise
+from flexctrl.model.solve import factorise
 
 _TARGET = 1e-12
 _LARGEST_TURN = 0.3

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexctrl.errors import MechanismError, StructureError
+from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.model.audit import Freedom, audit
 from flexctrl.model.chart import Chart
 from flexctrl.model.charting import chart_of
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-from flexctrl.model.solve import SingularMatrixError, factorise
+from flexctrl.model.solve import factorise
 
 if TYPE_CHECKING:
     import control

@@ -11,19 +11,11 @@ from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
-from flexctrl.errors import FlexctrlError
+from flexctrl.errors import SingularMatrixError
 
 Solve = Callable[[np.ndarray], np.ndarray]
 
 _DENSE_UP_TO = 40
-
-
-class SingularMatrixError(FlexctrlError, ArithmeticError):
-    """A matrix that cannot be factorised; ``where`` is the row of its zero pivot."""
-
-    def __init__(self, where: int) -> None:
-        super().__init__(f"the matrix is singular at row {where}")
-        self.where = where
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 
-from flexctrl.design.controller import Controller, ControllerError, LinearController, as_controller
+from flexctrl.design.controller import Controller, LinearController, as_controller
 from flexctrl.design.hardware import Delayed
 from flexctrl.design.tracking import Commanded, OpenLoop, Together
 from flexctrl.design.wrapping import Wrapper
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import ControllerError, StructureError, did_you_mean
 from flexctrl.model.linear import LinearModel
 from flexctrl.study.loop import Loop, open_loop
 

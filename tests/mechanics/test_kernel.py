@@ -13,8 +13,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from flexctrl.errors import MissingExtraError
-from flexctrl.mechanics.kernel import Batch, CasadiVM, Compiled, Kernel, KernelError, best_backend
+from flexctrl.errors import KernelError, MissingExtraError
+from flexctrl.mechanics.kernel import Batch, CasadiVM, Compiled, Kernel, best_backend
 
 pytest.importorskip("llvmlite")
 from flexctrl.mechanics.llvm import compile_kernel

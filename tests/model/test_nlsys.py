@@ -10,8 +10,7 @@ from scipy.integrate import DOP853, Radau, solve_ivp
 import flexctrl as fc
 from flexctrl.design import ControllerError
 from flexctrl.dynamics.sampled import sampled_response
-from flexctrl.errors import MechanismError, StructureError
-from flexctrl.model.chart import ChartError
+from flexctrl.errors import ChartError, MechanismError, StructureError
 from flexctrl.model.nlsys import equations_of
 from flexctrl.model.statespace import PhysicalForm
 
