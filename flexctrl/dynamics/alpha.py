@@ -8,10 +8,13 @@ stable, with the high frequencies damped down to the spectral radius ρ.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
@@ -20,6 +23,7 @@ from flexctrl.model.solve import Plan, Solve, factorise, plan
 _TURNED = 0.02
 _POOR = 0.25
 _ITERATIONS = 12
+_NEWTON = 1e-10
 
 
 @dataclass(frozen=True)
@@ -44,34 +48,25 @@ class Coefficients:
 
 
 @dataclass(frozen=True)
-class Point:
-    """A state with its accelerations: the true ones and the method's own; what feeds it; and how they grow.
+class AlphaPoint(Point):
+    """A point of the method: its own accelerations beside the true ones, and how these grow.
 
     ``trend`` is the change of the true accelerations over the last step, zero where it predicts worse than none.
     """
 
-    state: State
-    rate: np.ndarray
     algorithmic: np.ndarray
-    supply: Supply
     trend: np.ndarray
 
 
-@dataclass
-class Counts:
-    """What the steps cost."""
+class Tangent(NamedTuple):
+    """What the factorised tangent was made from."""
 
-    newton: int = 0
-    factorisations: int = 0
-    worst: int = 0
-
-
-class StepError(ArithmeticError):
-    """A step that did not converge; ``worst`` is its worst degree of freedom."""
-
-    def __init__(self, worst: int, reason: str) -> None:
-        super().__init__(reason)
-        self.worst = worst
+    state: State
+    v: np.ndarray
+    rate: np.ndarray
+    seeds: tuple[float, float, float]
+    supply: Supply
+    h: float
 
 
 @dataclass
@@ -93,17 +88,21 @@ class Stepper:
     coefficients: Coefficients
     tolerance: float
     counts: Counts = field(default_factory=Counts)
+    memory: Tangent | None = None
     _solve: Solve | None = None
     _plan: Plan | None = None
-    _made_for: float = 0.0
-    _made_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         names = self.model.coordinates
         self._turning = np.array([not n.endswith(("_u", "_v", "_w", "_slide", "_source")) for n in names], dtype=bool)
         self._weight = 1.0 / _yardsticks(self.model, self._turning)
 
-    def start(self, state: State, supply: Supply, step: float) -> Point:
+    def recall(self, memory: Tangent | None) -> None:
+        """Make the tangent of another stepper's memory again."""
+        if memory is not None:
+            self._factor(memory)
+
+    def start(self, state: State, supply: Supply, step: float) -> AlphaPoint:
         """Return a state with the accelerations it has under its inputs.
 
         Raises
@@ -114,7 +113,7 @@ class Stepper:
         zero = np.zeros(self.model.n)
         force = self.model.balance(state, state.v, zero) + self.model.loads(state, supply.u)
         rate = self._mass(state, supply, step)(force)
-        return Point(state, rate, rate, supply, zero)
+        return AlphaPoint(state, rate, supply, rate, zero)
 
     def _mass(self, state: State, supply: Supply, step: float) -> Solve:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
@@ -129,7 +128,7 @@ class Stepper:
         seeds = (c.beta * step**2, c.gamma * step, 1.0)
         return factorise(-self.model.slope(state, state.v, zero, seeds, supply.u))
 
-    def step(self, point: Point, h: float) -> Point:
+    def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later.
 
         Raises
@@ -142,7 +141,7 @@ class Stepper:
         except StepError:
             return self._attempt(point, h, fresh=True)
 
-    def _attempt(self, point: Point, h: float, fresh: bool) -> Point:
+    def _attempt(self, point: AlphaPoint, h: float, fresh: bool) -> AlphaPoint:
         c, now = self.coefficients, point.state
         to_v = c.gamma / (h * c.beta)
         to_rate = (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
@@ -156,7 +155,7 @@ class Stepper:
             supply = self.feed.at(state, point.supply, h)
             force = self.model.balance(state, v, rate) + self.model.loads(state, supply.u)
             if fresh or contraction > _POOR or (iteration == 0 and self._stale(state, h)):
-                self._factor(state, v, rate, (1.0, to_v, to_rate), supply, h)
+                self._factor(Tangent(state, v, rate, (1.0, to_v, to_rate), supply, h))
                 last = np.inf
             assert self._solve is not None
             correction = self._solve(force)
@@ -171,7 +170,9 @@ class Stepper:
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
 
-    def _finish(self, point: Point, h: float, step: np.ndarray, v: np.ndarray, rate: np.ndarray, worst: int) -> Point:
+    def _finish(
+        self, point: AlphaPoint, h: float, step: np.ndarray, v: np.ndarray, rate: np.ndarray, worst: int
+    ) -> AlphaPoint:
         c = self.coefficients
         self.counts.worst = worst
         state = self.model.advance(point.state, step, v, point.state.t + h)
@@ -180,26 +181,19 @@ class Stepper:
                 worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part of it bend"
             )
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
-        return Point(state, rate, algorithmic, self.feed.at(state, point.supply, h), _trend(point, rate))
+        return AlphaPoint(state, rate, self.feed.at(state, point.supply, h), algorithmic, _trend(point, rate))
 
     def _stale(self, state: State, h: float) -> bool:
-        if self._solve is None or abs(h - self._made_for) > 1e-6 * h:
+        made = self.memory
+        if made is None or abs(h - made.h) > 1e-6 * h:
             return True
-        turned = np.abs(state.q - self._made_at)[self._turning]
+        turned = np.abs(state.q - made.state.q)[self._turning]
         return bool(turned.size) and float(turned.max()) > _TURNED
 
-    def _factor(
-        self,
-        state: State,
-        v: np.ndarray,
-        rate: np.ndarray,
-        seeds: tuple[float, float, float],
-        supply: Supply,
-        h: float,
-    ) -> None:
-        slope = self.model.slope(state, v, rate, seeds, supply.u)
+    def _factor(self, at: Tangent) -> None:
+        slope = self.model.slope(at.state, at.v, at.rate, at.seeds, at.supply.u)
         if self.feed.continuous:
-            slope = slope + self.feed.slope(state, supply, h, seeds)
+            slope = slope + self.feed.slope(at.state, at.supply, at.h, at.seeds)
         if self._plan is None or not self._plan.fits(slope):
             self._plan = plan(slope)
         try:
@@ -208,7 +202,7 @@ class Stepper:
         except SingularMatrixError as error:
             raise StepError(error.where, "the tangent is singular") from error
         self.counts.factorisations += 1
-        self._made_for, self._made_at = h, state.q
+        self.memory = at
 
     def _size(self, correction: np.ndarray) -> tuple[float, int]:
         if not correction.size:
@@ -217,16 +211,16 @@ class Stepper:
         worst = int(np.argmax(sizes)) if np.isfinite(sizes).all() else int(np.argmax(~np.isfinite(sizes)))
         return float(sizes[worst]), worst
 
-    def error(self, before: Point, after: Point, moved: np.ndarray, relative: float, absolute: float) -> float:
+    def error(self, before: AlphaPoint, after: AlphaPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error of a step over what is allowed: |β − 1/6| h² |Δa| (Zienkiewicz & Xie 1991)."""
         h = after.state.t - before.state.t
         c = self.coefficients
         local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self._weight
-        allowed = absolute + relative * float((moved * self._weight).max(initial=0.0))
+        allowed = tolerance.absolute + tolerance.relative * float((moved * self._weight).max(initial=0.0))
         return float(local.max(initial=0.0)) / allowed
 
 
-def _trend(before: Point, rate: np.ndarray) -> np.ndarray:
+def _trend(before: AlphaPoint, rate: np.ndarray) -> np.ndarray:
     """Return the change of the accelerations, if going on with the last change was the better guess."""
     change = rate - before.rate
     still, onward = np.abs(change).sum(), np.abs(change - before.trend).sum()
@@ -267,6 +261,17 @@ class GeneralizedAlpha:
             raise StructureError(f"GeneralizedAlpha: step = {self.step}; expected seconds > 0")
         _check_rho(self.rho)
 
+    @property
+    def order(self) -> int:
+        return 2
+
+    @property
+    def pace(self) -> Fixed:
+        return Fixed(self.step)
+
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper:
+        return Stepper(model, feed, Coefficients.of(self.rho), _NEWTON)
+
 
 @dataclass(frozen=True)
 class AdaptiveAlpha:
@@ -296,12 +301,21 @@ class AdaptiveAlpha:
         if not (self.first_step > 0.0 and self.largest_step > 0.0):
             raise StructureError("AdaptiveAlpha: first_step and largest_step are seconds > 0")
 
+    @property
+    def order(self) -> int:
+        return 2
+
+    @property
+    def pace(self) -> Controlled:
+        return Controlled(self.first_step, self.largest_step)
+
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper:
+        return Stepper(model, feed, Coefficients.of(self.rho), min(1e-8, max(1e-3 * tolerance.absolute, 1e-13)))
+
 
 def _check_rho(rho: float) -> None:
     if not 0.0 <= rho <= 1.0:
         raise StructureError(f"generalised alpha: rho = {rho}; expected 0 … 1 (0.9 damps only the highest frequencies)")
 
 
-Integrator = GeneralizedAlpha | AdaptiveAlpha
-
-__all__ = ["AdaptiveAlpha", "Coefficients", "GeneralizedAlpha", "Integrator", "Point", "StepError", "Stepper"]
+__all__ = ["AdaptiveAlpha", "AlphaPoint", "Coefficients", "GeneralizedAlpha", "Integrator", "Stepper", "Tangent"]

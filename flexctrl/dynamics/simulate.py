@@ -10,17 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha, Coefficients, GeneralizedAlpha, Integrator, Point, StepError, Stepper
+from flexctrl.dynamics.alpha import AdaptiveAlpha
+from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.feed import Feed, feed_of
 from flexctrl.dynamics.run import Report, Run, Status, Tolerance
+from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Point, StepError
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
-_NEWTON = 1e-10
 _FRAMES = 120
 _SMALLEST = 1e-12
+_BLOCK = 1000
 
 
 def simulate(
@@ -105,12 +107,10 @@ class _Journey:
 
     def travel(self, state: State) -> Run:
         began = time.perf_counter()
-        newton = _NEWTON
-        if isinstance(self.method, AdaptiveAlpha):
-            newton = min(1e-8, max(1e-3 * self.tolerance.absolute, 1e-13))
-        self.stepper = Stepper(self.model, self.feed, Coefficients.of(self.method.rho), newton)
-        self.books = _Books(self.model, state)
-        self.size = self._first_step()
+        pace = self.method.pace
+        self.stepper = self.method.stepper(self.model, self.feed, self.tolerance)
+        self.books = Books(self.model, state)
+        self.size = pace.step if isinstance(pace, Fixed) else min(pace.first, pace.largest)
         self.point = self._start(state)
         self._record()
         try:
@@ -125,10 +125,6 @@ class _Journey:
             self._record()
         self.books.close(self.point)
         return self._run(time.perf_counter() - began)
-
-    def _first_step(self) -> float:
-        method = self.method
-        return method.step if isinstance(method, GeneralizedAlpha) else min(method.first_step, method.largest_step)
 
     def _start(self, state: State) -> Point:
         try:
@@ -183,31 +179,51 @@ class _Journey:
             self.point = self.stepper.start(state, fresh, self.size)
 
     def _advance_to(self, t: float) -> None:
+        pace = self.method.pace
         while (left := t - self.point.state.t) > 1e-12 * self.until:
-            if isinstance(self.method, GeneralizedAlpha):
-                h = left / max(1, math.ceil(left / self.method.step - 1e-6))
-                self._take(h)
+            if isinstance(pace, Fixed):
+                count = max(1, math.ceil(left / pace.step - 1e-6))
+                self._take_many(left / count, count)
             else:
-                h = min(self.size, self.method.largest_step)
-                self._try(left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h)
-            if self.every is None:
-                self._record()
+                self._try(left, pace)
+
+    def _take_many(self, h: float, count: int) -> None:
+        """Steps of fixed length: a block of them at once where the stepper can."""
+        if not isinstance(self.stepper, Marching) or self.feed.continuous:
+            return self._one(h)
+        before = self.point
+        block = self.stepper.march(before, h, min(count, _BLOCK))
+        self.books.enter_block(before, block)
+        self.point = block.last
+        self.steps += len(block.states)
+        if self.every is None:
+            for state in block.states:
+                self._record_state(state)
+        if len(block.states) < min(count, _BLOCK):
+            self._one(h)
+
+    def _one(self, h: float) -> None:
+        self._take(h)
+        if self.every is None:
+            self._record()
 
     def _take(self, h: float) -> None:
-        """A step of fixed length; where Newton fails, in halves."""
+        """A step of fixed length; where it does not converge, in halves."""
         try:
             after = self.stepper.step(self.point, h)
         except StepError:
             self.rejected += 1
-            if h < 2e-3 * self._first_step() or h < _SMALLEST:
+            if h < 2e-3 * self.size or h < _SMALLEST:
                 raise
             self._take(0.5 * h)
             self._take(0.5 * h)
             return
         self._accept(after)
 
-    def _try(self, h: float) -> None:
+    def _try(self, left: float, pace: Controlled) -> None:
         """A step whose error is controlled."""
+        h = min(self.size, pace.largest)
+        h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
         while True:
             if h < _SMALLEST * max(1.0, self.until):
                 raise StepError(
@@ -219,14 +235,15 @@ class _Journey:
                 self.rejected += 1
                 self.size = h = 0.25 * h
                 continue
-            tol = self.tolerance
-            error = self.stepper.error(self.point, after, self.books.moved, tol.relative, tol.absolute)
-            factor = 0.9 * max(error, 1e-6) ** (-1.0 / 3.0)
+            error = self.stepper.error(self.point, after, self.books.moved, self.tolerance)
+            factor = 0.9 * max(error, 1e-6) ** (-1.0 / (self.method.order + 1))
             if error > 1.0:
                 self.rejected += 1
                 self.size = h = h * max(0.2, factor)
                 continue
             self._accept(after)
+            if self.every is None:
+                self._record()
             if factor > 1.3 and h > 0.5 * self.size:
                 self.size = h * min(2.5, factor)
             elif factor < 1.0:
@@ -239,7 +256,9 @@ class _Journey:
         self.steps += 1
 
     def _record(self) -> None:
-        state = self.point.state
+        self._record_state(self.point.state)
+
+    def _record_state(self, state: State) -> None:
         self.t.append(state.t)
         self.y.append(self.model.measure(state))
         self.u.append(self.point.supply.u)
@@ -274,47 +293,6 @@ class _Journey:
             report,
             m.structure.name,
         )
-
-
-class _Books:
-    """The energy books of a run: work in, dissipated, and what is stored, checked now and then."""
-
-    def __init__(self, model: Model, state: State) -> None:
-        self.model = model
-        kinetic, stored, _ = model.energy(state)
-        self.start = kinetic + stored
-        self.work = self.lost = self.residual = self.closure = 0.0
-        self.turnover = 0.0
-        self.moved = np.zeros(model.n)
-        self.first = state.q
-        probe = np.linspace(1.0, 2.0, model.n)
-        self.dissipates = model.energy(state.with_(v=probe))[2] != 0.0
-        self.power = model.energy(state)[2] if self.dissipates else 0.0
-        self.checked = time.perf_counter()
-        self.worst = 0.0
-
-    def enter(self, before: Point, after: Point) -> None:
-        step = after.state.q - before.state.q
-        forces = self.model.loads(before.state, before.supply.u) + self.model.loads(after.state, after.supply.u)
-        self.work += 0.5 * float(forces @ step)
-        self.moved = np.maximum(self.moved, np.abs(after.state.q - self.first))
-        if self.dissipates:
-            power = self.model.energy(after.state)[2]
-            self.lost += 0.5 * (self.power + power) * (after.state.t - before.state.t)
-            self.power = power
-        if time.perf_counter() - self.checked > 0.05:
-            self.close(after)
-
-    def close(self, point: Point) -> None:
-        """Draw the balance."""
-        kinetic, stored, _ = self.model.energy(point.state)
-        gap = kinetic + stored - self.start - self.work + self.lost
-        turnover = max(kinetic, abs(self.work), self.lost, abs(stored + kinetic - self.start))
-        self.turnover = max(self.turnover, turnover)
-        self.worst = max(self.worst, abs(gap))
-        self.residual = self.worst / self.turnover if self.turnover > 0.0 else 0.0
-        self.closure = max(self.closure, self.model.motion.closure_error(point.state))
-        self.checked = time.perf_counter()
 
 
 __all__ = ["simulate"]

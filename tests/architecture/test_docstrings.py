@@ -12,9 +12,10 @@ import pytest
 
 import flexctrl
 from flexctrl.design.controller import Controller
+from flexctrl.dynamics.steps import Integrator
 from flexctrl.mechanics.kernel import Backend
 
-PROTOCOLS = (Backend, Controller)
+PROTOCOLS = (Backend, Controller, Integrator)
 PUBLIC = {name: getattr(flexctrl, name) for name in flexctrl.__all__}
 SECTIONS = ("Parameters", "Attributes", "Returns", "Raises", "Yields", "Notes", "Examples", "See Also", "References")
 

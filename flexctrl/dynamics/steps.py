@@ -1,0 +1,172 @@
+"""What a run asks of a method of integration: a value that makes steps, one after another.
+
+A `Integrator` is a frozen value (`GeneralizedAlpha`, …). It makes a `Stepper` for a model and what feeds it;
+the stepper goes from `Point` to `Point`. How long steps are is the method's `pace`; rejecting, halving and
+stopping at samples, breaks and events is the run's business, the same for all methods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Block", "Controlled", "Counts", "Fixed", "Integrator", "Marching", "Pace", "Point", "StepError", "Stepper"]
+
+
+@dataclass(frozen=True)
+class Point:
+    """A state, its accelerations, and what feeds it; methods that remember more extend it."""
+
+    state: State
+    rate: np.ndarray
+    supply: Supply
+
+
+@dataclass
+class Counts:
+    """What the steps cost; ``worst`` is the degree of freedom that converged last."""
+
+    newton: int = 0
+    factorisations: int = 0
+    worst: int = 0
+
+
+class StepError(ArithmeticError):
+    """A step that did not converge; ``worst`` is its worst degree of freedom."""
+
+    def __init__(self, worst: int, reason: str) -> None:
+        super().__init__(reason)
+        self.worst = worst
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Steps of one length [s], shortened a little so that a whole number of them ends at a sample or break."""
+
+    step: float
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """Steps chosen from the estimated error: length of the first and of the largest [s]."""
+
+    first: float
+    largest: float
+
+
+Pace = Fixed | Controlled
+P = TypeVar("P", bound=Point)
+
+
+class Stepper(Protocol[P]):
+    """Steps of one model under one feed.
+
+    Attributes
+    ----------
+    counts : Counts
+        What the steps have cost so far; the run reports them.
+    memory : object
+        What later steps depend on beside the point they start from (which tangent is in use, not its values): a
+        frozen dataclass, tuple, array or number. After ``recall(memory)`` another stepper of the same method
+        goes on with the same bits.
+    """
+
+    counts: Counts
+    memory: Any
+
+    def recall(self, memory: Any) -> None:
+        """Go on as the stepper whose memory this is."""
+
+    def start(self, state: State, supply: Supply, step: float) -> P:
+        """Return a state with the accelerations it has under its inputs; ``step`` is about to be taken.
+
+        Raises
+        ------
+        SingularMatrixError
+            If a freedom has neither mass nor stiffness.
+        """
+
+    def step(self, point: P, h: float) -> P:
+        """Return the point a step later.
+
+        Raises
+        ------
+        StepError
+            If it does not converge.
+        """
+
+    def error(self, before: P, after: P, moved: np.ndarray, tolerance: Tolerance) -> float:
+        """Return the local error of the step just taken over what is allowed; ``moved`` is the reach so far (n,)."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Many steps taken at once.
+
+    Attributes
+    ----------
+    states : sequence of State
+        After each step; fewer than asked for where a step did not converge.
+    last : Point
+        After the last of them; the start if there are none.
+    work, lost : float
+        Work of the inputs and energy dissipated over them (trapezoidal) [J].
+    reach : numpy.ndarray, shape (n,)
+        Largest |q − q of the block's start| of each degree of freedom.
+    """
+
+    states: Sequence[State]
+    last: Point
+    work: float
+    lost: float
+    reach: np.ndarray
+
+
+@runtime_checkable
+class Marching(Stepper[P], Protocol[P]):
+    """A stepper that takes many steps of one length in a call, quicker than one by one."""
+
+    def march(self, point: P, h: float, count: int) -> Block:
+        """Return up to ``count`` steps of length h under the inputs of ``point``, which stay as they are."""
+
+
+@runtime_checkable
+class Integrator(Protocol):
+    """A method of integration, as a frozen value.
+
+    Attributes
+    ----------
+    order : int
+        Of the global error of places and rates.
+    pace : Fixed or Controlled
+    """
+
+    @property
+    def order(self) -> int: ...
+
+    @property
+    def pace(self) -> Pace: ...
+
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper[Any]:
+        """Return the steps of a model under a feed.
+
+        Parameters
+        ----------
+        model : Model
+        feed : Feed
+            Where the inputs come from.
+        tolerance : Tolerance
+            For methods that control their error, and for how well implicit ones solve their steps.
+
+        Returns
+        -------
+        Stepper
+        """
