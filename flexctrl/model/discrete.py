@@ -10,19 +10,18 @@ import scipy.linalg as la
 
 from flexctrl.errors import StructureError
 from flexctrl.model.linear import LinearModel
-from flexctrl.model.statespace import FirstOrder as FirstOrderModel
-from flexctrl.model.statespace import modal_first_order
+from flexctrl.model.statespace import FirstOrder, modal_first_order
 
 if TYPE_CHECKING:
     import control
 
-__all__ = ["FirstOrder", "Hold", "ZeroOrder", "discretize"]
+__all__ = ["FirstOrderHold", "Hold", "ZeroOrderHold", "discretize"]
 
 Taps = dict[int, np.ndarray]
 
 
 @dataclass(frozen=True)
-class ZeroOrder:
+class ZeroOrderHold:
     """The input stays at its last sample (a digital-to-analogue converter).
 
     Attributes
@@ -35,7 +34,7 @@ class ZeroOrder:
 
 
 @dataclass(frozen=True)
-class FirstOrder:
+class FirstOrderHold:
     """The input runs straight from sample to sample (exact for ramps; needs the next sample at delay 0).
 
     Attributes
@@ -47,7 +46,7 @@ class FirstOrder:
     delay: float = 0.0
 
 
-Hold = ZeroOrder | FirstOrder
+Hold = ZeroOrderHold | FirstOrderHold
 
 
 def discretize(linear: LinearModel, dt: float, hold: Hold | None = None) -> control.StateSpace:
@@ -63,7 +62,7 @@ def discretize(linear: LinearModel, dt: float, hold: Hold | None = None) -> cont
     dt : float
         Sampling time, s.
     hold : Hold, optional
-        ``ZeroOrder()`` if left out.
+        ``ZeroOrderHold()`` if left out.
 
     Returns
     -------
@@ -77,7 +76,7 @@ def discretize(linear: LinearModel, dt: float, hold: Hold | None = None) -> cont
     """
     import control
 
-    kind = ZeroOrder() if hold is None else hold
+    kind = ZeroOrderHold() if hold is None else hold
     if not 0.0 < dt < np.inf:
         raise StructureError(f"sampling time dt = {dt} s: give a positive number")
     if not 0.0 <= kind.delay < np.inf:
@@ -109,13 +108,13 @@ def _split_delay(delay: float, dt: float) -> tuple[int, float]:
     return steps, delay - steps * dt
 
 
-def _sampled(first: FirstOrderModel, dt: float, kind: Hold, steps: int, part: float) -> tuple[np.ndarray, Taps, Taps]:
+def _sampled(first: FirstOrder, dt: float, kind: Hold, steps: int, part: float) -> tuple[np.ndarray, Taps, Taps]:
     """Transition matrix, and the weight of the sample `lag` steps ago on the next state and on the output."""
     transition = _exponential(first, dt)[0]
     rest, step_a, ramp_a = _exponential(first, dt - part)
     _, step_b, ramp_b = _exponential(first, part)
     share = part / dt
-    if isinstance(kind, ZeroOrder):
+    if isinstance(kind, ZeroOrderHold):
         moved = {steps: step_a} | ({steps + 1: rest @ step_b} if part else {})
         seen = {steps + (1 if part else 0): first.D}
         return transition, moved, seen
@@ -149,7 +148,7 @@ def _with_memory(
     return A, B, C, seen.get(0, zero_y) + output @ ahead
 
 
-def _exponential(first: FirstOrderModel, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _exponential(first: FirstOrder, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """e^(A t), its response to a unit step and to a unit ramp of each input."""
     n = len(first.A)
     transition, step, ramp = np.zeros((n, n)), np.zeros_like(first.B), np.zeros_like(first.B)

@@ -246,7 +246,7 @@ class LinearModel:
         dt : float
             Sampling time, s.
         hold : Hold, optional
-            ``ZeroOrder(delay=…)`` (default) or ``FirstOrder(delay=…)``.
+            ``ZeroOrderHold(delay=…)`` (default) or ``FirstOrderHold(delay=…)``.
         """
         from flexctrl.model.discrete import discretize
 

@@ -162,7 +162,17 @@ class Modes:
         return max(shares, key=lambda name: shares[name][mode]) if shares else ""
 
     def dominant_coordinate(self, mode: int) -> str:
-        """The coordinate with the largest entry of the shape."""
+        """The coordinate with the largest entry of the shape.
+
+        Parameters
+        ----------
+        mode : int
+            Mode number, from 0.
+
+        Returns
+        -------
+        str
+        """
         return self.coordinates[int(np.argmax(np.abs(self.shapes[:, mode])))]
 
     def __str__(self) -> str:

@@ -88,7 +88,16 @@ class Loop:
         return max(1e-12 * largest, 30.0 * float(far[far < AT_REST * largest].max(initial=0.0)))
 
     def at_rest(self, poles: np.ndarray) -> np.ndarray:
-        """Which poles are those of free motion, at s = 0 (z = 1) to rounding; shape of ``poles``."""
+        """Which poles are those of free motion, at s = 0 (z = 1) to rounding.
+
+        Parameters
+        ----------
+        poles : numpy.ndarray of complex
+
+        Returns
+        -------
+        numpy.ndarray of bool
+        """
         return np.asarray(abs(poles - (1.0 if self.dt else 0.0)) <= self.rest_radius)
 
     def is_stable(self, gain: float = 1.0) -> bool:
@@ -100,6 +109,10 @@ class Loop:
         ----------
         gain : float
             Loop gain k.
+
+        Returns
+        -------
+        bool
         """
         poles = self.closed_poles(gain)
         poles = poles[~self.at_rest(poles)]
@@ -114,6 +127,10 @@ class Loop:
         ----------
         gain : float
             Loop gain k.
+
+        Returns
+        -------
+        bool
         """
         poles = self.closed_poles(gain)
         poles = poles[~self.at_rest(poles)]
@@ -145,6 +162,10 @@ class Loop:
         ----------
         omega : numpy.ndarray, shape (N,)
             rad/s.
+
+        Returns
+        -------
+        control.FrequencyResponseData
         """
         import control
 

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from fixtures import structures as s
 
 from flexctrl.errors import StructureError
-from flexctrl.model.discrete import FirstOrder, ZeroOrder
+from flexctrl.model.discrete import FirstOrderHold, ZeroOrderHold
 
 
 def run(system: control.StateSpace, u: np.ndarray) -> np.ndarray:
@@ -69,7 +69,7 @@ def test_sampled_outputs_are_exact(kind, delay, first_order):
     linear, dt = machine(kind), 0.02
     u = np.random.default_rng(3).standard_normal((1, 25))
     u[:, 0] = 0.0
-    hold = FirstOrder(delay) if first_order else ZeroOrder(delay)
+    hold = FirstOrderHold(delay) if first_order else ZeroOrderHold(delay)
     ours = run(linear.discretize(dt, hold), u)
     reference = fine_run(linear, u, dt, delay, first_order)
     assert np.abs(ours - reference).max() < 1e-10 * np.abs(reference).max()
@@ -108,7 +108,7 @@ def test_integrator_with_delay_is_stable_up_to_the_known_gain(delay_steps):
     """u = -K x, limit 2 sin(π / 2(2d + 1)); one hidden sample of delay would move it."""
     dt = 0.1
     integrator = s.model(np.zeros((1, 1)), np.zeros((1, 1)), C=[[1.0]])
-    plant = integrator.discretize(dt, ZeroOrder(delay_steps * dt))
+    plant = integrator.discretize(dt, ZeroOrderHold(delay_steps * dt))
     limit = 2 * np.sin(np.pi / (2 * (2 * delay_steps + 1))) / dt
     for factor, grows in ((0.999, False), (1.001, True)):
         closed = plant.A - factor * limit * plant.B @ plant.C
@@ -120,7 +120,7 @@ def test_integrator_with_delay_is_stable_up_to_the_known_gain(delay_steps):
 
 
 def test_past_samples_are_named_states():
-    system = s.crane(3.355, 1.0, 0.5).discretize(0.01, ZeroOrder(0.025))
+    system = s.crane(3.355, 1.0, 0.5).discretize(0.01, ZeroOrderHold(0.025))
     assert system.state_labels[-3:] == ["force_past1", "force_past2", "force_past3"]
 
 
@@ -129,4 +129,4 @@ def test_impossible_times_are_refused():
     with pytest.raises(StructureError, match="positive"):
         linear.discretize(0.0)
     with pytest.raises(StructureError, match="delay"):
-        linear.discretize(0.1, ZeroOrder(-0.01))
+        linear.discretize(0.1, ZeroOrderHold(-0.01))

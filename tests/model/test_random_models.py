@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as la
 from fixtures.random_models import anything, dense_response
 
-from flexctrl.model.discrete import ZeroOrder
+from flexctrl.model.discrete import ZeroOrderHold
 
 
 @pytest.mark.parametrize("seed", range(120))
@@ -44,7 +44,7 @@ def test_poles_make_the_pencil_singular_and_are_complete(seed):
 def test_sampled_poles_are_the_exponentials(seed):
     linear, _ = anything(seed)
     dt = 0.05
-    system = linear.discretize(dt, ZeroOrder())
+    system = linear.discretize(dt, ZeroOrderHold())
     # traces of powers are symmetric functions of the poles: no pairing, no sensitivity of a defective zero
     expected = np.exp(linear.damped_poles() * dt)
     for power in (1, 2, 3):

@@ -55,7 +55,18 @@ class Reduced(ABC):
 
     @abstractmethod
     def transfer(self, top: float) -> Transfer:
-        """Evaluator of G_r(s), good up to |s| = top (rad/s)."""
+        """Evaluator of G_r(s).
+
+        Parameters
+        ----------
+        top : float
+            Good up to |s| = top, rad/s.
+
+        Returns
+        -------
+        callable
+            s, shape (N,) to G_r, shape (n_outputs, n_inputs, N).
+        """
 
     @abstractmethod
     def damped_poles(self) -> np.ndarray:
@@ -65,7 +76,19 @@ class Reduced(ABC):
     def frequency_response(
         self, omega: np.ndarray | Sequence[float] | None = None, span: tuple[float, float] | None = None
     ) -> FrequencyResponse:
-        """Response of the reduced model; as :meth:`LinearModel.frequency_response`."""
+        """Response of the reduced model.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Angular frequencies, rad/s; left out: an adaptive grid with every peak.
+        span : tuple of two floats, optional
+            Limits of the adaptive grid, rad/s.
+
+        Returns
+        -------
+        FrequencyResponse
+        """
 
     @abstractmethod
     def to_ss(self) -> control.StateSpace:

@@ -17,13 +17,32 @@ class Selection(Protocol):
     """A rule that picks flexible modes."""
 
     def choose(self, modes: Modes, room: int) -> np.ndarray:
-        """Indices to keep out of flexible ``modes``, at most ``room`` where the rule counts modes."""
+        """Pick modes.
+
+        Parameters
+        ----------
+        modes : Modes
+            Flexible ones only.
+        room : int
+            How many at most, where the rule counts modes.
+
+        Returns
+        -------
+        numpy.ndarray of int
+            Their numbers, ascending.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class Lowest:
-    """The lowest modes; ``order`` counts the rigid-body modes kept too."""
+    """The lowest modes.
+
+    Attributes
+    ----------
+    order : int
+        Number of modes, rigid-body modes included.
+    """
 
     order: int
 
@@ -34,7 +53,12 @@ class Lowest:
 
 @dataclass(frozen=True)
 class BelowFrequency:
-    """All modes below a frequency in Hz."""
+    """All modes below a frequency.
+
+    Attributes
+    ----------
+    hz : float
+    """
 
     hz: float
 
