@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, no_force
@@ -60,9 +61,17 @@ class Effect:
         """Whether the effect gives a part freedom to deform."""
         return False
 
+    def inertial(self, node: NodeMotion) -> NodeMotion:
+        """Motion of a node as its inertia feels it: seen from an inertial frame."""
+        return node
+
     def parts(self) -> tuple[Effect, ...]:
         """The effects it is composed of: itself, unless it stands for several."""
         return (self,)
+
+    def check_beside(self, others: Sequence[Effect]) -> None:
+        """Raise StructureError if the effect makes no sense together with the others of a model."""
+        return
 
 
 def _nothing(rows: int = 1) -> ca.SX:

@@ -43,11 +43,13 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     Raises
     ------
     StructureError
-        For something that is no effect or an effect given twice.
+        For something that is no effect, an effect given twice, or effects that make no sense together.
     """
     if not isinstance(structure, Structure):
         raise StructureError(f"assemble: {structure!r} is no Structure")
     parts = _flat(effects)
+    for effect in parts:
+        effect.check_beside(parts)
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
     groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
     elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))

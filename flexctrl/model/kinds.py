@@ -185,9 +185,31 @@ def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     for effect in effects:
         force = force + effect.beam(m)
     stored = sum((e.beam_energy(m, middle) for e in effects), ca.SX(1, 1))
-    return Shares(
-        beam.nodal_force(m, beam.inertial_force(m)), beam.nodal_force(m, force), beam.kinetic_energy(m), stored
-    )
+    felt, carried = m, ca.SX(1, 1)
+    if _turning(effects):
+        first, second = nodes
+        felt = beam.beam_motion(_inertial(effects, first), _inertial(effects, second), parameters)
+        parked = (_inertial(effects, _still(first)), _inertial(effects, _still(second)))
+        carried = beam.kinetic_energy(beam.beam_motion(*parked, parameters))
+    inertia = beam.nodal_force(felt, beam.inertial_force(felt))
+    return Shares(inertia, beam.nodal_force(m, force), beam.kinetic_energy(m), stored - carried)
+
+
+def _turning(effects: tuple[Effect, ...]) -> bool:
+    """Tell whether some effect lets inertia feel another motion than that of the nodes."""
+    return any(type(e).inertial is not Effect.inertial for e in effects)
+
+
+def _inertial(effects: tuple[Effect, ...], node: NodeMotion) -> NodeMotion:
+    for effect in effects:
+        node = effect.inertial(node)
+    return node
+
+
+def _still(node: NodeMotion) -> NodeMotion:
+    import casadi as ca
+
+    return NodeMotion(node.x, node.R, *[ca.SX(3, 1)] * 4)
 
 
 def _spring(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
@@ -221,9 +243,12 @@ def _body(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     import casadi as ca
 
     p = pieces.named(pieces.BODY_PARAMETERS, parameters)
-    force = sum((e.body(nodes[0], p) for e in effects), ca.SX(6, 1))
-    stored = sum((e.body_energy(nodes[0], p) for e in effects), ca.SX(1, 1))
-    return Shares(pieces.body_inertia(nodes[0], p), force, pieces.body_energy(nodes[0], p), stored)
+    node = nodes[0]
+    force = sum((e.body(node, p) for e in effects), ca.SX(6, 1))
+    stored = sum((e.body_energy(node, p) for e in effects), ca.SX(1, 1))
+    if _turning(effects):
+        stored = stored - pieces.body_energy(_inertial(effects, _still(node)), p)
+    return Shares(pieces.body_inertia(_inertial(effects, node), p), force, pieces.body_energy(node, p), stored)
 
 
 def _point(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:

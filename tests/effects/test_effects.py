@@ -43,7 +43,7 @@ def somewhere(model: fc.Model):
     return model.displace(0.2 * np.random.default_rng(0).normal(size=model.n)).with_(v=v), v, a
 
 
-NOTHING = [fc.RayleighDamping(0.0, 0.0), fc.Gravity((0.0, 0.0, 0.0))]
+NOTHING = [fc.RayleighDamping(0.0, 0.0), fc.Gravity((0.0, 0.0, 0.0)), fc.RotatingFrame((0.0, 0.0, 0.0))]
 
 
 @pytest.mark.parametrize("others", [[fc.LargeRotation()], MOVING, [fc.Flexible()]], ids=["rigid", "flexible", "small"])
@@ -67,8 +67,9 @@ def cost(model: fc.Model) -> dict[str, int]:
     [
         (fc.Gravity(), {"beam", "body", "point"}),
         (fc.RayleighDamping(0.1, 0.1), {"beam", "spring", "rope", "body", "point", "rotary_drive", "linear_drive"}),
+        (fc.RotatingFrame((0.0, 0.0, 2.0)), {"beam", "body", "point"}),
     ],
-    ids=["gravity", "damping"],
+    ids=["gravity", "damping", "spin"],
 )
 def test_an_effect_left_out_costs_nothing_and_one_put_in_only_where_it_acts(effect, pays):
     """Counted in instructions of the force kernels."""

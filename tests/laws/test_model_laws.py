@@ -14,15 +14,18 @@ from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
 
+SPIN = fc.RotatingFrame((0.15, -0.3, -1.35), (0.5, -0.2, 0.3))
 COMMON = [fc.Gravity((1.0, -2.0, -9.0)), fc.LargeRotation(), fc.RayleighDamping(0.1, 0.02)]
 EFFECTS = {
     "flexible": [*COMMON, fc.Flexible()],
     "rigid": COMMON,
     "beams": [*COMMON, fc.BeamFlexibility()],
     "shafts": [*COMMON, fc.ShaftElasticity()],
+    "spinning": [*COMMON, fc.Flexible(), SPIN],
+    "rigid_spinning": [*COMMON, SPIN],
 }
 FEW = [("flexible", s) for s in (1, 2, 4, 6, 15)] + [("rigid", s) for s in (1, 2, 3, 4, 6, 15, 23)]
-FEW += [("beams", 10), ("shafts", 7)]
+FEW += [("beams", 10), ("shafts", 7), ("spinning", 4), ("spinning", 15), ("rigid_spinning", 6), ("rigid_spinning", 23)]
 LOOPS = {"four_bar": four_bar, "bridle": bridle, "double_girder": double_girder}
 MANY = [(kind, s) for s in range(24, 60) for kind in ("flexible", "rigid")]
 CASES = [(*case, s % 3 > 0) for case in FEW for s in case[1:]]

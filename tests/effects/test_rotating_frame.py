@@ -1,0 +1,136 @@
+"""A turning frame: the same motion as seen from outside, by other accelerations; what it conserves; what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import flexctrl as fc
+from flexctrl.errors import StructureError
+
+E = fc.Section(EA=2e4, EI_y=157, EI_z=90, GJ=60, rhoA=1.5, rhoJ=0.02, rhoI_y=0.01)
+MOVING = [fc.LargeRotation(), fc.Flexible()]
+SPIN, CENTER = np.array([0.4, -0.7, 1.5]), np.array([0.3, 0.1, -0.2])
+FRAME = fc.RotatingFrame(SPIN, CENTER)
+
+
+def floating() -> fc.Structure:
+    """Nothing touches the ground, and every freedom is one of a node's."""
+    beam = fc.Beam("beam", (0, 0, 0), (1, 0.5, 0), E, elements=2)
+    body = fc.RigidBody("body", (1, 0.5, 0.3), 2.0, [[0.3, 0.02, 0.0], [0.02, 0.2, 0.01], [0.0, 0.01, 0.4]])
+    rope = fc.Rope("rope", beam.start, (0, -0.5, -1.0), EA=700.0)
+    load = fc.PointMass("load", rope.end, 1.5)
+    spring = fc.Spring("spring", beam.end, body.node, stiffness=300.0)
+    joints = [fc.Pin(beam.start, rope.start), fc.Pin(rope.end, load.node)]
+    joints += [fc.Pin(beam.end, spring.start), fc.Pin(body.node, spring.end)]
+    return fc.Structure([beam, body, rope, load, spring], joints)
+
+
+def from_outside(model: fc.Model, state: fc.State, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rates and accelerations of the same motion seen by who does not turn, at the moment when the axes coincide."""
+    T = model.motion.jacobian(state)
+    v_raw, a_raw = (np.asarray(T @ r)[: model.motion.source_base].reshape(-1, 6) for r in (v, a))
+    carried = np.cross(SPIN, state.x - CENTER)
+    speed, spin = v_raw[:, :3] + carried, v_raw[:, 3:] + SPIN
+    pull = a_raw[:, :3] + 2 * np.cross(SPIN, v_raw[:, :3]) + np.cross(SPIN, carried)
+    turn = a_raw[:, 3:] + np.cross(SPIN, v_raw[:, 3:])
+    pick = [np.argmax(T[:, i].toarray()) for i in range(model.n)]
+    return np.hstack([speed, spin]).ravel()[pick], np.hstack([pull, turn]).ravel()[pick]
+
+
+def test_forces_are_those_of_the_same_motion_seen_from_outside():
+    turning, outside = (fc.assemble(floating(), e, fc.CasadiVM()) for e in ([*MOVING, FRAME], MOVING))
+    rng = np.random.default_rng(3)
+    state = turning.displace(0.2 * rng.normal(size=turning.n))
+    v, a = rng.normal(size=(2, turning.n))
+    expected = outside.balance(state, *from_outside(turning, state, v, a))
+    assert np.allclose(turning.balance(state, v, a), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_a_run_in_the_turning_frame_is_the_run_outside():
+    """Turned back into the frame at the end; both converge to the same place with the square of the step."""
+    gaps = []
+    for step in (2e-3, 1e-3):
+        runs = []
+        for effects in ([*MOVING, FRAME], MOVING):
+            model = fc.assemble(floating(), effects)
+            v = np.random.default_rng(0).normal(size=model.n)
+            if FRAME not in effects:
+                v, _ = from_outside(model, model.rest, v, 0.0 * v)
+            start = model.rest.with_(v=v)
+            method = fc.GeneralizedAlpha(step=step, rho=1.0)
+            runs.append(fc.simulate(model, until=0.2, start=start, method=method).final)
+        inside, outside = runs
+        back = Rotation.from_rotvec(-0.2 * SPIN).as_matrix()
+        nodes = slice(0, -1)
+        gaps.append(np.abs((outside.x[nodes] - CENTER) @ back.T + CENTER - inside.x[nodes]).max())
+    assert gaps[1] < 2e-5
+    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize("effects", [MOVING, [fc.LargeRotation()]], ids=["flexible", "rigid"])
+def test_the_jacobi_integral_is_kept(effects):
+    """Kinetic energy of what is seen, plus the stored one with the centrifugal potential."""
+    model = fc.assemble(floating(), [*effects, FRAME])
+    start = model.rest.with_(v=np.random.default_rng(0).normal(size=model.n))
+    run = fc.simulate(model, until=0.2, start=start, method=fc.GeneralizedAlpha(step=1e-3, rho=1.0))
+    kept = [sum(model.energy(state)[:2]) for state in (start, run.final)]
+    kinetic = model.energy(start)[0]
+    assert kept[1] == pytest.approx(kept[0], abs=1e-4 * kinetic)
+    assert abs(model.energy(run.final)[0] - kinetic) > 0.1 * kinetic
+    assert run.report.energy_residual < 1e-4
+
+
+def test_a_point_on_springs_has_its_frequency_up_and_down_by_the_spin():
+    """Foucault: ω₀ ± Ω for whoever turns, also beyond Ω = ω₀, where K alone would be unstable."""
+    for spin in (0.0, 1.0, 2.5):
+        load = fc.PointMass("load", (0, 0, 0), 2.0)
+        springs = [
+            fc.Spring(f"spring_{i}", load.node, p, stiffness=4.0)
+            for i, p in enumerate([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
+        ]
+        joints = [fc.Pin(load.node, s.start) for s in springs] + [fc.Support(s.end) for s in springs]
+        joints.append(fc.Support(load.node, "w"))
+        effects = [fc.LargeRotation(), fc.RotatingFrame((0, 0, spin))]
+        linear = fc.linearize(fc.assemble(fc.Structure([load, *springs], joints), effects, fc.CasadiVM()))
+        poles = linear.damped_poles()
+        expected = sorted([abs(2.0 - spin)] * 2 + [2.0 + spin] * 2)
+        assert sorted(np.abs(poles)) == pytest.approx(expected, abs=1e-12)
+        assert np.abs(poles.real).max() < 1e-12
+        assert linear.C.toarray() == pytest.approx(np.array([[0, -4.0], [4.0, 0]]) * spin, abs=1e-14)
+
+
+def test_a_spinning_rod_stretches_as_it_should():
+    """u(L) = L (tan x/x − 1) with x = ΩL √(ρA/EA), for every point of the axis and direction of the rod."""
+    L, EA, spin = 10.0, 2.8e7, 60.0
+    s = fc.Section(EA=EA, EI_y=1.4e4, EI_z=1.4e4, GJ=1e4, rhoA=1.2, rhoJ=1e-3)
+    rod = fc.Beam("rod", (2, 1, 5), (2, 1 + L, 5), s, elements=8)
+    structure = fc.Structure([rod], [fc.Support(rod.start)], outputs=[fc.Position("tip", rod.end, "y")])
+    effects = [*MOVING, fc.RotatingFrame((0, 0, spin), (2, 1, -7))]
+    rest = fc.equilibrium(fc.assemble(structure, effects, fc.CasadiVM()))
+    x = spin * L * np.sqrt(1.2 / EA)
+    assert rest.outputs["tip"] - (1 + L) == pytest.approx(L * (np.tan(x) / x - 1), rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ([fc.Flexible()], "RotatingFrame: needs LargeRotation"),
+        ([*MOVING, fc.Gravity()], "gravity .* would turn in a frame"),
+    ],
+)
+def test_what_makes_no_sense_in_a_turning_frame_is_refused(effects, message):
+    with pytest.raises(StructureError, match=message):
+        fc.assemble(floating(), [*effects, FRAME])
+
+
+def test_gravity_along_the_axis_and_a_frame_at_rest_are_welcome():
+    fc.assemble(floating(), [*MOVING, fc.Gravity(), fc.RotatingFrame((0, 0, -3.0))])
+    fc.assemble(floating(), [fc.Gravity(), fc.RotatingFrame((0, 0, 0))])
+
+
+@pytest.mark.parametrize("vectors", [(3.0,), ((0, 0, np.nan),), ((0, 0, 1), "xyz")])
+def test_frames_that_cannot_be_are_refused(vectors):
+    with pytest.raises(StructureError, match=r"RotatingFrame: (rate|center)"):
+        fc.RotatingFrame(*vectors)
