@@ -10,6 +10,7 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Flexible, RopeStretch, ShaftElasticity
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.errors import did_you_mean
 from flexctrl.scene.reading import Kind, Place, checked, number, one_or_several, positive, table, vector
 
@@ -20,6 +21,7 @@ EFFECTS: dict[str, Kind] = {
     "shaft_elasticity": Kind(ShaftElasticity),
     "rope_stretch": Kind(RopeStretch),
     "large_rotation": Kind(LargeRotation),
+    "rotating_frame": Kind(RotatingFrame, {"rate": vector, "center": vector}),
     "rayleigh_damping": Kind(RayleighDamping, {"alpha": number, "beta": number}),
     "modal_damping": Kind(ModalDamping, {"ratios": one_or_several(number)}),
 }
