@@ -29,6 +29,10 @@ class Effect:
         """Energy stored in a beam element; ``middle`` is the mean of its nodes' positions."""
         return _nothing()
 
+    def beam_stress(self, m: BeamMotion) -> ca.SX:
+        """Stresses of a beam element that follow its strains by a linear law, in the order of `beam.stresses`."""
+        return _nothing(6)
+
     def spring(self, m: LineMotion) -> ca.SX:
         """Tension in a spring beside its own [N]."""
         return _nothing()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, elastic_force, strain_energy
+from flexctrl.mechanics.beam import BeamForce, BeamMotion, elastic_force, strain_energy, stresses
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion, rope_energy, shaft_energy, shaft_force, spring_tension
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
 from flexctrl.structure.elements import Beam, Part, Rope
@@ -22,6 +22,10 @@ class BeamFlexibility(Effect):
     def beam(self, m: BeamMotion) -> BeamForce:
         """Internal force."""
         return elastic_force(m)
+
+    def beam_stress(self, m: BeamMotion) -> ca.SX:
+        """Axial force, torque and end moments."""
+        return stresses(m)
 
     def beam_energy(self, m: BeamMotion, middle: ca.SX) -> ca.SX:
         """Strain energy."""

@@ -178,25 +178,37 @@ def bowing(m: BeamMotion) -> ca.SX:
     return (2.0 * (y1 * y1 + y2 * y2 + z1 * z1 + z2 * z2) - y1 * y2 - z1 * z2) / 30.0
 
 
-def elastic_force(m: BeamMotion) -> BeamForce:
-    """Return minus the gradient of `strain_energy`."""
+def stresses(m: BeamMotion) -> ca.SX:
+    """Return what the strains call forth: axial force, torque, end moments about y (two) and z (two)."""
     import casadi as ca
 
     (x1, y1, z1), (x2, y2, z2) = (_components(t) for t in m.theta)
-    N = m.p["EA"] * (m.stretch / m.p["L"] + bowing(m))
-    torque = m.p["GJ"] / m.p["L"] * (x2 - x1)
+    p = m.p
+    return ca.vertcat(
+        p["EA"] * (m.stretch / p["L"] + bowing(m)),
+        p["GJ"] / p["L"] * (x2 - x1),
+        p["a_y"] * y1 + p["b_y"] * y2,
+        p["b_y"] * y1 + p["a_y"] * y2,
+        p["a_z"] * z1 + p["b_z"] * z2,
+        p["b_z"] * z1 + p["a_z"] * z2,
+    )
+
+
+def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
+    """Return the force of given `stresses`: minus them times the gradients of their strains."""
+    import casadi as ca
+
+    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
+    N, torque = stress[0], stress[1]
     s = N * m.p["L"] / 30.0
-    m1 = ca.vertcat(
-        -torque,
-        m.p["a_y"] * y1 + m.p["b_y"] * y2 + s * (4.0 * y1 - y2),
-        m.p["a_z"] * z1 + m.p["b_z"] * z2 + s * (4.0 * z1 - z2),
-    )
-    m2 = ca.vertcat(
-        torque,
-        m.p["b_y"] * y1 + m.p["a_y"] * y2 + s * (4.0 * y2 - y1),
-        m.p["b_z"] * z1 + m.p["a_z"] * z2 + s * (4.0 * z2 - z1),
-    )
+    m1 = ca.vertcat(-torque, stress[2] + s * (4.0 * y1 - y2), stress[4] + s * (4.0 * z1 - z2))
+    m2 = ca.vertcat(torque, stress[3] + s * (4.0 * y2 - y1), stress[5] + s * (4.0 * z2 - z1))
     return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
+
+
+def elastic_force(m: BeamMotion) -> BeamForce:
+    """Return minus the gradient of `strain_energy`."""
+    return stress_force(m, stresses(m))
 
 
 def strain_energy(m: BeamMotion) -> ca.SX:

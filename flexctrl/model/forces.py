@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.model.families import Family
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.mixed import Excess, Mixed
 from flexctrl.model.motion import DENSE_UP_TO, Motion, State
 
 
@@ -30,12 +31,14 @@ class Forces:
     backend: Backend
 
     @property
-    def _drive_base(self) -> int:
+    def drive_base(self) -> int:
+        """Place of the first drive's slot."""
         return NODE_SLOT * len(self.motion.place)
 
     @property
-    def _seed_base(self) -> int:
-        return self._drive_base + DRIVE_SLOT * len(self.motion.drives)
+    def slot_count(self) -> int:
+        """Length of the vector that the kernels read, seeds left out."""
+        return self.drive_base + DRIVE_SLOT * len(self.motion.drives)
 
     def slots(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the flat vector the kernels read."""
@@ -43,14 +46,14 @@ class Forces:
         nodes = len(motion.place)
         rates = motion.rates(state, v)
         accelerations = motion.accelerations(state, v, a)
-        z = np.empty(self._seed_base)
-        slots = z[: self._drive_base].reshape(nodes, NODE_SLOT)
+        z = np.empty(self.slot_count)
+        slots = z[: self.drive_base].reshape(nodes, NODE_SLOT)
         slots[:, :3] = state.x
         slots[:, 3:12] = state.R.reshape(nodes, 9)
         slots[:, 12:18] = rates[: motion.source_base].reshape(nodes, 6)
         slots[:, 18:24] = accelerations[: motion.source_base].reshape(nodes, 6)
         if motion.drives:
-            drives = z[self._drive_base :].reshape(-1, DRIVE_SLOT)
+            drives = z[self.drive_base :].reshape(-1, DRIVE_SLOT)
             own = np.append(state.q, 0.0)[motion.sources]
             drives[:, 0] = np.where(motion.rigid, motion.ratios * state.driven, own)
             drives[:, 1] = rates[motion.source_base :]
@@ -77,12 +80,16 @@ class Forces:
         a: np.ndarray,
         seeds: tuple[float, float, float],
         loads: np.ndarray | None = None,
+        excess: Excess | None = None,
     ) -> sp.csr_matrix:
         """Return ∂(balance)/∂(own motion) for increments that add ``seeds`` × to place, rates and accelerations.
 
         Exact where the machine is at rest; in motion the turning of levers of followers is left out of the rates.
+        ``loads`` are raw forces of the inputs; ``excess`` stresses are borne beside those of the state.
         """
         blocks = self._blocks(state, v, a, seeds)
+        if excess is not None:
+            blocks += excess.blocks
         if self.motion.plain:
             places, indices, indptr = self._table
             data = np.bincount(places, weights=blocks, minlength=len(indices) + 1)[:-1]
@@ -90,9 +97,15 @@ class Forces:
         small = self.motion.n <= DENSE_UP_TO
         slope = self._dense(state, blocks) if small else self._projected(state, blocks, *self._pattern)
         if seeds[0] != 0.0:
-            raw = self.raw(state, v, a)
-            slope = slope + seeds[0] * self.motion.stiffening(state, raw if loads is None else raw + loads)
+            acting = self.raw(state, v, a) + (0.0 if loads is None else loads)
+            acting = acting if excess is None else acting + excess.raw
+            slope = slope + seeds[0] * self.motion.stiffening(state, acting)
         return sp.csr_matrix(slope)
+
+    @cached_property
+    def mixed(self) -> Mixed:
+        """The stresses of the pieces that strain."""
+        return Mixed(self)
 
     def _dense(self, state: State, blocks: np.ndarray) -> np.ndarray:
         size, (rows, columns) = self.motion.raw, self._pattern
@@ -133,14 +146,14 @@ class Forces:
 
     @cached_property
     def _force(self) -> tuple[Run, ...]:
-        base, sources = self._drive_base, self.motion.source_base
+        base, sources = self.drive_base, self.motion.source_base
         return tuple(
             self.backend.bind(f.kernels.force, f.gather(base), f.parameters, f.scatter(sources)) for f in self.families
         )
 
     @cached_property
     def _energy(self) -> tuple[Run, ...]:
-        base = self._drive_base
+        base = self.drive_base
         return tuple(
             self.backend.bind(f.kernels.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
             for f in self.families
@@ -148,18 +161,25 @@ class Forces:
 
     @cached_property
     def _tangent(self) -> tuple[Run, ...]:
-        found, start = [], 0
-        for f in self.families:
-            size = f.scatter(self.motion.source_base).shape[1] ** 2
+        found = []
+        for f, start in zip(self.families, self.block_starts, strict=True):
+            size = f.kernels.kind.width**2
             scatter = start + np.arange(f.count * size).reshape(f.count, size)
-            start += f.count * size
-            seeds = np.tile(self._seed_base + np.arange(3), (f.count, 1))
-            found.append(
-                self.backend.bind(
-                    f.kernels.tangent, np.hstack([f.gather(self._drive_base), seeds]), f.parameters, scatter
-                )
-            )
+            seeds = np.tile(self.slot_count + np.arange(3), (f.count, 1))
+            gather = np.hstack([f.gather(self.drive_base), seeds])
+            found.append(self.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
         return tuple(found)
+
+    @cached_property
+    def block_starts(self) -> tuple[int, ...]:
+        """Where the tangent blocks of each family begin."""
+        sizes = [f.count * f.kernels.kind.width**2 for f in self.families]
+        return tuple(np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(int).tolist()) if sizes else ()
+
+    @property
+    def entries(self) -> int:
+        """Entries of all tangent blocks together."""
+        return int(self._pattern[0].size)
 
     @cached_property
     def _pattern(self) -> tuple[np.ndarray, np.ndarray]:

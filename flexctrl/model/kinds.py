@@ -116,20 +116,14 @@ class Kernels:
         import casadi as ca
 
         kind = self.kind
-        symbols = ca.SX.sym("z", NODE_SLOT * kind.nodes + DRIVE_SLOT * kind.drives)
-        parameters = ca.SX.sym("p", kind.parameters)
+        symbols, parameters = symbols_of(kind)
         return symbols, parameters, self._evaluate(symbols, parameters, ca.SX(kind.width, 1), ca.SX(3, 1))
 
     def _evaluate(self, symbols: ca.SX, parameters: ca.SX, increment: ca.SX, seeds: ca.SX) -> Shares:
         import casadi as ca
 
-        count, freedoms = self.kind.nodes, self.kind.freedoms
-        nodes = []
-        for i in range(count):
-            d = increment[freedoms * i : freedoms * (i + 1)]
-            d = d if freedoms == 6 else ca.vertcat(d, ca.SX(3, 1))
-            nodes.append(_node_motion(symbols[NODE_SLOT * i : NODE_SLOT * (i + 1)], d, seeds))
-        slot = symbols[NODE_SLOT * count :]
+        nodes = moved(self.kind, symbols, increment, seeds)
+        slot = symbols[NODE_SLOT * self.kind.nodes :]
         if self.kind.drives:
             slot = slot + ca.vertcat(seeds, 0) * increment[-1]
         return self.kind.physics(self.effects, nodes, slot, parameters)
@@ -148,6 +142,25 @@ class Kernels:
         count = self.kind.nodes
         found = [symbols[NODE_SLOT * i + 12 : NODE_SLOT * i + 12 + self.kind.freedoms] for i in range(count)]
         return ca.vertcat(*found, *([symbols[NODE_SLOT * count + 1]] if self.kind.drives else []))
+
+
+def symbols_of(kind: Kind) -> tuple[ca.SX, ca.SX]:
+    """Return symbols of the slots that a piece reads, and of its parameters."""
+    import casadi as ca
+
+    return ca.SX.sym("z", NODE_SLOT * kind.nodes + DRIVE_SLOT * kind.drives), ca.SX.sym("p", kind.parameters)
+
+
+def moved(kind: Kind, symbols: ca.SX, increment: ca.SX, seeds: ca.SX) -> list[NodeMotion]:
+    """Return the motion of a piece's nodes after a raw increment, by factors ``seeds`` on place, rate, acceleration."""
+    import casadi as ca
+
+    nodes = []
+    for i in range(kind.nodes):
+        d = increment[kind.freedoms * i : kind.freedoms * (i + 1)]
+        d = d if kind.freedoms == 6 else ca.vertcat(d, ca.SX(3, 1))
+        nodes.append(_node_motion(symbols[NODE_SLOT * i : NODE_SLOT * (i + 1)], d, seeds))
+    return nodes
 
 
 def _node_motion(slot: ca.SX, d: ca.SX, seeds: ca.SX) -> NodeMotion:

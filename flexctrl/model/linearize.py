@@ -9,8 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError
+from flexctrl.model.balance import Balance
 from flexctrl.model.certificate import certify, taylor_slope
-from flexctrl.model.equilibrium import Rest, Search, equilibrium
+from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linear import LinearModel, PartMatrices
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
@@ -52,10 +53,11 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     state = rest.state if isinstance(rest, Rest) else rest
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
     free = _free(model, rest)
-    search = Search(model, u, free)
-    residual = _check_balance(search, state)
+    held = set(range(model.n)) - set(free.tolist())
+    balance = Balance(model, u, {i: float(state.q[i]) for i in sorted(held)})
+    residual = _check_balance(balance, state)
     linear, asymmetry = _derivative(model, state, u, free)
-    slope = taylor_slope(_push(search, state), linear.K, np.where(search.turning, 1.0, search.size)[free])
+    slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
     return replace(linear, certificate=certify(linear, residual, asymmetry, slope, model.motion, state))
 
 
@@ -83,14 +85,14 @@ def _derivative(model: Model, state: State, u: np.ndarray, free: np.ndarray) -> 
     return linear, gap / max(float(abs(K).max()) if K.nnz else 0.0, 1e-300)
 
 
-def _push(search: Search, state: State) -> Callable[[np.ndarray], np.ndarray]:
+def _push(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarray]:
     """Force on the free coordinates after a displacement of them."""
-    model, rest = search.model, search.force(state)
+    model, rest = balance.model, balance.force(state)
 
     def force(d: np.ndarray) -> np.ndarray:
         step = np.zeros(model.n)
-        step[search.free] = d
-        return search.force(model.advance(state, step, search.zero, 0.0)) - rest
+        step[balance.free] = d
+        return balance.force(model.advance(state, step, balance.still, 0.0)) - rest
 
     return force
 
@@ -100,14 +102,14 @@ def _free(model: Model, rest: Rest | State) -> np.ndarray:
     return np.array([i for i, name in enumerate(model.coordinates) if name not in held], dtype=int)
 
 
-def _check_balance(search: Search, state: State) -> float:
+def _check_balance(balance: Balance, state: State) -> float:
     if np.abs(state.v).max(initial=0.0) > 0.0:
         raise LinearizationError("linearize: the state moves; give one at rest, e.g. from equilibrium(model)")
-    force, scale = search.force(state), search.scale(state)
-    residual = search.relative(force, scale)
-    if residual > _BALANCED + search.noise(state):
+    force, scale = balance.force(state), balance.scale(state)
+    residual = balance.relative(force, scale)
+    if residual > _BALANCED + balance.noise(state):
         worst = int(np.argmax(np.abs(force)))
-        name = search.model.coordinates[search.free[worst]]
+        name = balance.model.coordinates[balance.free[worst]]
         raise LinearizationError(
             f"linearize: not an equilibrium: {name} is pushed by {force[worst]:.4g} (forces at work: {scale:.3g}); "
             "linearise about equilibrium(model), or name the inputs that balance it"

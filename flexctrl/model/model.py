@@ -18,6 +18,7 @@ from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.assembly import assembled, mass_blocks, stiffness_blocks
 from flexctrl.model.families import families_of
 from flexctrl.model.forces import Forces
+from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import Motion, State
 from flexctrl.model.signals import Signals, signals_of
 from flexctrl.structure.drives import Drive
@@ -197,7 +198,13 @@ class Model:
         return load - self._stiffness @ state.q - damping @ v - self._mass @ a
 
     def slope(
-        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float], u: np.ndarray
+        self,
+        state: State,
+        v: np.ndarray,
+        a: np.ndarray,
+        seeds: tuple[float, float, float],
+        u: np.ndarray,
+        excess: Excess | None = None,
     ) -> sp.csr_matrix:
         """Return ∂(balance + loads)/∂(own motion) for a motion that adds ``seeds`` × increment to (place, v, a).
 
@@ -211,13 +218,15 @@ class Model:
         seeds : tuple of 3 floats
             (1, 0, 0) gives −K, (0, 1, 0) gives −C, (0, 0, 1) gives −M; an integrator mixes them.
         u : numpy.ndarray, shape (inputs,)
+        excess : Excess, optional
+            Stresses borne beside those of the state; see `flexctrl.model.mixed`.
 
         Returns
         -------
         scipy.sparse.csr_matrix, shape (n, n)
         """
         if self.large:
-            slope = self.forces.slope(state, v, a, seeds, self.signals.loads @ u)
+            slope = self.forces.slope(state, v, a, seeds, self.signals.loads @ u, excess)
             return slope - seeds[1] * self.viscous if self.viscous.nnz else slope
         _, damping = self._small
         return -(seeds[0] * self._stiffness + seeds[1] * damping + seeds[2] * self._mass).tocsr()

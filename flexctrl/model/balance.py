@@ -1,0 +1,143 @@
+"""What is left of the forces in a state, scaled to the forces at work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.model.mixed import Excess
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Balance"]
+
+_TURNS = ("_rx", "_ry", "_rz", "_turn")
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """The conditions of one equilibrium.
+
+    Attributes
+    ----------
+    model : Model
+    u : numpy.ndarray, shape (inputs,)
+    held : mapping of int to float
+        Displacement from the drawn shape of each coordinate that is held.
+    kept : numpy.ndarray
+        Forces that the free coordinates are to keep, not to lose; empty for none.
+    """
+
+    model: Model
+    u: np.ndarray
+    held: Mapping[int, float] = field(default_factory=dict)
+    kept: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @cached_property
+    def free(self) -> np.ndarray:
+        """Numbers of the coordinates that are not held."""
+        return np.array([i for i in range(self.model.n) if i not in self.held], dtype=int)
+
+    @cached_property
+    def fixed(self) -> np.ndarray:
+        """Numbers of the coordinates that are held."""
+        return np.array(list(self.held), dtype=int)
+
+    @cached_property
+    def still(self) -> np.ndarray:
+        """No rates."""
+        return np.zeros(self.model.n)
+
+    @property
+    def size(self) -> float:
+        """Size of the machine [m]."""
+        return self.model.structure.size
+
+    @cached_property
+    def turning(self) -> np.ndarray:
+        """Which coordinates are angles."""
+        return np.array([name.endswith(_TURNS) for name in self.model.coordinates], dtype=bool)
+
+    @cached_property
+    def lever(self) -> np.ndarray:
+        """By what a force on each coordinate is divided to count as one in newtons."""
+        return np.where(self.turning, self.size, 1.0)
+
+    @cached_property
+    def unit(self) -> np.ndarray:
+        """A displacement of one of each coordinate: a radian, or the size of the machine."""
+        return np.where(self.turning, 1.0, self.size)
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """Masses of the coordinates, none of them zero."""
+        mass = np.asarray(self.model.mass().diagonal())
+        heaviest = mass[~self.turning].max(initial=0.0) or mass.max(initial=0.0) or 1.0
+        return np.maximum(mass, 1e-6 * heaviest * self.lever**2)
+
+    @cached_property
+    def heaviest(self) -> float:
+        """The largest of them [kg]."""
+        if self.turning.all():
+            return float(self.inertia.max(initial=1e-300) / self.size**2)
+        return float(self.inertia[~self.turning].max())
+
+    def force(self, state: State) -> np.ndarray:
+        """Return the unbalanced forces on the free coordinates."""
+        force = self.model.balance(state, self.still, self.still) + self.model.loads(state, self.u)
+        return force[self.free] - (self.kept if self.kept.size else 0.0)
+
+    def gap(self, state: State) -> np.ndarray:
+        """Return how far the held coordinates are from their places."""
+        return np.array(list(self.held.values())) - state.q[self.fixed]
+
+    def astray(self, state: State) -> float:
+        """Return the largest of these, in radians or sizes of the machine."""
+        return float(np.abs(self.gap(state) / self.unit[self.fixed]).max(initial=0.0))
+
+    def slope(self, state: State, excess: Excess | None = None) -> sp.csr_matrix:
+        """Return K of all coordinates, geometric stiffness included."""
+        return -self.model.slope(state, self.still, self.still, (1.0, 0.0, 0.0), self.u, excess)
+
+    def among_free(self, K: sp.csr_matrix) -> sp.csr_matrix:
+        """Return the rows and columns of the free coordinates."""
+        return K[self.free][:, self.free] if self.held else K
+
+    def scale(self, state: State) -> float:
+        """Return the forces at work: all loads and weights together [N]."""
+        loads = np.abs(self.model.signals.loads @ self.u).sum()
+        weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
+        return float(max(loads, weights, np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0), 1e-300))
+
+    def noise(self, state: State) -> float:
+        """Return the relative residual that round-off of the positions alone makes: |K| times their last digits."""
+        reach = np.where(self.turning, 1.0, max(self.size, float(np.abs(state.x).max(initial=0.0))))
+        force = (abs(self.slope(state)) @ (reach * np.finfo(float).eps)) / self.lever
+        return 4.0 * float(force[self.free].max(initial=0.0)) / self.scale(state)
+
+    def relative(self, force: np.ndarray, scale: float) -> float:
+        """Return the largest of some forces on the free coordinates over the forces at work; infinite for NaN."""
+        worst = np.abs(force / self.lever[self.free]).max(initial=0.0) / scale
+        return float(worst) if np.isfinite(worst) else np.inf
+
+    def residual(self, state: State) -> float:
+        """Return the largest unbalanced force over the forces at work."""
+        return self.relative(self.force(state), self.scale(state))
+
+    def worst(self, state: State) -> str:
+        """Return the coordinate that is pushed most."""
+        force = np.abs(self.force(state) / self.lever[self.free])
+        return self.model.coordinates[int(self.free[int(np.argmax(force))])] if force.size else "none"
+
+    def moved(self, step: np.ndarray) -> float:
+        """Return the largest of some displacements, in radians or sizes of the machine."""
+        return float(np.abs(step / self.unit).max(initial=0.0))
+
+    def part(self, start: State, holding: np.ndarray, done: float) -> Balance:
+        """Return the way to this balance from a start that its unbalanced forces ``holding`` hold: 0 there, 1 here."""
+        held = {i: (1.0 - done) * float(start.q[i]) + done * value for i, value in self.held.items()}
+        return replace(self, held=held, kept=(1.0 - done) * holding)

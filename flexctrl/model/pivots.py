@@ -1,0 +1,68 @@
+"""Signs of pivots: whether a stiffness matrix holds, and in how many directions it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+ZERO_PIVOT = 1e-13
+"""Pivots of a matrix scaled to a unit diagonal that count as zero."""
+
+
+def pivots(A: sp.spmatrix) -> np.ndarray:
+    """Return the pivots of the symmetric part of a matrix, scaled to a diagonal of ones.
+
+    Their signs are those of the eigenvalues (Sylvester's law of inertia).
+
+    Parameters
+    ----------
+    A : scipy.sparse matrix, shape (n, n)
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        NaN throughout if the matrix cannot be factorised without exchanging rows.
+    """
+    if not A.shape[0]:
+        return np.zeros(0)
+    size = np.sqrt(np.abs(A.diagonal()))
+    scale = sp.diags(1.0 / np.where(size > 0.0, size, 1.0))
+    scaled = scale @ (0.5 * (A + A.T)) @ scale + 0.1 * ZERO_PIVOT * sp.identity(A.shape[0])
+    try:
+        lu = splu(scaled.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:
+        return np.full(A.shape[0], np.nan)
+    return np.asarray(lu.U.diagonal())
+
+
+def negative_pivots(A: sp.spmatrix) -> int:
+    """Return in how many independent directions the quadratic form of a matrix is negative.
+
+    Parameters
+    ----------
+    A : scipy.sparse matrix, shape (n, n)
+
+    Returns
+    -------
+    int
+    """
+    found = pivots(A)
+    if np.isnan(found).any():
+        values = np.linalg.eigvalsh((0.5 * (A + A.T)).toarray())
+        return int((values < -1e-12 * np.abs(values).max()).sum())
+    return int((found < -ZERO_PIVOT).sum())
+
+
+def holds(A: sp.spmatrix) -> bool:
+    """Tell whether a stiffness matrix resists every displacement.
+
+    Parameters
+    ----------
+    A : scipy.sparse matrix, shape (n, n)
+
+    Returns
+    -------
+    bool
+    """
+    return bool((pivots(A) > ZERO_PIVOT).all())
