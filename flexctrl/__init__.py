@@ -33,6 +33,7 @@ _HOMES = {
     "flexctrl.effects.gravity": ("Gravity",),
     "flexctrl.effects.flexibility": ("BeamFlexibility", "Flexible", "RopeStretch", "ShaftElasticity"),
     "flexctrl.effects.large_rotation": ("LargeRotation",),
+    "flexctrl.effects.geometric_stiffness": ("GeometricStiffness",),
     "flexctrl.effects.rotating_frame": ("RotatingFrame",),
     "flexctrl.effects.damping": ("ModalDamping", "RayleighDamping"),
     "flexctrl.mechanics.kernel": ("CasadiVM", "Compiled"),

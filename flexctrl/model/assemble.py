@@ -11,11 +11,14 @@ import scipy.sparse as sp
 from flexctrl.effects.damping import ModalDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch, ShaftElasticity
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
+from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.kernel import Backend, best_backend
+from flexctrl.model.equilibrium import equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.mobility import motion_of
-from flexctrl.model.model import Model
+from flexctrl.model.model import Model, Small
 from flexctrl.structure.elements import Beam, Rope
 from flexctrl.structure.freedoms import listed
 from flexctrl.structure.relations import Group
@@ -50,6 +53,8 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     parts = _flat(effects)
     for effect in parts:
         effect.check_beside(parts)
+    if any(isinstance(e, GeometricStiffness) for e in parts):
+        return _prestressed(structure, parts, backend)
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
     groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
     elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))
@@ -67,6 +72,19 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]
     return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
+
+
+def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backend | None) -> Model:
+    """Return the model of small motion about the equilibrium under the machine's own weight."""
+    others = [e for e in parts if not isinstance(e, GeometricStiffness)]
+    large = assemble(structure, [*others, LargeRotation()], backend)
+    linear = linearize(large, at=(found := equilibrium(large)))
+    still = np.zeros(large.n)
+    rest = replace(found.state, q=still, v=still)
+    about = Small(still, linear.K, linear.C.tocsr(), linear.M)
+    return replace(
+        large, effects=parts, motion=replace(large.motion, rest=rest), viscous=0.0 * large.viscous, about=about
+    )
 
 
 def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:

@@ -32,6 +32,16 @@ if TYPE_CHECKING:
     from flexctrl.model.equilibrium import Rest
 
 
+@dataclass(frozen=True, eq=False)
+class Small:
+    """Constant matrices of a model that moves little: load − K q − C v − M a."""
+
+    load: np.ndarray
+    K: sp.csc_matrix
+    C: sp.csr_matrix
+    M: sp.csc_matrix
+
+
 @dataclass(frozen=True)
 class Model:
     """The equations of motion of a structure under some effects: Tᵀ (f(x, v, a) + loads) = 0.
@@ -48,6 +58,8 @@ class Model:
         How the kernels run.
     viscous : scipy.sparse.csr_matrix, shape (n, n)
         Damping that acts on the degrees of freedom themselves (modal damping); empty without.
+    about : Small or None
+        Matrices of small motion about another place than the drawn shape (geometric stiffness).
     """
 
     structure: Structure
@@ -55,6 +67,7 @@ class Model:
     motion: Motion
     backend: Backend
     viscous: sp.csr_matrix = field(repr=False)
+    about: Small | None = field(default=None, repr=False)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -117,11 +130,14 @@ class Model:
 
     def mass(self) -> sp.csc_matrix:
         """Return M at rest from the consistent element matrices, shape (n, n), in the order of `coordinates`."""
-        return self._mass
+        return self.about.M if self.about else self._mass
 
     def stiffness(self) -> sp.csc_matrix:
-        """Return K at rest from the element matrices, shape (n, n), without prestress; it may be singular."""
-        return self._stiffness
+        """Return K at rest from the element matrices, shape (n, n); it may be singular.
+
+        Without prestress, unless the model has `GeometricStiffness`.
+        """
+        return self.about.K if self.about else self._stiffness
 
     @cached_property
     def _mass(self) -> sp.csc_matrix:
@@ -132,12 +148,14 @@ class Model:
         return assembled(self.motion, stiffness_blocks(self.structure, self.motion, self.bends))
 
     @cached_property
-    def _small(self) -> tuple[np.ndarray, sp.csr_matrix]:
-        """The constant load and damping of the linear model about the shape at rest."""
+    def _small(self) -> Small:
+        """The matrices of the linear model."""
+        if self.about:
+            return self.about
         still = np.zeros(self.n)
         load = self.forces.balance(self.rest, still, still)
         damping = -self.forces.slope(self.rest, still, still, (0.0, 1.0, 0.0)).tocsr()
-        return load, damping + self.viscous
+        return Small(load, self._stiffness, damping + self.viscous, self._mass)
 
     def input_vector(self, inputs: Mapping[str, float]) -> np.ndarray:
         """Return input values in order; what is not named is zero.
@@ -194,8 +212,8 @@ class Model:
         if self.large:
             force = self.forces.balance(state, v, a)
             return force - self.viscous @ v if self.viscous.nnz else force
-        load, damping = self._small
-        return load - self._stiffness @ state.q - damping @ v - self._mass @ a
+        small = self._small
+        return small.load - small.K @ state.q - small.C @ v - small.M @ a
 
     def slope(
         self,
@@ -228,8 +246,8 @@ class Model:
         if self.large:
             slope = self.forces.slope(state, v, a, seeds, self.signals.loads @ u, excess)
             return slope - seeds[1] * self.viscous if self.viscous.nnz else slope
-        _, damping = self._small
-        return -(seeds[0] * self._stiffness + seeds[1] * damping + seeds[2] * self._mass).tocsr()
+        small = self._small
+        return -(seeds[0] * small.K + seeds[1] * small.C + seeds[2] * small.M).tocsr()
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
         """Return the state after a step of the degrees of freedom.
@@ -252,7 +270,7 @@ class Model:
             return self.motion.advance(state, step, v, t)
         q = state.q + step
         raw = (self.motion.jacobian(self.rest) @ q)[: self.motion.source_base].reshape(-1, 6)
-        x, R = self.rest.x + raw[:, :3], exponential(raw[:, 3:])
+        x, R = self.rest.x + raw[:, :3], exponential(raw[:, 3:]) @ self.rest.R
         return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t)
 
     def rates(self, state: State) -> np.ndarray:
@@ -295,10 +313,10 @@ class Model:
         if self.large:
             kinetic, stored, power = self.forces.energy(state, state.v)
             return kinetic, stored, power + float(state.v @ (self.viscous @ state.v))
-        load, damping = self._small
-        kinetic = 0.5 * float(state.v @ (self._mass @ state.v))
-        stored = 0.5 * float(state.q @ (self._stiffness @ state.q)) - float(load @ state.q)
-        return kinetic, stored, float(state.v @ (damping @ state.v))
+        small = self._small
+        kinetic = 0.5 * float(state.v @ (small.M @ state.v))
+        stored = 0.5 * float(state.q @ (small.K @ state.q)) - float(small.load @ state.q)
+        return kinetic, stored, float(state.v @ (small.C @ state.v))
 
     def displace(self, q: Mapping[str, float] | np.ndarray) -> State:
         """Return the machine at rest after a displacement of the degrees of freedom from the drawn shape.

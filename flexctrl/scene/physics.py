@@ -8,6 +8,7 @@ from typing import Any
 from flexctrl.effects.damping import ModalDamping, RayleighDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Flexible, RopeStretch, ShaftElasticity
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.rotating_frame import RotatingFrame
@@ -21,6 +22,7 @@ EFFECTS: dict[str, Kind] = {
     "shaft_elasticity": Kind(ShaftElasticity),
     "rope_stretch": Kind(RopeStretch),
     "large_rotation": Kind(LargeRotation),
+    "geometric_stiffness": Kind(GeometricStiffness),
     "rotating_frame": Kind(RotatingFrame, {"rate": vector, "center": vector}),
     "rayleigh_damping": Kind(RayleighDamping, {"alpha": number, "beta": number}),
     "modal_damping": Kind(ModalDamping, {"ratios": one_or_several(number)}),

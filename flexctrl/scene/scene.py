@@ -158,6 +158,7 @@ class Scene:
     def with_(
         self,
         *,
+        structure: Structure | None = None,
         effects: Sequence[Effect] | None = None,
         controller: Any = None,
         loads: Mapping[str, float | Signal] | None = None,
@@ -167,14 +168,20 @@ class Scene:
 
         Parameters
         ----------
-        effects, controller, loads, simulation
+        structure, effects, controller, loads, simulation
             As for the constructor.
 
         Returns
         -------
         Scene
         """
-        given = {"effects": effects, "controller": controller, "loads": loads, "simulation": simulation}
+        given = {
+            "structure": structure,
+            "effects": effects,
+            "controller": controller,
+            "loads": loads,
+            "simulation": simulation,
+        }
         return replace(self, **{name: value for name, value in given.items() if value is not None})
 
     # -- models
@@ -213,11 +220,11 @@ class Scene:
 
     def _equilibrium(self, model: Model) -> Rest:
         for name in self.hold:
-            if not _own(self.model, name):
+            if not _own(self.model, name) and not _free(self.structure, name):
                 hint = did_you_mean(name, self.model.coordinates)
                 raise SceneError(f"{self.name}: hold: the machine has no free coordinate {name!r}{hint}")
         places = {_own(model, name): at for name, at in self.hold.items()}
-        places.pop("", None)  # the rigid twin may not have it
+        places.pop("", None)  # where parts are rigid it may be no coordinate
         return equilibrium(model, hold=places, inputs=dict(self.rest_inputs))
 
     # -- runs
@@ -290,13 +297,22 @@ def _own(model: Model, name: str) -> str:
     """The coordinate behind a freedom, ``girder.start.u`` or its own name; empty if the model has none of its own."""
     if "." not in name:
         return name if name in model.coordinates else ""
+    number = int(model.motion.place[_cell(model.structure, name)])
+    return model.coordinates[number] if number < model.n else ""
+
+
+def _free(structure: Structure, name: str) -> bool:
+    """Whether the joints leave a freedom free, even if what is rigid takes it away."""
+    return "." in name and bool(structure.join_table.rows[_cell(structure, name)[0]][_cell(structure, name)[1]])
+
+
+def _cell(structure: Structure, name: str) -> tuple[int, int]:
+    """Node and column of ``girder.start.u``."""
     where, _, freedom = name.rpartition(".")
     column = {word: i for names in (FREEDOMS, IDENTIFIERS) for i, word in enumerate(names)}
     if freedom not in column:
         raise SceneError(f"hold {name!r}: there is no freedom {freedom!r}{did_you_mean(freedom, FREEDOMS)}")
-    node = model.structure.number(node_of(model.structure.elements, where))
-    number = int(model.motion.place[node, column[freedom]])
-    return model.coordinates[number] if number < model.n else ""
+    return structure.number(node_of(structure.elements, where)), column[freedom]
 
 
 __all__ = ["Channel", "Plan", "Scene", "Simulation", "Start"]
