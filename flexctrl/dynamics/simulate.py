@@ -176,7 +176,7 @@ class _Journey:
         if np.array_equal(fresh.u, before.u):
             self.point = replace(self.point, supply=fresh)
         else:
-            self.point = self.stepper.start(state, fresh, self.size)
+            self.point = self.stepper.renew(self.point, fresh, self.size)
 
     def _advance_to(self, t: float) -> None:
         pace = self.method.pace
@@ -236,7 +236,7 @@ class _Journey:
                 self.size = h = 0.25 * h
                 continue
             error = self.stepper.error(self.point, after, self.books.moved, self.tolerance)
-            factor = 0.9 * max(error, 1e-6) ** (-1.0 / (self.method.order + 1))
+            factor = 0.9 * max(error, 1e-6) ** (-1.0 / pace.steepness)
             if error > 1.0:
                 self.rejected += 1
                 self.size = h = h * max(0.2, factor)

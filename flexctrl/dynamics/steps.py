@@ -56,10 +56,19 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Controlled:
-    """Steps chosen from the estimated error: length of the first and of the largest [s]."""
+    """Steps chosen from the estimated error.
+
+    Attributes
+    ----------
+    first, largest : float
+        Length of the first and of the largest step [s].
+    steepness : int
+        Power of the step with which the estimated error grows.
+    """
 
     first: float
     largest: float
+    steepness: int
 
 
 Pace = Fixed | Controlled
@@ -93,6 +102,9 @@ class Stepper(Protocol[P]):
         SingularMatrixError
             If a freedom has neither mass nor stiffness.
         """
+
+    def renew(self, point: P, supply: Supply, step: float) -> P:
+        """Return the point under other inputs, which jump here; ``step`` is about to be taken."""
 
     def step(self, point: P, h: float) -> P:
         """Return the point a step later.
