@@ -15,6 +15,7 @@ from flexctrl.model.motion import State
 
 __all__ = ["Balance"]
 
+_LASTING = ("free", "fixed", "still", "turning", "lever", "unit", "inertia", "heaviest")
 _TURNS = ("_rx", "_ry", "_rz", "_turn")
 
 
@@ -140,4 +141,13 @@ class Balance:
     def part(self, start: State, holding: np.ndarray, done: float) -> Balance:
         """Return the way to this balance from a start that its unbalanced forces ``holding`` hold: 0 there, 1 here."""
         held = {i: (1.0 - done) * float(start.q[i]) + done * value for i, value in self.held.items()}
-        return replace(self, held=held, kept=(1.0 - done) * holding)
+        return self._again(replace(self, held=held, kept=(1.0 - done) * holding))
+
+    def under(self, u: np.ndarray) -> Balance:
+        """Return the same balance under other inputs."""
+        return self._again(replace(self, u=u))
+
+    def _again(self, other: Balance) -> Balance:
+        """What does not depend on loads and places is not worked out anew."""
+        other.__dict__.update({name: self.__dict__[name] for name in _LASTING if name in self.__dict__})
+        return other

@@ -1,0 +1,267 @@
+"""Paths of equilibria under a growing load, through the points at which the load has to turn back."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.model.balance import Balance
+from flexctrl.model.equilibrium import Rest, equilibrium
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+from flexctrl.model.path_course import Course, Direction, Station
+from flexctrl.model.path_critical import across, softest
+from flexctrl.model.path_walk import PathEnd, Walk
+from flexctrl.structure.freedoms import check_finite, check_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["BranchPoint", "EquilibriumPath", "LimitPoint", "PathEnd", "PathPoint", "equilibrium_path"]
+
+
+@dataclass(frozen=True, eq=False)
+class PathPoint:
+    """An equilibrium on a path.
+
+    Attributes
+    ----------
+    factor : float
+        λ, by which the load is multiplied.
+    rest : Rest
+        The equilibrium itself, as `linearize` and `simulate` take it.
+    """
+
+    factor: float
+    rest: Rest
+
+    @property
+    def outputs(self) -> dict[str, float]:
+        """The model's outputs."""
+        return self.rest.outputs
+
+    @property
+    def unstable(self) -> int:
+        """Independent directions in which it does not last; see `Rest`."""
+        return self.rest.unstable
+
+
+@dataclass(frozen=True, eq=False)
+class LimitPoint(PathPoint):
+    """Where the load turns back: under load control the machine snaps through.
+
+    Attributes
+    ----------
+    factor : float
+        λ.
+    rest : Rest
+    mode : numpy.ndarray, shape (n,)
+        The displacement in which it gives way.
+    """
+
+    mode: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint(PathPoint):
+    """Where another path crosses: the machine buckles.
+
+    Attributes
+    ----------
+    factor : float
+        λ.
+    rest : Rest
+    mode : numpy.ndarray, shape (n,)
+        The displacement in which it gives way; a path that starts here leaves along it.
+    """
+
+    mode: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumPath:
+    """Equilibria under constant inputs and λ times a load, in order along their path.
+
+    Attributes
+    ----------
+    load : dict of str to float
+        The inputs that λ multiplies.
+    points : tuple of PathPoint
+        The computed ones; `limits` and `branchings` lie between them.
+    limits : tuple of LimitPoint
+    branchings : tuple of BranchPoint
+    end : PathEnd
+    iterations : int
+        Newton's, altogether.
+    """
+
+    load: dict[str, float]
+    points: tuple[PathPoint, ...]
+    limits: tuple[LimitPoint, ...]
+    branchings: tuple[BranchPoint, ...]
+    end: PathEnd
+    iterations: int
+
+    @property
+    def factor(self) -> np.ndarray:
+        """λ along the path."""
+        return np.array([p.factor for p in self.points])
+
+    @property
+    def unstable(self) -> np.ndarray:
+        """Unstable directions along the path."""
+        return np.array([p.unstable for p in self.points])
+
+    def __getitem__(self, output: str) -> np.ndarray:
+        """Return an output along the path."""
+        known = self.points[0].outputs
+        if output not in known:
+            raise StructureError(f"path: no output {output!r}{did_you_mean(output, known)}")
+        return np.array([p.outputs[output] for p in self.points])
+
+    def plot(self, over: str | None = None) -> Figure:
+        """Draw the load over an output: stable parts drawn through, unstable ones dashed, critical points marked.
+
+        Parameters
+        ----------
+        over : str, optional
+            The output; default: the one that changes most.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        return importlib.import_module("flexctrl.plots.path").path_figure(self, over)
+
+    def __str__(self) -> str:
+        limits = ", ".join(f"{p.factor:.6g}" for p in self.limits) or "none"
+        crossings = ", ".join(f"{p.factor:.6g}" for p in self.branchings) or "none"
+        return (
+            f"{len(self.points)} equilibria, λ = {self.points[0].factor:.6g} … {self.points[-1].factor:.6g} "
+            f"({self.end.value}); limit points at λ = {limits}; branch points at λ = {crossings}"
+        )
+
+
+def equilibrium_path(
+    model: Model,
+    load: Mapping[str, float],
+    until: float | Mapping[str, float],
+    inputs: Mapping[str, float] | None = None,
+    hold: Mapping[str, float] | None = None,
+    start: State | PathPoint | None = None,
+    most: int = 2000,
+) -> EquilibriumPath:
+    """Follow the equilibria of a model under λ times a load, past limit points.
+
+    Pseudo-arclength continuation (Keller 1977; Riks 1979) from λ = 0, with step lengths that go by Newton's
+    contraction and the bending of the path. Points where the load turns back are located to round-off, and so
+    are points where another path crosses; after these the path keeps straight on.
+
+    Parameters
+    ----------
+    model : Model
+    load : mapping of str to float
+        Inputs that grow with λ.
+    until : float or mapping of str to float
+        Where to end: at a value of λ, or where one of the named outputs has the value given with it. The last
+        point has it exactly.
+    inputs : mapping of str to float, optional
+        Constant inputs.
+    hold : mapping of str to float, optional
+        Coordinates held at a displacement from the drawn shape [m or rad].
+    start : State or PathPoint, optional
+        Where to begin: a shape near the first equilibrium; a point of another path; or a `BranchPoint`, from
+        which the path leaves along its mode. Default: the shape as drawn.
+    most : int
+        Points at most.
+
+    Returns
+    -------
+    EquilibriumPath
+        Its ``end`` says whether it got there; what was computed is kept.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is no equilibrium to begin with.
+    StructureError
+        For an unknown name, or a load of nothing.
+    """
+    if not isinstance(model, Model):
+        raise StructureError(f"equilibrium_path: {model!r} is no Model; give what flexctrl.assemble returns")
+    pushed = model.input_vector(load)
+    if not pushed.any():
+        raise StructureError("equilibrium_path: the load is nothing; name an input, e.g. load={'push': 1.0}")
+    goals = _goals(model, until)
+    held = {model.coordinate(name): check_finite(value, name, "hold") for name, value in (hold or {}).items()}
+    count = check_whole(most, "most", "equilibrium_path", least=2)
+    balance = Balance(model, model.input_vector(inputs or {}), held)
+    course, first = _begin(balance, pushed, goals, start, hold, inputs)
+    walked = Walk(course, goals, count, isinstance(start, BranchPoint)).from_(first)
+    return EquilibriumPath(
+        dict(load),
+        tuple(PathPoint(s.factor, _rest(course, s)) for s in walked.stations),
+        tuple(LimitPoint(s.factor, _rest(course, s), _mode(course, s)) for s in walked.limits),
+        tuple(BranchPoint(s.factor, _rest(course, s), _mode(course, s)) for s in walked.crossings),
+        walked.end,
+        walked.iterations,
+    )
+
+
+def _goals(model: Model, until: float | Mapping[str, float]) -> dict[str, float]:
+    """Values at which the path ends; the load factor has no name."""
+    if not isinstance(until, Mapping):
+        return {"": check_finite(until, "until", "equilibrium_path")}
+    for name, value in until.items():
+        if name not in model.outputs:
+            raise StructureError(f"equilibrium_path: no output {name!r}{did_you_mean(name, model.outputs)}")
+        check_finite(value, f"until {name!r}", "equilibrium_path")
+    return {name: float(value) for name, value in until.items()}
+
+
+def _begin(
+    balance: Balance,
+    load: np.ndarray,
+    goals: Mapping[str, float],
+    start: State | PathPoint | None,
+    hold: Mapping[str, float] | None,
+    inputs: Mapping[str, float] | None,
+) -> tuple[Course, Station]:
+    """The course and its first station."""
+    model = balance.model
+    if isinstance(start, PathPoint):
+        state, factor = start.rest.state, start.factor
+    else:
+        state, factor = equilibrium(model, hold, inputs, start).state, 0.0
+    rough = Course(balance, load, 1.0)
+    straight = rough.tangent(state, factor, Direction(np.zeros(len(balance.free)), 1.0))
+    way = float(np.sqrt((straight.place**2) @ rough.weight)) / abs(straight.factor or 1.0)
+    scale = abs(goals[""] - factor) if "" in goals else 1.0 / max(way, 1e-300)
+    course = Course(balance, load, scale or 1.0)
+    rising = np.sign(goals.get("", factor + 1.0) - factor)
+    station = course.station(state, factor, Direction(np.zeros(len(balance.free)), float(rising)), 0)
+    if isinstance(start, BranchPoint):
+        away = across(course, station, start.mode[balance.free])
+        station = Station(state, factor, away, station.unstable, 0)
+    return course, station
+
+
+def _mode(course: Course, station: Station) -> np.ndarray:
+    mode = np.zeros(course.balance.model.n)
+    mode[course.balance.free] = softest(course, station)
+    return mode
+
+
+def _rest(course: Course, station: Station) -> Rest:
+    balance = course.at(station.factor)
+    model = balance.model
+    outputs = dict(zip(model.outputs, model.measure(station.state).tolist(), strict=True))
+    held = tuple(model.coordinates[i] for i in balance.held)
+    loads = float(np.abs(model.signals.loads @ (course.factor_scale * course.load)).sum())
+    residual = balance.relative(balance.force(station.state), max(balance.scale(station.state), loads))
+    return Rest(station.state, residual, outputs, balance.u, station.iterations, held, station.unstable)
