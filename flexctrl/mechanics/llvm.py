@@ -9,6 +9,7 @@ Parameters are stored by blocks of items, lane next to lane: (blocks, n_par, lan
 from __future__ import annotations
 
 import ctypes
+import itertools
 import sys
 import threading
 from collections.abc import Callable
@@ -28,6 +29,7 @@ from flexctrl.mechanics.llvm_ir import LIBRARY, translate
 
 _lock = threading.Lock()
 _codes: dict[str, Code] = {}
+_numbers = itertools.count()
 _known: WeakKeyDictionary[Kernel, dict[tuple[int, int], Code]] = WeakKeyDictionary()
 _RUN = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 _start: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
@@ -100,21 +102,46 @@ def compile_kernel(kernel: Kernel, lanes: int, level: int) -> Code:
 
 def _load(assembly: str, lanes: int, level: int) -> Code:
     """Link the object code of an assembly text, unless the same text has been."""
-    key = "\n".join((_host(), str(level), assembly))
+    key = f"{level} {assembly}"
     if key not in _codes:
-        image = stored(key, lambda: _object_code(assembly, level))
-        builder = binding.JITLibraryBuilder().add_object_img(image).add_current_process()
-        for name, address in _library_addresses().items():
-            builder.import_symbol(name, address)
-        library = builder.export_symbol("run").export_symbol("call").link(_linker(), f"kernel{len(_codes)}")
+        library = link(assembly, level, ("run", "call"))
         _codes[key] = Code(lanes, library["run"], library["call"], library)
     return _codes[key]
 
 
-def _object_code(assembly: str, level: int) -> bytes:
+def link(assembly: str, level: int, exported: tuple[str, ...], passes: bool = False) -> binding.ResourceTracker:
+    """Return a library in memory, compiled from LLVM assembly or taken from the cache.
+
+    Parameters
+    ----------
+    assembly : str
+    level : int
+        LLVM's optimisation of the code it generates, 0 to 3.
+    exported : tuple of str
+        Functions wanted; ``library[name]`` is their address.
+    passes : bool
+        Whether LLVM shall optimise the assembly first (inlining, loops to vectors).
+    """
+    key = "\n".join((_host(), str(level), str(passes), assembly))
+    image = stored(key, lambda: _object_code(assembly, level, passes))
+    builder = binding.JITLibraryBuilder().add_object_img(image).add_current_process()
+    for name, address in _library_addresses().items():
+        builder.import_symbol(name, address)
+    for name in exported:
+        builder.export_symbol(name)
+    return builder.link(_linker(), f"library{next(_numbers)}")
+
+
+def _object_code(assembly: str, level: int, passes: bool) -> bytes:
     module = binding.parse_assembly(assembly)
     module.verify()
-    return _machine(level).emit_object(module)
+    machine = _machine(level)
+    if passes:
+        options = binding.create_pipeline_tuning_options(speed_level=2)
+        options.loop_vectorization = options.slp_vectorization = True
+        builder = binding.create_pass_builder(machine, options)
+        builder.getModulePassManager().run(module, builder)
+    return machine.emit_object(module)
 
 
 @cache

@@ -6,6 +6,12 @@ import struct
 from collections.abc import Callable
 
 
+def double(number: float) -> str:
+    """Return a double as LLVM writes it, exactly."""
+    (pattern,) = struct.unpack(">Q", struct.pack(">d", number))
+    return f"0x{pattern:016X}"
+
+
 class Writer:
     """Straight-line vector code. Operands are strings: names (``%v7``) or constants.
 
@@ -46,8 +52,7 @@ class Writer:
 
     def constant(self, number: float) -> str:
         """Return a double, exactly."""
-        (pattern,) = struct.unpack(">Q", struct.pack(">d", number))
-        return self.splat("double", f"0x{pattern:016X}")
+        return self.splat("double", double(number))
 
     def integers(self, number: int) -> str:
         """Return a 64-bit integer."""

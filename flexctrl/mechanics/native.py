@@ -1,0 +1,127 @@
+"""Loops as machine code: functions in a small part of Python, compiled once and called on a record.
+
+A record is a dataclass of numbers, vectors (float64 or int64 arrays) and compiled runs. `compiled` turns a
+function of one record into machine code; a `Packed` record is what that code reads and writes. The same
+function runs on the plain record without being compiled: slower, for tests. What may be written is told in
+`native_ir`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from flexctrl.errors import KernelError
+from flexctrl.mechanics.kernel import FLOAT, Run
+from flexctrl.mechanics.native_ir import Translation
+from flexctrl.mechanics.native_types import DECLARATIONS, RUNS, SCALARS, record_fields
+
+__all__ = ["Packed", "Reals", "Runs", "Wholes", "assembly", "compiled"]
+
+Reals: TypeAlias = np.ndarray
+"""A vector of floats."""
+Wholes: TypeAlias = np.ndarray
+"""A vector of ints."""
+Runs: TypeAlias = Sequence[Run]
+"""Compiled kernels bound to their tables, called as ``runs[i](z, r)``."""
+
+_WHOLE = np.dtype(np.int64)
+_ENTRY = """\
+define i64 @entry(ptr %record) {{
+  %status = call i64 @{name}(ptr %record)
+  ret i64 %status
+}}
+!0 = !{{}}
+"""
+
+
+class Packed:
+    """A record as machine code sees it: one word a field; numbers are read and written as attributes.
+
+    Parameters
+    ----------
+    record : dataclass
+        Its arrays are shared, not copied: they must be contiguous.
+
+    Raises
+    ------
+    KernelError
+        If an array is not contiguous or of another type.
+    """
+
+    def __init__(self, record: Any) -> None:
+        known = record_fields(type(record))
+        words = np.zeros(len(known), dtype=_WHOLE)
+        own: dict[str, Any] = {"record": record, "words": words, "reals": words.view(FLOAT), "kept": []}
+        own["places"] = {name: (i, kind) for i, (name, kind) in enumerate(known.items()) if kind in SCALARS}
+        self.__dict__.update(own)
+        for i, (name, kind) in enumerate(known.items()):
+            if kind in SCALARS:
+                setattr(self, name, getattr(record, name))
+            else:
+                words[i] = self._address(name, kind, getattr(record, name))
+
+    def _address(self, name: str, kind: Any, value: Any) -> int:
+        if isinstance(kind, type):
+            inner = Packed(value)
+            self.kept.append(inner)
+            return int(inner.words.ctypes.data)
+        if kind == RUNS:
+            value = np.array([word for run in value for word in (run.address, run.arguments)], dtype=_WHOLE)
+        wanted = FLOAT if kind == "Reals" else _WHOLE
+        if not (isinstance(value, np.ndarray) and value.dtype == wanted and value.flags.c_contiguous):
+            raise KernelError(f"record field {name!r} is no contiguous vector of {wanted}")
+        self.kept.append(value)
+        return int(value.ctypes.data)
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self.places:
+            return getattr(self.record, name)
+        i, kind = self.places[name]
+        return float(self.reals[i]) if kind == "float" else int(self.words[i])
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        i, kind = self.places[name]
+        (self.reals if kind == "float" else self.words)[i] = value
+
+    def bound(self, function: Callable[[Any], int]) -> Callable[[], int]:
+        """Return a function of such records, compiled, on this one."""
+        code = compiled(function)
+        address = ctypes.c_void_p(self.words.ctypes.data)
+        return lambda: code(address)
+
+
+def assembly(function: Callable[..., int]) -> str:
+    """Return the LLVM assembly of a function of one record and of all that it calls.
+
+    Raises
+    ------
+    KernelError
+        If a function uses what cannot be compiled; says what and where.
+    """
+    waiting, parts, libraries = [function], {}, set()
+    while waiting:
+        one = waiting.pop()
+        translation = Translation(one)
+        parts[one.__name__] = translation.assembly()
+        libraries |= translation.libraries
+        waiting += [f for name, f in translation.callees.items() if name not in parts]
+    return "\n".join([*parts.values(), *DECLARATIONS, *sorted(libraries), _ENTRY.format(name=function.__name__)])
+
+
+@cache
+def compiled(function: Callable[[Any], int]) -> Callable[[ctypes.c_void_p], int]:
+    """Return the machine code of a function that takes a record and returns an int; called on a record's address."""
+    from flexctrl.mechanics.llvm import link
+
+    library = link(assembly(function), 2, ("entry",), passes=True)
+    code = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library["entry"])
+
+    def call(address: ctypes.c_void_p, keep: object = library) -> int:
+        return code(address)
+
+    return call

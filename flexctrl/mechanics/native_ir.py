@@ -1,0 +1,137 @@
+"""From a function in a small part of Python to LLVM assembly.
+
+The part: ``int`` (64 bits), ``float`` and ``bool`` values; vectors (`Reals`, `Wholes`) read and written by one
+index, and their tails ``a[k:]``; records, which are dataclasses of such; lists of compiled runs (`Runs`);
+``if``, ``while``, ``for … in range``, ``return``; arithmetic, comparisons, ``and``/``or``/``not``, ``x if c else y``;
+``min``, ``max``, ``abs``, ``int``, ``float``, functions of `math`, eight floats at once (`eights`), and other
+functions of the same part. Every variable keeps the type of its first value, ``//`` and ``%`` are for numbers
+≥ 0, and vectors that one function is given must not overlap. What is outside is refused with its line.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable
+from typing import Any
+
+from flexctrl.mechanics.native_expressions import Expressions
+from flexctrl.mechanics.native_types import VECTORS, ZERO, Value, llvm_type, signature
+
+
+class Translation(Expressions):
+    """A function and its statements."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self.loops: list[tuple[str, str]] = []
+        self.parameters, self.result = signature(function)
+
+    def assembly(self) -> str:
+        """Return the definition in LLVM assembly."""
+        source = textwrap.dedent(inspect.getsource(self.function))
+        (tree,) = ast.parse(source).body
+        assert isinstance(tree, ast.FunctionDef)
+        heads = []
+        for name, kind in self.parameters:
+            heads.append(f"{llvm_type(kind)}{' noalias' if kind in VECTORS else ''} %{name}.in")
+            self._set(name, Value(kind, f"%{name}.in"))
+        self._body(tree.body)
+        self._put(f"ret {llvm_type(self.result)} {ZERO[llvm_type(self.result)]}")
+        slots = [f"  {slot.text} = alloca {llvm_type(slot.type)}" for slot in self.slots.values()]
+        top = f"define internal {llvm_type(self.result)} @{self.function.__name__}({', '.join(heads)}) {{"
+        return "\n".join([top, *slots, *self.lines, "}"])
+
+    def _go(self, label: str) -> None:
+        """Jump, and go on in a block that nothing reaches."""
+        self.lines += [f"  br label %{label}", f"{self._new('dead')}:"]
+
+    def _body(self, statements: list[ast.stmt]) -> None:
+        for statement in statements:
+            self.line = statement.lineno
+            action = getattr(self, f"_{type(statement).__name__.lower()}", None)
+            if action is None:
+                raise self._fail(f"{type(statement).__name__} is no statement it knows")
+            action(statement)
+
+    def _expr(self, s: ast.Expr) -> None:
+        if not isinstance(s.value, ast.Constant):
+            self._eval(s.value)
+
+    def _assign(self, s: ast.Assign) -> None:
+        value = self._eval(s.value)
+        for target in s.targets:
+            self._store(target, value)
+
+    def _augassign(self, s: ast.AugAssign) -> None:
+        left = ast.copy_location(ast.BinOp(_loaded(s.target), s.op, s.value), s)
+        self._store(s.target, self._eval(left))
+
+    def _store(self, target: ast.expr, value: Value) -> None:
+        if isinstance(target, ast.Name):
+            self._set(target.id, value)
+            return
+        kind, place, _ = self._place(target)
+        value = self._cast(value, kind)
+        self._put(f"store {llvm_type(kind)} {value.text}, ptr {place}")
+
+    def _return(self, s: ast.Return) -> None:
+        if s.value is None:
+            self._put("ret void")
+        else:
+            value = self._cast(self._eval(s.value), self.result)
+            self._put(f"ret {llvm_type(self.result)} {value.text}")
+        self.lines.append(f"{self._new('dead')}:")
+
+    def _if(self, s: ast.If) -> None:
+        truth, then, other, end = self._truth(s.test), self._new("then"), self._new("else"), self._new("end")
+        self.lines += [f"  br i1 {truth}, label %{then}, label %{other}", f"{then}:"]
+        self._body(s.body)
+        self.lines += [f"  br label %{end}", f"{other}:"]
+        self._body(s.orelse)
+        self._label(end)
+
+    def _while(self, s: ast.While) -> None:
+        head, body, end = self._new("while"), self._new("do"), self._new("done")
+        self._label(head)
+        self.lines += [f"  br i1 {self._truth(s.test)}, label %{body}, label %{end}", f"{body}:"]
+        self._looped(s.body, head, end)
+        self.lines += [f"  br label %{head}", f"{end}:"]
+
+    def _looped(self, body: list[ast.stmt], again: str, end: str) -> None:
+        self.loops.append((again, end))
+        self._body(body)
+        self.loops.pop()
+
+    def _for(self, s: ast.For) -> None:
+        call = s.iter
+        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"):
+            raise self._fail("for goes over range only")
+        assert isinstance(s.target, ast.Name)
+        given = [self._cast(self._eval(a), "int") for a in call.args]
+        first, last = (Value("int", "0"), given[0]) if len(given) == 1 else given[:2]
+        step = given[2].text if len(given) == 3 else "1"
+        head, body, more, end = (self._new(label) for label in ("for", "do", "next", "done"))
+        hidden = f"{s.target.id}.{head}"
+        self._set(hidden, first)
+        self._label(head)
+        now = self._value("int", f"load i64, ptr %{hidden}.slot")
+        going = self._value("bool", f"icmp {'sgt' if step.startswith('-') else 'slt'} i64 {now.text}, {last.text}")
+        self.lines += [f"  br i1 {going.text}, label %{body}, label %{end}", f"{body}:"]
+        self._set(s.target.id, now)
+        self._looped(s.body, more, end)
+        self._label(more)
+        self._set(hidden, self._value("int", f"add nsw i64 {now.text}, {step}"))
+        self.lines += [f"  br label %{head}", f"{end}:"]
+
+    def _break(self, s: ast.Break) -> None:
+        self._go(self.loops[-1][1])
+
+    def _continue(self, s: ast.Continue) -> None:
+        self._go(self.loops[-1][0])
+
+
+def _loaded(target: ast.expr) -> ast.expr:
+    """Return a target as an expression."""
+    return ast.parse(ast.unparse(target), mode="eval").body

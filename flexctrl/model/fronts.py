@@ -1,0 +1,279 @@
+"""Elimination by fronts: a sparse matrix factorised and solved with, in compiled loops.
+
+Unknowns with the same neighbours (a node's) are eliminated together, the ones with the fewest neighbours
+first. Each group has a front: a small dense matrix of the group and the unknowns that it touches. Sweeping
+its pivots leaves A₁₁⁻¹ and A₁₁⁻¹A₁₂ in their rows, −A₂₁A₁₁⁻¹ below, and the Schur complement, which is added
+into the front of the next group that it touches. Without exchange of rows: for matrices ruled by masses and
+stiffnesses; a pivot that vanishes is reported and not worked around.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.mechanics.eights import eight, put
+from flexctrl.mechanics.native import Reals, Wholes
+
+__all__ = ["Fronts", "Plan", "factor", "plan_of", "solve"]
+
+_VANISHING = 1e-13
+_MERGED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """How matrices of a pattern are eliminated.
+
+    Attributes
+    ----------
+    fronts : Fronts
+    order : numpy.ndarray of int, shape (n,)
+        The matrix' own number of each unknown, in the order of elimination.
+    length : int
+        Number of entries of all fronts.
+    widest : int
+        Longest column of a front.
+    """
+
+    fronts: Fronts
+    order: np.ndarray
+    length: int
+    widest: int
+
+    @cached_property
+    def position(self) -> np.ndarray:
+        """When each of the matrix' unknowns is eliminated."""
+        place = np.empty_like(self.order)
+        place[self.order] = np.arange(len(self.order))
+        return place
+
+    def places(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Return where entries of the matrix, by row and column, stand among those of the fronts."""
+        f = self.fronts
+        r, c = self.position[rows], self.position[columns]
+        front = np.repeat(np.arange(f.count), f.pivots)[np.minimum(r, c)]
+        return f.base[front] + self.rows(front, c) * f.lead[front] + self.rows(front, r)
+
+    def rows(self, front: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+        """Return the rows of unknowns, in the order of elimination, in fronts."""
+        f = self.fronts
+        within = unknown - f.first[front]
+        keys = np.repeat(np.arange(f.count), f.size - f.pivots) * f.n + f.others
+        found = np.searchsorted(keys, front * f.n + unknown) - f.rest[front] + f.pivots[front]
+        return np.where(within < f.pivots[front], within, found)
+
+
+@dataclass
+class Fronts:
+    """The fronts of a pattern, as compiled loops read them.
+
+    Attributes
+    ----------
+    n : int
+        Unknowns; they are numbered in the order in which they are eliminated.
+    count : int
+        Fronts.
+    first, pivots, size, lead, base, rest, parent : Wholes, (count,)
+        First pivot, number of pivots and of unknowns, length of a column (a multiple of eight), where the front
+        begins in the entries (column by column) and where its other unknowns in ``others``, and the front that
+        takes its Schur complement (−1: none).
+    others, into : Wholes
+        The other unknowns of all fronts, and their rows in the fronts' parents.
+    diagonal : Wholes, (n,)
+        Where the diagonal stands in the entries.
+    """
+
+    n: int
+    count: int
+    first: Wholes
+    pivots: Wholes
+    size: Wholes
+    lead: Wholes
+    base: Wholes
+    rest: Wholes
+    parent: Wholes
+    others: Wholes
+    into: Wholes
+    diagonal: Wholes
+
+
+def plan_of(rows: np.ndarray, columns: np.ndarray, n: int) -> Plan:
+    """Return the plan for matrices with entries at some rows and columns (repeats allowed)."""
+    pattern = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+    pattern = (pattern + pattern.T + sp.identity(n)).tocsr()
+    groups, touching = _grouped(pattern)
+    return _laid_out(n, _merged(*_eliminated(groups, touching)))
+
+
+def _grouped(pattern: sp.csr_matrix) -> tuple[list[np.ndarray], list[set[int]]]:
+    """Return groups of unknowns with the same neighbours, and the groups that each touches."""
+    n = pattern.shape[0]
+    pattern.data[:] = 1.0
+    marks = pattern @ np.random.default_rng(0).random((n, 2))
+    _, lead, group = np.unique(marks.round(9), axis=0, return_index=True, return_inverse=True)
+    group = group.ravel()
+    members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]) if n else []
+    touching = [set(group[pattern.indices[pattern.indptr[i] : pattern.indptr[i + 1]]].tolist()) for i in lead]
+    return members, [found - {i} for i, found in enumerate(touching)]
+
+
+def _eliminated(groups: list[np.ndarray], touching: list[set[int]]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the groups in the order of elimination, and the unknowns each touches then: fewest first.
+
+    Among equals the one known longest comes first: branches are taken in turns, and the processor has
+    independent work side by side.
+    """
+    weight = [len(g) for g in groups]
+    costs = [sum(weight[k] for k in near) for near in touching]
+    waiting = [(cost, i, i) for i, cost in enumerate(costs)]
+    heapq.heapify(waiting)
+    age, order, fronts = len(groups), [], []
+    while waiting:
+        cost, _, one = heapq.heappop(waiting)
+        if cost != costs[one]:
+            continue
+        costs[one], near = -1, touching[one]
+        order.append(groups[one])
+        fronts.append(near)
+        for k in near:
+            touching[k] |= near
+            touching[k] -= {one, k}
+            costs[k], age = sum(weight[j] for j in touching[k]), age + 1
+            heapq.heappush(waiting, (costs[k], age, k))
+    return order, [np.concatenate([groups[k] for k in sorted(near)]) if near else np.zeros(0, int) for near in fronts]
+
+
+def _merged(order: list[np.ndarray], touched: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return (own unknowns, others) of fronts, small ones joined with the next that they touch."""
+    holder = {int(i): k for k, own in enumerate(order) for i in own}
+    when = {i: k for k, i in enumerate(int(i) for own in order for i in own)}
+    own = [g.tolist() for g in order]
+    gone = np.zeros(len(order), dtype=bool)
+    for c, others in enumerate(touched):
+        if not len(others):
+            continue
+        p = holder[min(others.tolist(), key=when.__getitem__)]
+        if len(own[c]) + len(own[p]) <= _MERGED or len(others) == len(own[p]) + len(touched[p]):
+            own[p] = own[c] + own[p]
+            holder |= dict.fromkeys(own[c], p)
+            gone[c] = True
+    return [(np.array(own[k]), touched[k]) for k in range(len(order)) if not gone[k]]
+
+
+def _laid_out(n: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
+    """Return the tables of fronts."""
+    order = np.concatenate([np.zeros(0, dtype=int), *(own for own, _ in fronts)])
+    position = np.empty(n, dtype=int)
+    position[order] = np.arange(n)
+    others = [np.sort(position[rest]) for _, rest in fronts]
+    pivots = np.array([len(own) for own, _ in fronts], dtype=int)
+    rests = np.array([len(rest) for rest in others], dtype=int)
+    front = np.repeat(np.arange(len(fronts)), pivots)
+    size = pivots + rests
+    lead = -(-size // 8) * 8
+    starts = [np.concatenate([[0], np.cumsum(counts)[:-1]]) for counts in (pivots, lead * size, rests)]
+    parent = np.array([front[rest[0]] if len(rest) else -1 for rest in others], dtype=int)
+    tables = Fronts(
+        n=n,
+        count=len(fronts),
+        first=starts[0],
+        pivots=pivots,
+        size=size,
+        lead=lead,
+        base=starts[1],
+        rest=starts[2],
+        parent=parent,
+        others=np.concatenate([np.zeros(0, dtype=int), *others]),
+        into=np.zeros(int(rests.sum()), dtype=int),
+        diagonal=np.zeros(n, dtype=int),
+    )
+    found = Plan(tables, order, int((lead * size).sum()), int(lead.max(initial=8)))
+    up = np.repeat(parent, rests)
+    tables.into[:] = found.rows(up, tables.others)
+    tables.diagonal[:] = found.places(order, order)
+    return found
+
+
+def factor(f: Fronts, entries: Reals, diagonal: Reals) -> int:
+    """Factorise the matrix in ``entries`` in place; return the unknown whose pivot vanishes, or −1."""
+    for i in range(f.n):
+        diagonal[i] = abs(entries[f.diagonal[i]])
+    for s in range(f.count):
+        size = f.size[s]
+        lead = f.lead[s]
+        pivots = f.pivots[s]
+        a = entries[f.base[s] :]
+        for k in range(pivots):
+            pivot = a[k * lead + k]
+            if not abs(pivot) > _VANISHING * diagonal[f.first[s] + k]:
+                return f.first[s] + k
+            sweep(size, lead, k, 1.0 / pivot, a, a[k * lead :])
+        if f.parent[s] >= 0:
+            parent = f.parent[s]
+            rest = size - pivots
+            extend(
+                rest, lead, a[pivots * lead + pivots :], f.lead[parent], f.into[f.rest[s] :], entries[f.base[parent] :]
+            )
+    return -1
+
+
+def sweep(size: int, lead: int, k: int, inverse: float, a: Reals, column: Reals) -> None:
+    """Exchange unknown k with its equation."""
+    for j in range(size):
+        if j != k:
+            t = a[j * lead + k] * inverse
+            if t != 0.0:
+                other = a[j * lead :]
+                for i in range(0, lead, 8):
+                    put(other[i:], eight(other[i:]) - t * eight(column[i:]))
+                other[k] = t
+    for i in range(0, lead, 8):
+        put(column[i:], -inverse * eight(column[i:]))
+    column[k] = inverse
+
+
+def extend(rest: int, lead: int, a: Reals, wide: int, into: Wholes, parent: Reals) -> None:
+    """Add a Schur complement into the parent's front."""
+    for j in range(rest):
+        column = parent[into[j] * wide :]
+        for i in range(rest):
+            column[into[i]] += a[j * lead + i]
+
+
+def solve(f: Fronts, entries: Reals, b: Reals, work: Reals) -> None:
+    """Solve in place with a factorised matrix."""
+    for s in range(f.count):
+        pivots = f.pivots[s]
+        lead = f.lead[s]
+        a = entries[f.base[s] :]
+        own = b[f.first[s] :]
+        for i in range(0, lead, 8):
+            found = own[0] * eight(a[i:])
+            for k in range(1, pivots):
+                found = found + own[k] * eight(a[k * lead + i :])
+            put(work[i:], found)
+        for k in range(pivots):
+            own[k] = work[k]
+        others = f.others[f.rest[s] :]
+        for i in range(pivots, f.size[s]):
+            b[others[i - pivots]] += work[i]
+    for s in range(f.count - 1, -1, -1):
+        pivots = f.pivots[s]
+        lead = f.lead[s]
+        a = entries[f.base[s] :]
+        others = f.others[f.rest[s] :]
+        own = b[f.first[s] :]
+        for k in range(pivots):
+            work[k] = own[k]
+        for i in range(0, pivots, 8):
+            found = eight(work[i:])
+            for j in range(pivots, f.size[s]):
+                found = found - b[others[j - pivots]] * eight(a[j * lead + i :])
+            put(work[i:], found)
+        for k in range(pivots):
+            own[k] = work[k]

@@ -1,0 +1,224 @@
+"""Loops as machine code give what Python gives; what cannot be compiled is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from flexctrl.errors import KernelError
+from flexctrl.mechanics.eights import Eight, eight, larger, largest, put, total
+from flexctrl.mechanics.kernel import CasadiVM, Compiled, Kernel
+from flexctrl.mechanics.native import Packed, Reals, Runs, Wholes, assembly
+
+pytest.importorskip("llvmlite")
+
+SCALE = 2.5
+_SIZE = 40
+
+
+@dataclass
+class Inner:
+    weight: float
+    table: Wholes
+
+
+@dataclass
+class Record:
+    n: int
+    h: float
+    flag: int
+    x: Reals
+    y: Reals
+    places: Wholes
+    inner: Inner
+    runs: Runs = ()
+
+
+def record(backend=None) -> Record:
+    rng = np.random.default_rng(3)
+    x, y = rng.normal(size=(2, _SIZE))
+    inner = Inner(0.75, rng.integers(0, _SIZE, 10))
+    runs = (spring(backend, 3), spring(backend, 5)) if backend else ()
+    return Record(_SIZE, 0.5, 0, x, y, rng.permutation(_SIZE), inner, runs)
+
+
+def spring(backend, n):
+    z, p = ca.SX.sym("z", 2), ca.SX.sym("p", 1)
+    kernel = Kernel("spring", z, p, ca.vertcat(p * ca.sin(z[1] - z[0]), z[0]))
+    pairs = np.arange(n)[:, None] + np.arange(2)
+    return backend.bind(kernel, pairs, np.arange(n)[:, None] + 1.0, pairs + 7)
+
+
+def sums(m: Record) -> int:
+    found = 0.0
+    for i in range(m.n):
+        if m.x[i] > 0.5 and not (i == 2 or i % 2 == 0):
+            found += m.x[i]
+        elif m.x[i] < 0.1 or i == 3:
+            continue
+        else:
+            found -= math.sqrt(m.x[i]) if i < 30 else SCALE
+        found = min(found, 50)
+    m.h = found * m.inner.weight
+    return int(found) + m.inner.table[2]
+
+
+def turns(m: Record) -> int:
+    steps = 0
+    while True:
+        steps += 1
+        if steps > 5:
+            break
+    for j in range(9, 2, -2):
+        m.y[m.places[j]] -= float(j) / 3 + abs(-m.h) + abs(2 - j) + j // 2
+    for j in range(2, 5):
+        m.x[j] = math.atan2(m.y[j], m.x[j]) + math.copysign(m.h, m.y[j]) + math.pi
+        m.flag += 1 if math.isfinite(m.x[j] / 0.5) else 100
+    return max(steps, 3) - min(1, 2)
+
+
+def shares(m: Record) -> int:
+    add(m.n - 8, factor(m.h, True), m.x, m.y[8:])
+    return 1 if is_small(m.y[8]) else 0
+
+
+def add(n: int, a: float, x: Reals, y: Reals) -> None:
+    if n < 0:
+        return
+    for i in range(n):
+        y[i] += a * x[i]
+
+
+def factor(h: float, twice: bool) -> float:
+    return 2 * h if twice else h
+
+
+def is_small(x: float) -> bool:
+    return x >= -1e-3 and x <= 1e-3
+
+
+def eights(m: Record) -> int:
+    most = 0.0 * eight(m.x)
+    for i in range(0, m.n, 8):
+        here = 2 * eight(m.x[i:]) - eight(m.y[i:]) / SCALE
+        put(m.y[i:], -here)
+        most = larger(most, abs(here))
+    m.h = largest(most) + total(most) * scaled(most)
+    return 0
+
+
+def scaled(a: Eight) -> float:
+    return largest(a * 0.5)
+
+
+def kernels(m: Record) -> int:
+    for k in range(2):
+        m.runs[k](m.x, m.y)
+    return len_of(m.x)
+
+
+def len_of(x: Reals) -> int:
+    return 2
+
+
+@pytest.mark.parametrize("function", [sums, turns, shares, eights])
+def test_compiled_functions_do_what_python_does(function):
+    plain, packed = record(), Packed(record())
+    assert packed.bound(function)() == function(plain)
+    for name in ("x", "y"):
+        assert np.allclose(getattr(packed, name), getattr(plain, name), rtol=1e-14, atol=1e-14)
+    assert packed.h == pytest.approx(plain.h, rel=1e-14)
+    assert packed.flag == plain.flag
+
+
+def test_compiled_functions_run_compiled_kernels():
+    plain, packed = record(CasadiVM()), Packed(record(Compiled()))
+    assert packed.bound(kernels)() == kernels(plain)
+    assert np.allclose(packed.y, plain.y, rtol=1e-14)
+
+
+def test_numbers_of_a_packed_record_are_read_and_written_as_attributes():
+    packed = Packed(record())
+    packed.h, packed.flag = -2.25, -7
+    assert (packed.h, packed.flag, packed.n) == (-2.25, -7, _SIZE)
+    packed.bound(turns)()
+    assert packed.flag == -4
+
+
+def test_nan_is_neither_less_nor_more_but_stays_in_sums():
+    packed = Packed(record())
+    packed.x[5] = math.nan
+    packed.bound(eights)()
+    assert math.isfinite(packed.h)
+    assert math.isnan(packed.y[5])
+
+
+def test_vectors_of_another_type_are_refused():
+    wrong = record()
+    wrong.x = np.zeros(_SIZE, dtype=np.float32)
+    with pytest.raises(KernelError, match="'x' is no contiguous vector of float64"):
+        Packed(wrong)
+    wrong.x = np.zeros(2 * _SIZE)[::2]
+    with pytest.raises(KernelError, match="'x'"):
+        Packed(wrong)
+
+
+@dataclass
+class Small:
+    x: Reals = field(default_factory=lambda: np.zeros(8))
+    n: int = 3
+
+
+def with_a_list(m: Small) -> int:
+    return [m.n][0]
+
+
+def with_try(m: Small) -> int:
+    try:
+        m.n += 1
+    finally:
+        m.n -= 1
+    return 0
+
+
+def with_two_types(m: Small) -> int:
+    a = 1
+    a = 2.5
+    return a
+
+
+def without_field(m: Small) -> int:
+    return m.missing
+
+
+def with_a_stranger(m: Small) -> int:
+    return strange(m.n)
+
+
+def with_a_middle(m: Small) -> int:
+    add(1, 1.0, m.x[:3], m.x)
+    return 0
+
+
+strange = math.factorial
+
+
+@pytest.mark.parametrize(
+    ("function", "what"),
+    [
+        (with_a_list, "no expression it knows"),
+        (with_try, "Try is no statement"),
+        (with_two_types, "type float where int is expected"),
+        (without_field, "has no field missing"),
+        (with_a_stranger, "strange is no function"),
+        (with_a_middle, "only tails"),
+    ],
+)
+def test_what_cannot_be_compiled_is_refused_with_its_line(function, what):
+    with pytest.raises(KernelError, match=what) as error:
+        assembly(function)
+    assert "test_native.py:" in str(error.value)
