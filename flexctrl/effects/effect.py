@@ -73,6 +73,10 @@ class Effect:
         """The effects it is composed of: itself, unless it stands for several."""
         return (self,)
 
+    def everywhere(self) -> Effect:
+        """The effect with all parts it can act on: what kernels are made for."""
+        return self
+
     def check_beside(self, others: Sequence[Effect]) -> None:
         """Raise StructureError if the effect makes no sense together with the others of a model."""
         return

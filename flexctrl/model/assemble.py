@@ -10,10 +10,10 @@ import scipy.sparse as sp
 
 from flexctrl.effects.damping import ModalDamping
 from flexctrl.effects.effect import Effect
-from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch, ShaftElasticity
+from flexctrl.effects.flexibility import Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.mechanics.kernel import Backend, best_backend
 from flexctrl.model.equilibrium import equilibrium
 from flexctrl.model.linearize import linearize
@@ -53,6 +53,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     parts = _flat(effects)
     for effect in parts:
         effect.check_beside(parts)
+        _check_names(structure, effect)
     if any(isinstance(e, GeometricStiffness) for e in parts):
         return _prestressed(structure, parts, backend)
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
@@ -72,6 +73,18 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]
     return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
+
+
+def _check_names(structure: Structure, effect: Effect) -> None:
+    """Refuse an effect on a part that is not there or not of its kind."""
+    if isinstance(effect, Deforming):
+        known = [p.name for p in (*structure.elements, *structure.drives) if effect.acts_on(p)]
+        for name in effect.of:
+            if name not in known:
+                raise StructureError(
+                    f"{type(effect).__name__}: structure {structure.name!r} has no such part {name!r}"
+                    f"{did_you_mean(name, known)}; it acts on {', '.join(known) or 'nothing there'}"
+                )
 
 
 def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backend | None) -> Model:
@@ -114,8 +127,7 @@ def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, .
         kept = rigid(model_or_effects.effects)
         assert isinstance(kept, tuple)
         return assemble(model_or_effects.structure, kept, model_or_effects.backend)
-    flexible = (BeamFlexibility, ShaftElasticity, RopeStretch)
-    return tuple(e for e in _flat(model_or_effects) if not isinstance(e, flexible))
+    return tuple(e for e in _flat(model_or_effects) if not isinstance(e, Deforming))
 
 
 def _flat(effects: Sequence[Effect]) -> tuple[Effect, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.mechanics.matrices import bending
 from flexctrl.model import kinds
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
@@ -57,10 +58,13 @@ class Family:
 
 def families_of(structure: Structure, effects: tuple[Effect, ...], rigid: frozenset[str]) -> tuple[Family, ...]:
     """Return the families of a structure under some effects; a rigid beam is one piece, a rigid rope none."""
-    parts = structure.elements
+    parts, effects = structure.elements, tuple(e.everywhere() for e in effects)
+    beams = [p for p in parts if isinstance(p, Beam)]
+    stiff = tuple(e for e in effects if not isinstance(e, BeamFlexibility))
     lines = [p for p in parts if isinstance(p, Spring) or (isinstance(p, Rope) and p.name not in rigid)]
     made = [
-        _beams(structure, effects, [p for p in parts if isinstance(p, Beam)], rigid),
+        _beams(structure, effects, [b for b in beams if b.name not in rigid], rigid),
+        _beams(structure, stiff, [b for b in beams if b.name in rigid], rigid),
         _lines(kinds.SPRING, structure, effects, [p for p in lines if isinstance(p, Spring)]),
         _lines(kinds.ROPE, structure, effects, [p for p in lines if isinstance(p, Rope)]),
         _bodies(kinds.POINT, structure, effects, [p for p in parts if isinstance(p, PointMass)]),

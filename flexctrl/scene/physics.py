@@ -13,14 +13,14 @@ from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.errors import did_you_mean
-from flexctrl.scene.reading import Kind, Place, checked, number, one_or_several, positive, table, vector
+from flexctrl.scene.reading import Kind, Place, checked, number, one_or_several, positive, several, table, text, vector
 
 EFFECTS: dict[str, Kind] = {
     "gravity": Kind(Gravity, {"g": vector}),
     "flexible": Kind(Flexible),
-    "beam_flexibility": Kind(BeamFlexibility),
-    "shaft_elasticity": Kind(ShaftElasticity),
-    "rope_stretch": Kind(RopeStretch),
+    "beam_flexibility": Kind(BeamFlexibility, {"of": several(text)}),
+    "shaft_elasticity": Kind(ShaftElasticity, {"of": several(text)}),
+    "rope_stretch": Kind(RopeStretch, {"of": several(text)}),
     "large_rotation": Kind(LargeRotation),
     "geometric_stiffness": Kind(GeometricStiffness),
     "rotating_frame": Kind(RotatingFrame, {"rate": vector, "center": vector}),
