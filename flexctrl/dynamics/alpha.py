@@ -14,6 +14,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.model import Model
@@ -274,6 +275,10 @@ class GeneralizedAlpha:
         return 2
 
     @property
+    def damping(self) -> str:
+        return told_damping(self.rho)
+
+    @property
     def pace(self) -> Fixed:
         return Fixed(self.step)
 
@@ -312,6 +317,10 @@ class AdaptiveAlpha:
     @property
     def order(self) -> int:
         return 2
+
+    @property
+    def damping(self) -> str:
+        return told_damping(self.rho)
 
     @property
     def pace(self) -> Controlled:

@@ -1,65 +1,135 @@
-"""The energy books of a run: work in, dissipated, and what is stored, checked now and then."""
+"""The energy books of a run: work in, dissipated, and what is stored."""
 
 from __future__ import annotations
 
-import time
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from flexctrl.dynamics.dense import Curve
+from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.steps import Block, Point
-from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
-__all__ = ["Books"]
+__all__ = ["Books", "Sums"]
+
+_OFTEN = 32
+_LOBATTO = ((0.5 * (1.0 - (3.0 / 7.0) ** 0.5), 49.0 / 180.0), (0.5, 64.0 / 180.0))
+_ENDS = 1.0 / 20.0
+
+
+@dataclass
+class Sums:
+    """What the books hold.
+
+    Attributes
+    ----------
+    start : float
+        Energy at the start [J].
+    work, lost : float
+        Work of the inputs and energy dissipated so far [J].
+    kinetic, stored : float
+        When the balance was drawn last [J].
+    gap, turnover : float
+        Largest |energy − start − work + lost| and largest energy turned over [J].
+    power : float
+        Dissipated now [W].
+    closure : float
+        Largest violation of conditions that close rigid loops.
+    entered : int
+        Steps since the start.
+    moved : numpy.ndarray, shape (n,)
+        How far each degree of freedom has been from its start.
+    """
+
+    start: float = 0.0
+    work: float = 0.0
+    lost: float = 0.0
+    kinetic: float = 0.0
+    stored: float = 0.0
+    gap: float = 0.0
+    turnover: float = 0.0
+    power: float = 0.0
+    closure: float = 0.0
+    entered: int = 0
+    moved: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class Books:
-    """What a run has turned over, and how far each degree of freedom has been from its start."""
+    """What a run has turned over, drawn up every few steps."""
 
-    def __init__(self, model: Model, state: State) -> None:
-        self.model = model
-        kinetic, stored, _ = model.energy(state)
-        self.start = kinetic + stored
-        self.work = self.lost = self.residual = self.closure = 0.0
-        self.turnover = 0.0
-        self.moved = np.zeros(model.n)
+    def __init__(self, feed: Feed, state: State, order: int) -> None:
+        self.feed, self.model, self.order = feed, feed.model, order
         self.first = state.q
-        probe = np.linspace(1.0, 2.0, model.n)
-        self.dissipates = model.energy(state.with_(v=probe))[2] != 0.0
-        self.power = model.energy(state)[2] if self.dissipates else 0.0
-        self.checked = time.perf_counter()
-        self.worst = 0.0
+        probe = np.linspace(1.0, 2.0, self.model.n)
+        self.dissipates = self.model.energy(state.with_(v=probe))[2] != 0.0
+        kinetic, stored, power = self.model.energy(state)
+        self.sums = Sums(kinetic + stored, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n))
 
-    def enter(self, before: Point, after: Point) -> None:
+    def enter(self, before: Point, after: Point, curve: Curve) -> None:
         """Enter a step."""
-        step = after.state.q - before.state.q
-        forces = self.model.loads(before.state, before.supply.u) + self.model.loads(after.state, after.supply.u)
-        self.work += 0.5 * float(forces @ step)
-        self.moved = np.maximum(self.moved, np.abs(after.state.q - self.first))
-        if self.dissipates:
-            power = self.model.energy(after.state)[2]
-            self.lost += 0.5 * (self.power + power) * (after.state.t - before.state.t)
-            self.power = power
-        if time.perf_counter() - self.checked > 0.05:
+        sums = self.sums
+        if before.supply.u.any() or after.supply.u.any() or self.dissipates:
+            if self.order > 2:
+                self._integrate(before, after, curve)
+            else:
+                self._trapezoid(before, after)
+        sums.moved = np.maximum(sums.moved, np.abs(after.state.q - self.first))
+        sums.entered += 1
+        if sums.entered < _OFTEN or sums.entered % _OFTEN == 0:
             self.close(after)
 
     def enter_block(self, before: Point, block: Block) -> None:
         """Enter many steps."""
-        self.work += block.work
-        self.lost += block.lost
-        self.moved = np.maximum(self.moved, np.abs(before.state.q - self.first) + block.reach)
+        sums = self.sums
+        sums.work += block.work
+        sums.lost += block.lost
+        sums.moved = np.maximum(sums.moved, np.abs(before.state.q - self.first) + block.reach)
         if self.dissipates:
-            self.power = self.model.energy(block.last.state)[2]
-        if time.perf_counter() - self.checked > 0.05:
+            sums.power = self.model.energy(block.last.state)[2]
+        due = sums.entered // _OFTEN < (sums.entered + len(block.times)) // _OFTEN
+        sums.entered += len(block.times)
+        if due or sums.entered < _OFTEN:
             self.close(block.last)
+
+    def _trapezoid(self, before: Point, after: Point) -> None:
+        loads = self.model.loads
+        step = after.state.q - before.state.q
+        forces = loads(before.state, before.supply.u) + loads(after.state, after.supply.u)
+        self.sums.work += 0.5 * float(forces @ step)
+        if self.dissipates:
+            power = self.model.energy(after.state)[2]
+            self.sums.lost += 0.5 * (self.sums.power + power) * (after.state.t - before.state.t)
+            self.sums.power = power
+
+    def _integrate(self, before: Point, after: Point, curve: Curve) -> None:
+        """Integrate the powers over a step by Lobatto's rule with five points."""
+        t, h = before.state.t, after.state.t - before.state.t
+        first, last = self._powers(before.state, before.supply.u), self._powers(after.state, after.supply.u)
+        total = _ENDS * (first + last)
+        for share, weight in (*_LOBATTO, (1.0 - _LOBATTO[0][0], _LOBATTO[0][1])):
+            state = curve.at(t + share * h)
+            total = total + weight * self._powers(
+                state, self.feed.between(before.supply, after.supply, (share, h), state).u
+            )
+        self.sums.work += h * float(total[0])
+        self.sums.lost += h * float(total[1])
+        self.sums.power = float(last[1])
+
+    def _powers(self, state: State, u: np.ndarray) -> np.ndarray:
+        lost = self.model.energy(state)[2] if self.dissipates else 0.0
+        return np.array([self.model.loads(state, u) @ state.v, lost])
 
     def close(self, point: Point) -> None:
         """Draw the balance."""
-        kinetic, stored, _ = self.model.energy(point.state)
-        gap = kinetic + stored - self.start - self.work + self.lost
-        turnover = max(kinetic, abs(self.work), self.lost, abs(stored + kinetic - self.start))
-        self.turnover = max(self.turnover, turnover)
-        self.worst = max(self.worst, abs(gap))
-        self.residual = self.worst / self.turnover if self.turnover > 0.0 else 0.0
-        self.closure = max(self.closure, self.model.motion.closure_error(point.state))
-        self.checked = time.perf_counter()
+        s = self.sums
+        s.kinetic, s.stored, _ = self.model.energy(point.state)
+        gap = s.kinetic + s.stored - s.start - s.work + s.lost
+        s.turnover = max(s.turnover, s.kinetic, abs(s.work), s.lost, abs(s.stored + s.kinetic - s.start))
+        s.gap = max(s.gap, abs(gap))
+        s.closure = max(s.closure, self.model.motion.closure_error(point.state))
+
+    @property
+    def residual(self) -> float:
+        """The largest gap over the largest energy turned over."""
+        return self.sums.gap / self.sums.turnover if self.sums.turnover > 0.0 else 0.0

@@ -75,7 +75,7 @@ class Feed:
         if self.controller is None:
             return Supply(self.base, np.zeros(0), np.zeros(0))
         x = np.asarray(self.controller.initial(), dtype=float)
-        return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self._command(state, x)
+        return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self.evaluate(state, x)
 
     def sample(self, state: State, supply: Supply) -> Supply:
         """Return the inputs from a sample instant on."""
@@ -87,13 +87,24 @@ class Feed:
 
     def restart(self, state: State, supply: Supply) -> Supply:
         """Return the inputs after a break of a continuous command."""
-        return self._command(state, supply.x) if self.continuous else supply
+        return self.evaluate(state, supply.x) if self.continuous else supply
 
-    def _command(self, state: State, x: np.ndarray) -> Supply:
+    def evaluate(self, state: State, x: np.ndarray) -> Supply:
+        """Return the inputs that a continuous controller in state x gives."""
         assert self.controller is not None
         y = self.measured(state)
         rate = np.asarray(self.controller.rate(state.t, x, y), dtype=float) if x.size else x
         return Supply(self._total(self.controller.command(state.t, x, y)), x, rate)
+
+    def between(self, before: Supply, after: Supply, share: tuple[float, float], state: State) -> Supply:
+        """Return the inputs within a step: ``share`` of it done, and its length; the state there."""
+        if not self.continuous:
+            return before
+        s, h = share
+        first, last = h * before.rate, h * after.rate
+        step = after.x - before.x
+        x = before.x + s * (first + s * (3.0 * step - 2.0 * first - last + s * (first + last - 2.0 * step)))
+        return self.evaluate(state, x)
 
     def _total(self, command: Any) -> np.ndarray:
         u = self.base.copy()
@@ -124,7 +135,7 @@ class Feed:
         T = self.model.motion.jacobian(state)[: self.model.motion.raw]
         C = (seeds[0] * on_place + seeds[1] * on_rates)[self._reads] @ T
         gain = sp.csr_matrix(self._gain(state, supply, h))
-        return (T.T @ self.model.signals.loads @ gain @ C).tocsr()
+        return (T.T @ self.model.signals.loads_at(state) @ gain @ C).tocsr()
 
     def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:
         """∂u/∂y over a step, by central differences of the controller itself."""

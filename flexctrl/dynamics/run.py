@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.motion import State
 
+if TYPE_CHECKING:
+    from flexctrl.dynamics.checkpoint import Checkpoint
+    from flexctrl.dynamics.dense import Track
+    from flexctrl.dynamics.events import Occurrence
+
 
 class Status(Enum):
-    """How a run ended."""
+    """How a run ended; ``STOPPED`` is by an event that ends it."""
 
     FINISHED = "finished"
+    STOPPED = "stopped"
     FAILED = "failed"
     INTERRUPTED = "interrupted"
 
@@ -49,15 +57,49 @@ class Tolerance:
 
 
 @dataclass(frozen=True)
-class Report:
-    """Numerical health of a run.
+class EnergyBalance:
+    """Where the energy of a run went [J]: kinetic + stored = start + work − dissipated, but for the residual.
 
     Attributes
     ----------
+    start : float
+        Kinetic and stored at the start.
+    work : float
+        Done by the inputs.
+    dissipated : float
+    kinetic, stored : float
+        At the end.
+    """
+
+    start: float
+    work: float
+    dissipated: float
+    kinetic: float
+    stored: float
+
+    @property
+    def gap(self) -> float:
+        """What the integrator made (positive) or lost over the whole run [J]."""
+        return self.kinetic + self.stored - self.start - self.work + self.dissipated
+
+
+@dataclass(frozen=True)
+class Report:
+    """Numerical health of a run; ``print(run.report)`` shows it.
+
+    Attributes
+    ----------
+    method : str
+        The method of integration, with its parameters.
+    order : int
+        Of the method.
+    damping : str
+        What the method itself damps.
     steps, rejected_steps, newton_iterations, factorisations : int
     wall_s : float
         Time it took [s].
     dofs : int
+    energy : EnergyBalance
     energy_residual : float
         Worst |energy − start − work in + dissipated| over the largest energy turned over: what the
         integrator lost or made.
@@ -68,20 +110,62 @@ class Report:
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str
-        What was held or released so that rigid loops close.
+        What was held or released so that rigid loops close, and what was changed in the start.
     """
 
+    method: str
+    order: int
+    damping: str
     steps: int
     rejected_steps: int
     newton_iterations: int
     factorisations: int
     wall_s: float
     dofs: int
+    energy: EnergyBalance
     energy_residual: float
     worst: str
     closure_error: float
     message: str
     notes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        e = self.energy
+        lines = [
+            f"{self.method}, order {self.order}, {self.damping}",
+            f"{self.steps} steps, {self.rejected_steps} rejected, {self.newton_iterations} Newton iterations, "
+            f"{self.factorisations} factorisations, {self.dofs} degrees of freedom, {self.wall_s:.3g} s",
+            f"energy [J]: start {e.start:.6g}, work {e.work:+.6g}, dissipated {-e.dissipated:+.6g}; at the end "
+            f"{e.kinetic:.6g} kinetic, {e.stored:.6g} stored; gap {e.gap:.3g}; worst {self.energy_residual:.2g} of the "
+            "turnover",
+            f"converged last: {self.worst or 'none'}",
+            *([f"loops of rigid parts closed to {self.closure_error:.2g}"] if self.closure_error else []),
+            *([self.message] if self.message else []),
+            *self.notes,
+        ]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A run at one instant: ``moment["load_z"]`` gives a signal by name.
+
+    Attributes
+    ----------
+    t : float
+    state : State
+    signals : mapping of str to float
+        Outputs and inputs.
+    """
+
+    t: float
+    state: State
+    signals: Mapping[str, float]
+
+    def __getitem__(self, signal: str) -> float:
+        if signal not in self.signals:
+            raise StructureError(f"the run has no signal {signal!r}{did_you_mean(signal, self.signals)}")
+        return self.signals[signal]
 
 
 @dataclass(frozen=True)
@@ -103,6 +187,12 @@ class Run:
     status : Status
     report : Report
     name : str
+    events : tuple of Occurrence
+        What happened, in order: the events asked for, and switches of the machine's own laws of force.
+    checkpoint : Checkpoint
+        Where to go on from: the last instant at which nothing was yet cut to fit the end of the run.
+    track : Track
+        The steps, as far as they are kept; see `at`.
     """
 
     t: np.ndarray
@@ -114,7 +204,10 @@ class Run:
     frames: tuple[State, ...]
     status: Status
     report: Report
-    name: str = "run"
+    name: str
+    events: tuple[Occurrence, ...] = field(repr=False)
+    checkpoint: Checkpoint = field(repr=False)
+    track: Track = field(repr=False)
 
     def __getitem__(self, signal: str) -> np.ndarray:
         if signal in self.outputs:
@@ -123,6 +216,37 @@ class Run:
             return self.u[:, self.inputs.index(signal)]
         known = (*self.outputs, *self.inputs)
         raise StructureError(f"the run has no signal {signal!r}{did_you_mean(signal, known)}")
+
+    def at(self, t: float) -> Moment:
+        """Return the run at any time of it, interpolated between steps to the order of the method.
+
+        Parameters
+        ----------
+        t : float
+            [s]
+
+        Returns
+        -------
+        Moment
+
+        Raises
+        ------
+        StructureError
+            For a time outside the run, or if its steps took too much room to be kept.
+        """
+        track = self.track
+        if not track.stretches:
+            raise StructureError(
+                "run.at: the steps of this run were not kept, they need more room; give record=InMemory(states=bytes), "
+                "or every=… for rows at the instants wanted"
+            )
+        first, last = track.starts[0], track.stretches[-1].after.state.t
+        slack = 1e-12 * max(1.0, abs(last))
+        if not first - slack <= t <= last + slack:
+            raise StructureError(f"run.at({t}): expected a time from {first:.6g} to {last:.6g} s")
+        state, u = track.state(min(max(t, first), last))
+        values = (*track.feed.model.measure(state).tolist(), *u.tolist())
+        return Moment(state.t, state, dict(zip((*self.outputs, *self.inputs), values, strict=True)))
 
     def plot(self, signals: tuple[str, ...] | None = None) -> np.ndarray:
         """Draw curves over time, one axes a signal.
@@ -151,4 +275,4 @@ class Run:
         np.savetxt(path, np.column_stack([self.t, self.y, self.u]), delimiter=",", header=header, comments="")
 
 
-__all__ = ["Report", "Run", "Status", "Tolerance"]
+__all__ = ["EnergyBalance", "Moment", "Report", "Run", "Status", "Tolerance"]

@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha
 from flexctrl.dynamics.books import Books
-from flexctrl.dynamics.feed import Feed, feed_of
-from flexctrl.dynamics.run import Report, Run, Status, Tolerance
-from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Point, StepError
+from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
+from flexctrl.dynamics.dense import Curve, Dense, Hermite, Track
+from flexctrl.dynamics.events import Event, Watch
+from flexctrl.dynamics.feed import feed_of
+from flexctrl.dynamics.journey import Journey, Plan
+from flexctrl.dynamics.local import Local
+from flexctrl.dynamics.record import InMemory, Record
+from flexctrl.dynamics.rows import Rows
+from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
+from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Point, Stepper
+from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-
-_FRAMES = 120
-_SMALLEST = 1e-12
-_BLOCK = 1000
 
 
 def simulate(
@@ -30,11 +34,14 @@ def simulate(
     controller: Any = None,
     *,
     until: float,
-    start: State | Rest | None = None,
+    start: State | Rest | Checkpoint | None = None,
     inputs: Mapping[str, float] | None = None,
     method: Integrator | None = None,
     tolerance: Tolerance | None = None,
     every: float | None = None,
+    events: Sequence[Event] = (),
+    record: Record | None = None,
+    autosave: Autosave | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Run a model through time.
@@ -46,16 +53,24 @@ def simulate(
         Connected by signal names; sampled ones are held between their instants.
     until : float
         End [s].
-    start : State or Rest, optional
-        Where to begin; default: the shape as drawn, at rest. A `Rest` brings its constant inputs along.
+    start : State, Rest or Checkpoint, optional
+        Where to begin; default: the shape as drawn, at rest. A `Rest` brings its constant inputs along. From a
+        `Checkpoint` the run goes on as if it had not been stopped, bit for bit; model, controller, method,
+        tolerance, events and ``every`` must be those of the run it was taken from.
     inputs : mapping of str to float, optional
         Constant inputs, applied as a step at the start; a controller's commands add to them.
-    method : GeneralizedAlpha or AdaptiveAlpha, optional
-        Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``.
+    method : Integrator, optional
+        `GeneralizedAlpha`, `AdaptiveAlpha`, …. Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``.
     tolerance : Tolerance, optional
         For error-controlled methods.
     every : float, optional
-        Spacing of the output [s]; default: every step.
+        Spacing of the output [s], interpolated between steps; default: every step.
+    events : sequence of Event, optional
+        What to look for; what was found is in ``run.events``.
+    record : InMemory or CsvStream, optional
+        Where the curves go; default: into memory.
+    autosave : Autosave, optional
+        Checkpoints written while the run goes on.
     progress : callable, optional
         Called now and then with the fraction done.
 
@@ -68,7 +83,7 @@ def simulate(
     Raises
     ------
     StructureError
-        For an end that is not positive or an unknown input.
+        For an end that is not positive, an unknown input, or a checkpoint of another run.
     ControllerError
         If the controller's names are not the model's.
     MechanismError
@@ -78,221 +93,161 @@ def simulate(
         raise StructureError(f"simulate: until = {until}; expected seconds > 0")
     if every is not None and not every > 0.0:
         raise StructureError(f"simulate: every = {every}; expected seconds > 0")
-    state = start.state if isinstance(start, Rest) else start or model.rest
-    base = start.inputs if isinstance(start, Rest) and inputs is None else model.input_vector(inputs or {})
-    feed = feed_of(model, controller, base)
-    journey = _Journey(model, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, every, progress)
-    return journey.travel(state.with_(t=0.0))
+    record = record or InMemory()
+    feed = feed_of(model, controller, _base(model, start, inputs))
+    spacing = every if record.every is None else record.every
+    tell = progress or _untold
+    plan = Plan(
+        model, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, tell, autosave, time.perf_counter()
+    )
+    stepper = plan.method.stepper(model, feed, plan.tolerance)
+    curve = _curves(model, stepper)
+    recorder = record.start((*model.outputs, *model.inputs))
+    try:
+        rows = Rows(feed, spacing, until, recorder, curve)
+        track = Track(feed, record.states, curve)
+        return _run(plan, stepper, start, tuple(events), rows, track)
+    finally:
+        recorder.close()
 
 
-@dataclass
-class _Journey:
-    """One run under way."""
+def _untold(share: float) -> None:
+    """Progress nobody asked for."""
+    return
 
-    model: Model
-    feed: Feed
-    method: Integrator
-    tolerance: Tolerance
-    until: float
-    every: float | None
-    progress: Callable[[float], None] | None
-    t: list[float] = field(default_factory=list)
-    y: list[np.ndarray] = field(default_factory=list)
-    u: list[np.ndarray] = field(default_factory=list)
-    frames: list[State] = field(default_factory=list)
-    steps: int = 0
-    rejected: int = 0
-    message: str = ""
-    status: Status = Status.FINISHED
 
-    def travel(self, state: State) -> Run:
-        began = time.perf_counter()
-        pace = self.method.pace
-        self.stepper = self.method.stepper(self.model, self.feed, self.tolerance)
-        self.books = Books(self.model, state)
-        self.size = pace.step if isinstance(pace, Fixed) else min(pace.first, pace.largest)
-        self.point = self._start(state)
-        self._record()
-        try:
-            self._through_breaks()
-        except KeyboardInterrupt:
-            self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
-        except StepError as error:
-            self.stepper.counts.worst = error.worst
-            worst = self.model.coordinates[error.worst]
-            self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
-        if self.t[-1] < self.point.state.t:
-            self._record()
-        self.books.close(self.point)
-        return self._run(time.perf_counter() - began)
+def _base(model: Model, start: State | Rest | Checkpoint | None, inputs: Mapping[str, float] | None) -> np.ndarray:
+    if inputs is not None:
+        return model.input_vector(inputs)
+    if isinstance(start, Checkpoint):
+        return start.base
+    return start.inputs if isinstance(start, Rest) else model.input_vector({})
 
-    def _start(self, state: State) -> Point:
-        try:
-            return self.stepper.start(state, self.feed.first(state), self.size)
-        except SingularMatrixError as error:
-            name = self.model.coordinates[error.where]
-            raise MechanismError(
-                f"simulate: {name} has neither mass nor stiffness; hold it with a Support, or give the part "
-                "rotary inertia (rhoJ, rhoI) or mass"
-            ) from None
 
-    def _instants(self) -> list[tuple[float, bool, bool]]:
-        """All instants at which a step must end: (time, is a sample or break, is an output)."""
-        marks: dict[int, list[bool]] = {}
-        tick = self.until * 1e-12
+def _run(
+    plan: Plan,
+    stepper: Stepper[Any],
+    start: State | Rest | Checkpoint | None,
+    events: tuple[Event, ...],
+    rows: Rows,
+    track: Track,
+) -> Run:
+    setting_out = _resumed if isinstance(start, Checkpoint) else _begun
+    journey = setting_out(plan, stepper, start, events, rows, track)  # type: ignore[arg-type]
+    journey.travel()
+    return _result(journey)
 
-        def mark(t: float, which: int) -> None:
-            marks.setdefault(round(t / tick), [False, False])[which] = True
 
-        sample = self.feed.sample_time
-        for k in range(1, int(self.until / sample + 1e-9) + 1) if sample else ():
-            mark(k * sample, 0)
-        for t in self.feed.breaks:
-            if 0.0 < t < self.until:
-                mark(t, 0)
-        every = self.every or self.until
-        for k in range(1, int(self.until / every + 1e-9) + 1):
-            mark(k * every, 1)
-        mark(self.until, 1)
-        return [(min(key * tick, self.until), *flags) for key, flags in sorted(marks.items())]  # type: ignore[misc]
+def _curves(model: Model, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:
+    """How motions within steps are found."""
+    if isinstance(stepper, Dense):
+        return stepper.curve
+    local = Local(model)
+    return lambda before, after: Hermite(local, before.state, after.state)
 
-    def _through_breaks(self) -> None:
-        told = time.perf_counter()
-        for t, breaks, output in self._instants():
-            self._advance_to(t)
-            if breaks and t < self.until * (1 - 1e-12):
-                self._renew()
-            if output and self.every is not None:
-                self._record()
-            if self.progress and time.perf_counter() - told > 0.1:
-                told = time.perf_counter()
-                self.progress(t / self.until)
 
-    def _renew(self) -> None:
-        """New inputs at a sample instant or break; accelerations jump with them."""
-        before = self.point.supply
-        state = self.point.state
-        fresh = self.feed.restart(state, before) if self.feed.continuous else self.feed.sample(state, before)
-        if np.array_equal(fresh.u, before.u):
-            self.point = replace(self.point, supply=fresh)
-        else:
-            self.point = self.stepper.renew(self.point, fresh, self.size)
+def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:
+    return Watch(plan.feed, events, lambda state: np.zeros(0), ())
 
-    def _advance_to(self, t: float) -> None:
-        pace = self.method.pace
-        while (left := t - self.point.state.t) > 1e-12 * self.until:
-            if isinstance(pace, Fixed):
-                count = max(1, math.ceil(left / pace.step - 1e-6))
-                self._take_many(left / count, count)
-            else:
-                self._try(left, pace)
 
-    def _take_many(self, h: float, count: int) -> None:
-        """Steps of fixed length: a block of them at once where the stepper can."""
-        if not isinstance(self.stepper, Marching) or self.feed.continuous:
-            return self._one(h)
-        before = self.point
-        block = self.stepper.march(before, h, min(count, _BLOCK))
-        self.books.enter_block(before, block)
-        self.point = block.last
-        self.steps += len(block.states)
-        if self.every is None:
-            for state in block.states:
-                self._record_state(state)
-        if len(block.states) < min(count, _BLOCK):
-            self._one(h)
+def _begun(
+    plan: Plan,
+    stepper: Stepper[Any],
+    start: State | Rest | None,
+    events: tuple[Event, ...],
+    rows: Rows,
+    track: Track,
+) -> Journey:
+    """A run from a state."""
+    model, pace = plan.model, plan.method.pace
+    state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
+    size = pace.step if isinstance(pace, Fixed) else min(pace.first, pace.largest)
+    try:
+        point = stepper.start(state, plan.feed.first(state), size)
+    except SingularMatrixError as error:
+        name = model.coordinates[error.where]
+        raise MechanismError(
+            f"simulate: {name} has neither mass nor stiffness; hold it with a Support, or give the part "
+            "rotary inertia (rhoJ, rhoI) or mass"
+        ) from None
+    stops, watch = Stops(plan.feed.sample_time, plan.feed.breaks), _watch(plan, events)
+    stops.skip(0.0)
+    watch.begin(point)
+    books = Books(plan.feed, state, plan.method.order)
+    journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
+    rows.here(point, 0.0)
+    return journey
 
-    def _one(self, h: float) -> None:
-        self._take(h)
-        if self.every is None:
-            self._record()
 
-    def _take(self, h: float) -> None:
-        """A step of fixed length; where it does not converge, in halves."""
-        try:
-            after = self.stepper.step(self.point, h)
-        except StepError:
-            self.rejected += 1
-            if h < 2e-3 * self.size or h < _SMALLEST:
-                raise
-            self._take(0.5 * h)
-            self._take(0.5 * h)
-            return
-        self._accept(after)
+def _resumed(
+    plan: Plan, stepper: Stepper[Any], start: Checkpoint, events: tuple[Event, ...], rows: Rows, track: Track
+) -> Journey:
+    """A run that goes on."""
+    for what, now, before in (
+        ("model", machine_of(plan.model), start.machine),
+        ("method", repr(plan.method), start.method),
+        ("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x)),
+        ("events", len(events), len(start.sides)),
+    ):
+        if now != before:
+            raise StructureError(
+                f"simulate: the checkpoint is of another {what} ({before} there, {now} here); give what the run had"
+            )
+    stepper.recall(start.memory)
+    stepper.counts = replace(start.counts)
+    watch = _watch(plan, events)
+    watch.sides, watch.sizes = start.sides.copy(), start.sizes.copy()
+    books = Books(plan.feed, start.point.state, plan.method.order)
+    books.sums, books.first = replace(start.sums), start.first
+    stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed)
+    rows.count = start.rows
+    return Journey(plan, stepper, start.point, stops, books, watch, rows, track, replace(start.mark))
 
-    def _try(self, left: float, pace: Controlled) -> None:
-        """A step whose error is controlled."""
-        h = min(self.size, pace.largest)
-        h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
-        while True:
-            if h < _SMALLEST * max(1.0, self.until):
-                raise StepError(
-                    self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {self.point.state.t:.6g} s"
-                )
-            try:
-                after = self.stepper.step(self.point, h)
-            except StepError:
-                self.rejected += 1
-                self.size = h = 0.25 * h
-                continue
-            error = self.stepper.error(self.point, after, self.books.moved, self.tolerance)
-            factor = 0.9 * max(error, 1e-6) ** (-1.0 / pace.steepness)
-            if error > 1.0:
-                self.rejected += 1
-                self.size = h = h * max(0.2, factor)
-                continue
-            self._accept(after)
-            if self.every is None:
-                self._record()
-            if factor > 1.3 and h > 0.5 * self.size:
-                self.size = h * min(2.5, factor)
-            elif factor < 1.0:
-                self.size = h * factor
-            return
 
-    def _accept(self, after: Point) -> None:
-        self.books.enter(self.point, after)
-        self.point = after
-        self.steps += 1
+def _result(journey: Journey) -> Run:
+    plan, state, supply = journey.plan, journey.point.state, journey.point.supply
+    checkpoint = journey.saved or journey.snapshot()
+    if abs(state.t - plan.until) <= 1e-9 * plan.until:
+        state = state.with_(t=plan.until)
+    rows = journey.rows.finish(state, supply.u)
+    width = len(plan.model.outputs)
+    return Run(
+        rows[:, 0],
+        plan.model.outputs,
+        plan.model.inputs,
+        rows[:, 1 : 1 + width],
+        rows[:, 1 + width :],
+        state,
+        tuple(journey.rows.frames),
+        journey.status,
+        _report(journey),
+        plan.model.structure.name,
+        tuple(journey.events),
+        checkpoint,
+        journey.track,
+    )
 
-    def _record(self) -> None:
-        self._record_state(self.point.state)
 
-    def _record_state(self, state: State) -> None:
-        self.t.append(state.t)
-        self.y.append(self.model.measure(state))
-        self.u.append(self.point.supply.u)
-        if len(self.t) == 1 or state.t >= self.frames[-1].t + self.until / _FRAMES * (1 - 1e-9):
-            self.frames.append(state)
-
-    def _run(self, wall: float) -> Run:
-        counts = self.stepper.counts
-        report = Report(
-            steps=self.steps,
-            rejected_steps=self.rejected,
-            newton_iterations=counts.newton,
-            factorisations=counts.factorisations,
-            wall_s=wall,
-            dofs=self.model.n,
-            energy_residual=self.books.residual,
-            worst=self.model.coordinates[counts.worst] if self.model.n else "",
-            closure_error=self.books.closure,
-            message=self.message,
-            notes=self.model.notes,
-        )
-        m = self.model
-        return Run(
-            np.array(self.t),
-            m.outputs,
-            m.inputs,
-            np.array(self.y).reshape(len(self.t), -1),
-            np.array(self.u).reshape(len(self.t), -1),
-            self.point.state,
-            tuple(self.frames),
-            self.status,
-            report,
-            m.structure.name,
-        )
+def _report(journey: Journey) -> Report:
+    plan, mark, counts, sums = journey.plan, journey.mark, journey.stepper.counts, journey.books.sums
+    model = plan.model
+    return Report(
+        method=repr(plan.method),
+        order=plan.method.order,
+        damping=plan.method.damping,
+        steps=mark.steps,
+        rejected_steps=mark.rejected,
+        newton_iterations=counts.newton,
+        factorisations=counts.factorisations,
+        wall_s=time.perf_counter() - plan.began,
+        dofs=model.n,
+        energy=EnergyBalance(sums.start, sums.work, sums.lost, sums.kinetic, sums.stored),
+        energy_residual=journey.books.residual,
+        worst=model.coordinates[counts.worst] if model.n else "",
+        closure_error=sums.closure,
+        message=journey.message,
+        notes=model.notes,
+    )
 
 
 __all__ = ["simulate"]

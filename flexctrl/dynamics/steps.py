@@ -18,7 +18,19 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
-__all__ = ["Block", "Controlled", "Counts", "Fixed", "Integrator", "Marching", "Pace", "Point", "StepError", "Stepper"]
+__all__ = [
+    "Block",
+    "Controlled",
+    "Counts",
+    "Fixed",
+    "Integrator",
+    "Marching",
+    "Mark",
+    "Pace",
+    "Point",
+    "StepError",
+    "Stepper",
+]
 
 
 @dataclass(frozen=True)
@@ -37,6 +49,29 @@ class Counts:
     newton: int = 0
     factorisations: int = 0
     worst: int = 0
+
+
+@dataclass
+class Mark:
+    """Where a run stands among its steps.
+
+    Attributes
+    ----------
+    size : float
+        Next step [s].
+    left : int
+        Steps of that size left to the next stop; 0: none planned; −1: no stop ahead.
+    steps, rejected : int
+        So far.
+    stuck : int
+        Switches in a row that came at once.
+    """
+
+    size: float
+    left: int = 0
+    steps: int = 0
+    rejected: int = 0
+    stuck: int = 0
 
 
 class StepError(ArithmeticError):
@@ -125,8 +160,10 @@ class Block:
 
     Attributes
     ----------
+    times : numpy.ndarray, shape (steps,)
+        The end of each step [s]; fewer than asked for where a step did not converge.
     states : sequence of State
-        After each step; fewer than asked for where a step did not converge.
+        After each step; they may be made when they are asked for.
     last : Point
         After the last of them; the start if there are none.
     work, lost : float
@@ -135,6 +172,7 @@ class Block:
         Largest |q − q of the block's start| of each degree of freedom.
     """
 
+    times: np.ndarray
     states: Sequence[State]
     last: Point
     work: float
@@ -158,11 +196,16 @@ class Integrator(Protocol):
     ----------
     order : int
         Of the global error of places and rates.
+    damping : str
+        What the method itself damps, in words for the report.
     pace : Fixed or Controlled
     """
 
     @property
     def order(self) -> int: ...
+
+    @property
+    def damping(self) -> str: ...
 
     @property
     def pace(self) -> Pace: ...

@@ -1,0 +1,191 @@
+"""Where a run stands, as a value: to be kept in a file and gone on from, bit for bit."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.steps import Counts, Mark, Point
+from flexctrl.errors import StructureError
+from flexctrl.model.model import Model
+
+__all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
+
+_FORMAT = 1
+_HOUSE = "flexctrl."
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """All that the rest of a run depends on beside model, controller and method: from ``run.checkpoint``.
+
+    ``simulate(model, controller, until=…, start=checkpoint)`` goes on as if the run had not been stopped.
+
+    Attributes
+    ----------
+    machine : str
+        Digest of the model it belongs to.
+    method : str
+        The method, as text.
+    base : numpy.ndarray, shape (inputs,)
+        Constant inputs under the controller's.
+    point : Point
+        State of the machine, its accelerations, state of the controller.
+    memory : object
+        What the stepper goes on from.
+    passed : int
+        Sample instants or breaks that are over.
+    mark : Mark
+        Step length, and what is left to the next stop.
+    rows : int
+        Rows written.
+    sums : Sums
+        The energy books.
+    first : numpy.ndarray, shape (n,)
+        Where the run began.
+    sides, sizes : numpy.ndarray
+        Of the gauges of events.
+    counts : Counts
+    """
+
+    machine: str
+    method: str
+    base: np.ndarray
+    point: Point
+    memory: Any
+    passed: int
+    mark: Mark
+    rows: int
+    sums: Sums
+    first: np.ndarray
+    sides: np.ndarray
+    sizes: np.ndarray
+    counts: Counts
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return self.point.state.t
+
+    def save(self, path: str | Path) -> None:
+        """Write to a file (numpy's .npz; nothing in it is executed when it is read).
+
+        The file is complete or not there at all: it is written beside and then moved.
+
+        Parameters
+        ----------
+        path : str or Path
+            Name of the file; no ending is added.
+        """
+        arrays: dict[str, np.ndarray] = {}
+        tree = _packed(self, arrays)
+        text = json.dumps({"format": _FORMAT, "checkpoint": tree})
+        beside = Path(f"{path}.part")
+        with beside.open("wb") as file:
+            np.savez(file, allow_pickle=False, tree=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
+        os.replace(beside, path)
+
+
+def load_checkpoint(path: str | Path) -> Checkpoint:
+    """Read what :meth:`Checkpoint.save` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Checkpoint
+
+    Raises
+    ------
+    StructureError
+        If the file is no checkpoint of this version.
+    """
+    try:
+        with np.load(Path(path), allow_pickle=False) as file:
+            content = json.loads(file["tree"].tobytes().decode())
+            if content["format"] != _FORMAT:
+                raise StructureError(f"{path} is a checkpoint of format {content['format']}; expected {_FORMAT}")
+            found = _unpacked(content["checkpoint"], file)
+    except (KeyError, ValueError, TypeError, AttributeError, ImportError) as error:
+        raise StructureError(f"{path} is no checkpoint: {error}; give a file that Checkpoint.save wrote") from error
+    if not isinstance(found, Checkpoint):
+        raise StructureError(f"{path} holds a {type(found).__name__}; give a file that Checkpoint.save wrote")
+    return found
+
+
+@dataclass(frozen=True)
+class Autosave:
+    """Checkpoints written while a run goes on, each replacing the one before.
+
+    Parameters
+    ----------
+    path : str or Path
+    seconds : float
+        Wall-clock time between them [s].
+
+    Raises
+    ------
+    StructureError
+        If ``seconds`` is not positive.
+    """
+
+    path: str | Path
+    seconds: float = 60.0
+
+    def __post_init__(self) -> None:
+        if not self.seconds > 0.0:
+            raise StructureError(f"Autosave: seconds = {self.seconds}; expected > 0")
+
+
+def machine_of(model: Model) -> str:
+    """Return a digest of a model: its names, its effects and its parts' numbers."""
+    digest = hashlib.sha256(repr((model.coordinates, model.inputs, model.outputs, model.effects)).encode())
+    for numbers in (model.rest.x, *(f.parameters for f in model.forces.families)):
+        digest.update(np.ascontiguousarray(numbers).tobytes())
+    return digest.hexdigest()
+
+
+def _packed(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """Return a value as JSON; arrays are put aside under a number."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        arrays[f"a{len(arrays)}"] = value
+        return {"array": f"a{len(arrays) - 1}"}
+    kind = type(value)
+    if is_dataclass(value) and kind.__module__.startswith(_HOUSE):
+        parts = {f.name: _packed(getattr(value, f.name), arrays) for f in fields(value)}
+        return {"kind": f"{kind.__module__}:{kind.__qualname__}", "fields": parts}
+    if isinstance(value, tuple) and hasattr(value, "_fields") and kind.__module__.startswith(_HOUSE):
+        parts = {name: _packed(getattr(value, name), arrays) for name in value._fields}
+        return {"kind": f"{kind.__module__}:{kind.__qualname__}", "fields": parts}
+    if isinstance(value, tuple | list):
+        return {"items": [_packed(item, arrays) for item in value]}
+    raise StructureError(f"a checkpoint cannot hold a {kind.__name__}")
+
+
+def _unpacked(tree: Any, arrays: Mapping[str, np.ndarray]) -> Any:
+    if not isinstance(tree, dict):
+        return tree
+    if "array" in tree:
+        return arrays[tree["array"]]
+    if "items" in tree:
+        return tuple(_unpacked(item, arrays) for item in tree["items"])
+    module, _, name = tree["kind"].partition(":")
+    kind = getattr(importlib.import_module(module), name) if module.startswith(_HOUSE) else None
+    if kind is None or not (is_dataclass(kind) or hasattr(kind, "_fields")):
+        raise ValueError(f"{tree['kind']} is not a value of flexctrl")
+    return kind(**{key: _unpacked(part, arrays) for key, part in tree["fields"].items()})

@@ -1,0 +1,246 @@
+"""Events: instants at which a function of the signals crosses zero, found between the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from itertools import pairwise
+
+import numpy as np
+
+from flexctrl.dynamics.dense import Curve
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.steps import Point
+from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.model.motion import State
+
+__all__ = ["Direction", "Event", "Occurrence", "Watch"]
+
+_DUST = 1e-13
+_SLOPE = 1e-2
+
+
+class Direction(Enum):
+    """Which way a value must go through zero to count."""
+
+    RISING = 1
+    FALLING = -1
+    EITHER = 0
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something to look for during a run: a signal, or a function of signals, reaches a value.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in ``run.events``.
+    of : str or callable
+        An output or input of the model, or a function of a mapping of all of them (name → value) to a number that is
+        continuous in time.
+    at : float
+        The value to be reached.
+    direction : Direction
+        Which way.
+    terminal : bool
+        Whether the run ends there, with `Status.STOPPED`.
+
+    Raises
+    ------
+    StructureError
+        For a value that is no finite number.
+
+    Notes
+    -----
+    Each step is looked at in its middle and at its end. What crosses and comes back within half a step goes unseen
+    unless its parabola through those points shows it.
+    """
+
+    name: str
+    of: str | Callable[[Mapping[str, float]], float]
+    at: float = 0.0
+    direction: Direction = Direction.EITHER
+    terminal: bool = False
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.at):
+            raise StructureError(f"event {self.name!r}: at = {self.at}; expected a finite number")
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """An event that happened.
+
+    Attributes
+    ----------
+    name : str
+    t : float
+        When [s].
+    rising : bool
+        Which way the value went.
+    signals : mapping of str to float
+        Outputs and inputs at that instant.
+    """
+
+    name: str
+    t: float
+    rising: bool
+    signals: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A gauge goes through zero."""
+
+    t: float
+    gauge: int
+    rising: bool
+
+
+@dataclass
+class Watch:
+    """All gauges of a run: the events asked for, then the switching functions of the machine's own physics.
+
+    Attributes
+    ----------
+    feed : Feed
+    events : tuple of Event
+    switches : callable
+        State → values whose signs tell which law of force is in force; a run stops and starts anew where one changes.
+    names : tuple of str
+        Of the switches.
+    sides : numpy.ndarray
+        The side each gauge is on: ±1; 0 while it has not left zero.
+    """
+
+    feed: Feed
+    events: tuple[Event, ...]
+    switches: Callable[[State], np.ndarray]
+    names: tuple[str, ...]
+    sides: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    idle: bool = True
+
+    def __post_init__(self) -> None:
+        model = self.feed.model
+        known = (*model.outputs, *model.inputs)
+        for event in self.events:
+            if isinstance(event.of, str) and event.of not in known:
+                hint = did_you_mean(event.of, known)
+                raise StructureError(f"event {event.name!r}: the model has no signal {event.of!r}{hint}")
+
+        self.idle = not self.events and not self.names
+
+    def stops(self, gauge: int) -> bool:
+        """Tell whether a step has to end at a gauge's zero."""
+        return gauge >= len(self.events) or self.events[gauge].terminal
+
+    def signals(self, state: State, u: np.ndarray) -> dict[str, float]:
+        """Return all signals by name."""
+        model = self.feed.model
+        values = [*model.measure(state).tolist(), *np.asarray(u).tolist()]
+        return dict(zip((*model.outputs, *model.inputs), values, strict=True))
+
+    def values(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return the gauges' values."""
+        found = []
+        if self.events:
+            signals = self.signals(state, u)
+            found = [(signals[e.of] if isinstance(e.of, str) else float(e.of(signals))) - e.at for e in self.events]
+        return np.append(found, self.switches(state)) if self.names else np.array(found)
+
+    def begin(self, point: Point) -> None:
+        """Note the side that each gauge is on at the start."""
+        values = self.values(point.state, point.supply.u)
+        self.sides, self.sizes = np.sign(values), np.abs(values)
+
+    def crossings(self, curve: Curve, before: Point, after: Point) -> list[Crossing]:
+        """Return where gauges cross zero over a step, in order; sides stay as they are."""
+        t, h = before.state.t, after.state.t - before.state.t
+        value = _Along(self, curve, before, after)
+        last = self.values(before.state, before.supply.u)
+        ends = [(t + 0.5 * h, value(t + 0.5 * h)), (t + h, self.values(after.state, after.supply.u))]
+        self.sizes = np.maximum(self.sizes, np.abs([last, *(v for _, v in ends)]).max(axis=0))
+        found = []
+        for gauge in range(len(last)):
+            corners = [(t, last[gauge]), *((at, v[gauge]) for at, v in ends)]
+            found += self._through(gauge, self._with_vertex(corners, gauge, value), value)
+        return sorted(found, key=lambda c: c.t)
+
+    def _with_vertex(self, corners: list[tuple[float, float]], gauge: int, value: _Along) -> list[tuple[float, float]]:
+        """Add the vertex of the parabola through three points where it may lie across zero and they do not."""
+        (a, fa), (b, fb), (_, fc) = corners
+        bend = fa - 2.0 * fb + fc
+        if not (fa * fb > 0.0 and fb * fc > 0.0 and bend * fb > 0.0):
+            return corners
+        s = 0.5 * (fa - fc) / bend
+        if not (abs(s) < 1.0 and (fb - 0.125 * (fa - fc) ** 2 / bend) * fb < 0.1 * fb * fb):
+            return corners
+        at = b + s * (b - a)
+        return sorted([*corners, (at, value(at)[gauge])])
+
+    def _through(self, gauge: int, corners: Sequence[tuple[float, float]], value: _Along) -> list[Crossing]:
+        side, found = self.sides[gauge], []
+        dust = _DUST * self.sizes[gauge]
+        direction = self.events[gauge].direction if gauge < len(self.events) else Direction.EITHER
+        for (a, fa), (b, fb) in pairwise(corners):
+            if abs(fb) <= dust or np.sign(fb) == side:
+                continue
+            rising = fb > 0.0
+            if side != 0.0 and direction is not (Direction.FALLING if rising else Direction.RISING):
+                at = _root(lambda s: value(s)[gauge], a, b, fb) if fa * fb < 0.0 else a
+                found.append(Crossing(at, gauge, rising))
+            side = np.sign(fb)
+        return found
+
+    def offset(self, curve: Curve, before: Point, after: Point, gauge: int) -> float:
+        """Return how much later than at the end of a step a gauge is zero, by its slope there."""
+        t, h = after.state.t, after.state.t - before.state.t
+        now = self.values(after.state, after.supply.u)[gauge]
+        slope = (now - _Along(self, curve, before, after)(t - _SLOPE * h)[gauge]) / (_SLOPE * h)
+        return float(-now / slope) if abs(now) > _DUST * self.sizes[gauge] and slope != 0.0 else 0.0
+
+    def settle(self, after: Point) -> None:
+        """Note the sides after a step."""
+        values = self.values(after.state, after.supply.u)
+        clear = np.abs(values) > _DUST * self.sizes
+        self.sides = np.where(clear, np.sign(values), self.sides)
+
+    def cross(self, crossing: Crossing) -> None:
+        """Note that a gauge has crossed, though its value may still be on either side of zero by round-off."""
+        self.sides[crossing.gauge] = 1.0 if crossing.rising else -1.0
+
+    def occurrence(self, crossing: Crossing, state: State, u: np.ndarray) -> Occurrence:
+        """Return what is told of a crossing."""
+        named = [*(e.name for e in self.events), *self.names]
+        return Occurrence(named[crossing.gauge], crossing.t, crossing.rising, self.signals(state, u))
+
+
+@dataclass(frozen=True)
+class _Along:
+    """The gauges over a step."""
+
+    watch: Watch
+    curve: Curve
+    before: Point
+    after: Point
+
+    def supply(self, state: State) -> Supply:
+        return self.watch.feed.between(self.before.supply, self.after.supply, self._share(state.t), state)
+
+    def _share(self, t: float) -> tuple[float, float]:
+        h = self.after.state.t - self.before.state.t
+        return (t - self.before.state.t) / h, h
+
+    def __call__(self, t: float) -> np.ndarray:
+        state = self.curve.at(t)
+        return self.watch.values(state, self.supply(state).u)
+
+
+def _root(f: Callable[[float], float], a: float, b: float, fb: float) -> float:
+    """Return a root in [a, b] to round-off of time."""
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda t: fb if t == b else f(t), a, b, xtol=4e-16 * max(abs(a), abs(b)) + 1e-300, rtol=1e-15))

@@ -1,0 +1,310 @@
+"""A run under way: steps of a method from stop to stop, with books, events and records."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from flexctrl.dynamics.books import Books
+from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
+from flexctrl.dynamics.dense import Curve, Track
+from flexctrl.dynamics.events import Crossing, Occurrence, Watch
+from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.interrupt import Interruption
+from flexctrl.dynamics.rows import Rows
+from flexctrl.dynamics.run import Status, Tolerance
+from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Mark, Point, StepError, Stepper
+from flexctrl.dynamics.stops import Stops
+from flexctrl.model.model import Model
+
+__all__ = ["Journey", "Plan"]
+
+_SMALLEST = 1e-12
+_BLOCK = 1000
+_BLOCK_BYTES = 16e6
+_NEAR = 1e-9
+_LANDINGS = 5
+_CHATTER = 20
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is to do.
+
+    Attributes
+    ----------
+    model : Model
+    feed : Feed
+    method : Integrator
+    tolerance : Tolerance
+    until : float
+    tell : callable
+        Told the share done, now and then.
+    autosave : Autosave or None
+    began : float
+        Wall-clock time [s].
+    """
+
+    model: Model
+    feed: Feed
+    method: Integrator
+    tolerance: Tolerance
+    until: float
+    tell: Callable[[float], None]
+    autosave: Autosave | None
+    began: float
+
+
+@dataclass
+class Journey:
+    """One run under way.
+
+    Attributes
+    ----------
+    plan : Plan
+    stepper : Stepper
+    point : Point
+    stops : Stops
+    books : Books
+    watch : Watch
+    rows : Rows
+    track : Track
+    mark : Mark
+    """
+
+    plan: Plan
+    stepper: Stepper[Any]
+    point: Any
+    stops: Stops
+    books: Books
+    watch: Watch
+    rows: Rows
+    track: Track
+    mark: Mark
+    events: list[Occurrence] = field(default_factory=list)
+    status: Status = Status.FINISHED
+    message: str = ""
+    saved: Checkpoint | None = None
+    _memory: Any = None
+    _told: float = 0.0
+    _kept: float = 0.0
+
+    def travel(self) -> None:
+        """Go on to the end, or as far as it goes."""
+        self._memory = self.stepper.memory
+        try:
+            with Interruption() as interruption:
+                self._through_stops(interruption)
+        except KeyboardInterrupt:
+            self.stepper.memory = self._memory
+            self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
+        except StepError as error:
+            self.stepper.counts.worst = error.worst
+            worst = self.plan.model.coordinates[error.worst]
+            self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
+        self.books.close(self.point)
+
+    @property
+    def _tick(self) -> float:
+        return 1e-12 * self.plan.until
+
+    def _through_stops(self, interruption: Interruption) -> None:
+        step = self._fixed if isinstance(self.plan.method.pace, Fixed) else self._controlled
+        end, self._told = self.plan.until - self._tick, time.perf_counter()
+        self._kept = self._told
+        while self.status is Status.FINISHED:
+            t, stop = self.point.state.t, self.stops.next
+            if t >= end:
+                return
+            if stop - t <= self._tick:
+                self._renew(stop)
+                continue
+            step(stop, self.plan.until)
+            self._memory = self.stepper.memory
+            interruption.check()
+            if (now := time.perf_counter()) - self._told > 0.1:
+                self._told = now
+                self._report(now)
+
+    def _report(self, now: float) -> None:
+        self.plan.tell(self.point.state.t / self.plan.until)
+        autosave = self.plan.autosave
+        if autosave is not None and now - self._kept > autosave.seconds:
+            self._kept = now
+            (self.saved or self.snapshot()).save(autosave.path)
+
+    def snapshot(self) -> Checkpoint:
+        """Return where the run stands."""
+        return Checkpoint(
+            machine_of(self.plan.model),
+            repr(self.plan.method),
+            self.plan.feed.base,
+            self.point,
+            self._memory,
+            self.stops.passed,
+            replace(self.mark),
+            self.rows.count,
+            replace(self.books.sums, moved=self.books.sums.moved.copy()),
+            self.books.first,
+            self.watch.sides.copy(),
+            self.watch.sizes.copy(),
+            replace(self.stepper.counts),
+        )
+
+    def _renew(self, stop: float) -> None:
+        """New inputs at a sample instant or break; accelerations jump with them."""
+        if self.point.state.t != stop:
+            self.point = replace(self.point, state=self.point.state.with_(t=stop))
+        self.stops.passed += 1
+        self.mark.left = 0
+        feed, before, state = self.plan.feed, self.point.supply, self.point.state
+        fresh = feed.restart(state, before) if feed.continuous else feed.sample(state, before)
+        if np.array_equal(fresh.u, before.u):
+            self.point = replace(self.point, supply=fresh)
+        else:
+            self.point = self.stepper.renew(self.point, fresh, self.mark.size)
+        if not self.watch.idle:
+            self.watch.settle(self.point)
+        self.rows.here(self.point, 1e-6 * self.mark.size)
+
+    # -- steps of fixed length
+
+    def _fixed(self, stop: float, until: float) -> None:
+        mark, t = self.mark, self.point.state.t
+        if not mark.left:
+            length = self.plan.method.pace.step  # type: ignore[union-attr]
+            count = max(1, math.ceil((stop - t) / length - 1e-6)) if math.isfinite(stop) else 0
+            mark.size, mark.left = (stop - t) / count if count else length, count or -1
+        room = math.floor((until - t) / mark.size + _NEAR)
+        if not room:
+            self.saved = self.saved or self.snapshot()
+            return self._take(until - t, stop)
+        count = min(room, _BLOCK) if mark.left < 0 else min(room, mark.left, _BLOCK)
+        done = self._march(mark.size, count, stop)
+        if not done:
+            self._take(mark.size, stop)
+        if mark.left > 0:
+            mark.left -= max(done, 1)
+
+    def _march(self, h: float, count: int, stop: float) -> int:
+        """Take many steps at once, if the stepper can; return how many."""
+        if not isinstance(self.stepper, Marching) or self.plan.feed.continuous or not self.watch.idle:
+            return 0
+        before = self.point
+        count = max(1, min(count, int(_BLOCK_BYTES / (100.0 * len(before.state.x) + 32.0 * before.state.q.size))))
+        block = self.stepper.march(before, h, count)
+        if not len(block.times):
+            return 0
+        self.books.enter_block(before, block)
+        self.point = block.last
+        self.mark.steps += len(block.times)
+        self.track.keep(block.states, before, block.last)
+        self.rows.among(before, block, stop - block.times[-1] <= self._tick)
+        return len(block.times)
+
+    def _take(self, h: float, stop: float) -> None:
+        """A step of fixed length; where it does not converge, in halves."""
+        try:
+            after = self.stepper.step(self.point, h)
+        except StepError:
+            self.mark.rejected += 1
+            if h < 2e-3 * self.mark.size or h < _SMALLEST:
+                raise
+            self._take(0.5 * h, stop)
+            return self._take(0.5 * h, stop)
+        self._accept(after, stop)
+
+    # -- steps of controlled length
+
+    def _controlled(self, stop: float, until: float) -> None:
+        pace, mark, t = self.plan.method.pace, self.mark, self.point.state.t
+        assert isinstance(pace, Controlled)
+        left, size = stop - t, mark.size
+        h = min(size, pace.largest)
+        h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
+        if t + h > until + self._tick:
+            self.saved = self.saved or self.snapshot()
+            h = until - t
+        while True:
+            if h < _SMALLEST * max(1.0, t):
+                raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s")
+            try:
+                after = self.stepper.step(self.point, h)
+            except StepError:
+                mark.rejected += 1
+                size = h = 0.25 * h
+                continue
+            error = self.stepper.error(self.point, after, self.books.sums.moved, self.plan.tolerance)
+            factor = 0.9 * max(error, 1e-9) ** (-1.0 / pace.steepness)
+            if error <= 1.0:
+                break
+            mark.rejected += 1
+            size = h = h * max(0.2, factor)
+        if factor > 1.3 and h > 0.5 * size:
+            size = h * min(2.5, factor)
+        elif factor < 1.0:
+            size = h * factor
+        mark.size = size
+        self._accept(after, stop)
+
+    # -- what comes with every step
+
+    def _accept(self, after: Point, stop: float) -> None:
+        before = self.point
+        if not self.watch.idle:
+            after = self._watched(before, after)
+            if after.state is before.state:
+                self.point = after
+                return
+        curve = self.track.curve(before, after)
+        self.books.enter(before, after, curve)
+        self.point = after
+        self.mark.steps += 1
+        self.track.keep((after.state,), before, after)
+        self.rows.within(before, after, stop - after.state.t <= self._tick)
+
+    def _watched(self, before: Point, after: Point) -> Point:
+        """Note what happens over a step; end it where the run stops or a law of force switches."""
+        watch, curve = self.watch, self.track.curve(before, after)
+        crossings = watch.crossings(curve, before, after)
+        landing = next((c for c in crossings if watch.stops(c.gauge)), None)
+        if landing is None or self.mark.stuck >= _CHATTER:
+            self._note(crossings, curve, before)
+            watch.settle(after)
+            self.mark.stuck = 0
+            return after
+        self._note([c for c in crossings if c.t < landing.t], curve, before)
+        after, landing = self._land(before, after, landing)
+        watch.settle(after)
+        watch.cross(landing)
+        self.events.append(watch.occurrence(landing, after.state, after.supply.u))
+        if landing.gauge < len(watch.events):
+            self.status, self.message = Status.STOPPED, f"{self.events[-1].name} at t = {landing.t:.6g} s"
+            return after
+        short = landing.t - before.state.t < 1e-6 * self.mark.size
+        self.mark.stuck = self.mark.stuck + 1 if short else 0
+        return self.stepper.renew(after, self.plan.feed.restart(after.state, after.supply), self.mark.size)
+
+    def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:
+        for c in crossings:
+            self.watch.cross(c)
+            self.events.append(self.watch.occurrence(c, curve.at(c.t), before.supply.u))
+
+    def _land(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
+        """Take the step again, to where a gauge is zero; where it is at once, there is none."""
+        t, h, gauge = before.state.t, after.state.t - before.state.t, crossing.gauge
+        at = crossing.t
+        for _ in range(_LANDINGS):
+            if at - t <= _SMALLEST * h:
+                return before, replace(crossing, t=t)
+            after = self.stepper.step(before, at - t)
+            off = self.watch.offset(self.track.curve(before, after), before, after, gauge)
+            if abs(off) <= _NEAR * h:
+                break
+            at = min(max(at + off, t), t + h)
+        return after, replace(crossing, t=after.state.t)

@@ -1,0 +1,149 @@
+"""Where the curves of a run go: into memory, or line by line into a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import TextIOBase
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from flexctrl.errors import StructureError
+
+__all__ = ["CsvStream", "InMemory", "Record", "Recorder"]
+
+
+class Recorder(Protocol):
+    """A record being written."""
+
+    def row(self, t: float, y: np.ndarray, u: np.ndarray) -> None:
+        """Write the signals of an instant."""
+
+    def table(self) -> np.ndarray:
+        """Return what the run shall hold: rows of (t, y, u)."""
+
+    def close(self) -> None:
+        """Let go of what is held open; nothing is written afterwards."""
+
+
+class Record(Protocol):
+    """Where the curves of a run go, as a value."""
+
+    @property
+    def every(self) -> float | None:
+        """Spacing of the rows [s], if it is not to be the run's."""
+
+    @property
+    def states(self) -> float:
+        """Bytes of states that may be kept for `Run.at`."""
+
+    def start(self, signals: Sequence[str]) -> Recorder:
+        """Return a recorder of time and some signals."""
+
+
+@dataclass(frozen=True)
+class InMemory:
+    """Curves are kept by the run: the default.
+
+    Parameters
+    ----------
+    states : float
+        Bytes of states that may be kept beside the curves, for `Run.at`; a run that needs more keeps none of them.
+
+    Raises
+    ------
+    StructureError
+        For a negative number.
+    """
+
+    states: float = 32e6
+
+    def __post_init__(self) -> None:
+        if not self.states >= 0.0:
+            raise StructureError(f"InMemory: states = {self.states}; expected bytes ≥ 0")
+
+    @property
+    def every(self) -> None:
+        return None
+
+    def start(self, signals: Sequence[str]) -> _Table:
+        return _Table(1 + len(signals))
+
+
+@dataclass(frozen=True)
+class CsvStream:
+    """Curves are written to a file as they come; the run itself holds their first and last rows.
+
+    A file that exists is replaced. Lines are on the disk when the run ends, however it ends.
+
+    Parameters
+    ----------
+    path : str or Path
+    every : float, optional
+        Spacing of the rows [s]; default: that of the run.
+
+    Raises
+    ------
+    StructureError
+        If ``every`` is not positive.
+    """
+
+    path: str | Path
+    every: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.every is not None and not self.every > 0.0:
+            raise StructureError(f"CsvStream: every = {self.every}; expected seconds > 0")
+
+    @property
+    def states(self) -> float:
+        return 0.0
+
+    def start(self, signals: Sequence[str]) -> _Stream:
+        file = Path(self.path).open("w", encoding="utf-8")  # noqa: SIM115 (the run closes it)
+        file.write(",".join(["t", *signals]) + "\n")
+        return _Stream(file, 1 + len(signals))
+
+
+class _Table:
+    """Rows in one array that grows by half: no object is kept per row."""
+
+    def __init__(self, width: int) -> None:
+        self.rows = np.empty((64, width))
+        self.count = 0
+
+    def row(self, t: float, y: np.ndarray, u: np.ndarray) -> None:
+        if self.count == len(self.rows):
+            self.rows = np.concatenate([self.rows, np.empty((1 + self.count // 2, self.rows.shape[1]))])
+        place = self.rows[self.count]
+        place[0] = t
+        place[1 : 1 + len(y)] = y
+        place[1 + len(y) :] = u
+        self.count += 1
+
+    def table(self) -> np.ndarray:
+        return self.rows[: self.count].copy()
+
+    def close(self) -> None:
+        self.rows = self.rows[: self.count]
+
+
+class _Stream:
+    """Lines of a file; numbers are written so that they read back the same."""
+
+    def __init__(self, file: TextIOBase, width: int) -> None:
+        self.file, self.width = file, width
+        self.ends: list[list[float]] = []
+
+    def row(self, t: float, y: np.ndarray, u: np.ndarray) -> None:
+        values = [float(t), *y.tolist(), *u.tolist()]
+        self.file.write(",".join(map(repr, values)) + "\n")
+        self.ends = [self.ends[0] if self.ends else values, values]
+
+    def table(self) -> np.ndarray:
+        return np.array(self.ends).reshape(-1, self.width)
+
+    def close(self) -> None:
+        self.file.close()

@@ -1,0 +1,94 @@
+"""The rows of a run: at every step, or at instants evenly spaced whatever the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from flexctrl.dynamics.dense import Curve
+from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.record import Recorder
+from flexctrl.dynamics.steps import Block, Point
+from flexctrl.model.motion import State
+
+__all__ = ["Rows"]
+
+_FRAMES = 120
+_NEAR = 1e-9
+
+
+@dataclass
+class Rows:
+    """What is written of a run.
+
+    Attributes
+    ----------
+    feed : Feed
+    every : float or None
+        Spacing [s]; None: every step.
+    until : float
+        End of the run [s]; some 120 states on the way are kept for drawing.
+    recorder : Recorder
+    curve : callable
+        (point before, point after) → the motion over that step.
+    count : int
+        Number of the next row.
+    """
+
+    feed: Feed
+    every: float | None
+    until: float
+    recorder: Recorder
+    curve: Callable[[Point, Point], Curve]
+    count: int = 0
+    frames: list[State] = field(default_factory=list)
+
+    def here(self, point: Point, slack: float) -> None:
+        """Write the row of a point, if one is due within some slack."""
+        if self.every is None or abs(self.count * self.every - point.state.t) <= slack:
+            self._write(point.state, point.supply.u)
+
+    def within(self, before: Point, after: Point, to_jump: bool) -> None:
+        """Write the rows within a step, and the one at its end unless inputs are about to jump there."""
+        every, t, h = self.every, after.state.t, after.state.t - before.state.t
+        curve: Curve | None = None
+        while every is not None and (row := self.count * every) < t - _NEAR * h:
+            curve = curve or self.curve(before, after)
+            state = curve.at(row)
+            share = ((row - before.state.t) / h, h)
+            self._write(state, self.feed.between(before.supply, after.supply, share, state).u)
+        if not to_jump:
+            self.here(after, _NEAR * h)
+
+    def among(self, before: Point, block: Block, to_jump: bool) -> None:
+        """Write the rows within many steps."""
+        times, states, u, h = block.times, block.states, before.supply.u, block.times[0] - before.state.t
+        kept = len(times) - to_jump
+        if self.every is None:
+            for i in range(kept):
+                self._write(states[i], u)
+            return
+        while (row := self.count * self.every) <= times[-1] + _NEAR * h:
+            i = int(np.searchsorted(times, row - _NEAR * h))
+            state = states[i]
+            if abs(times[i] - row) > _NEAR * h:
+                start = replace(before, state=states[i - 1]) if i else before
+                state = self.curve(start, replace(block.last, state=state)).at(row)
+            elif i >= kept:
+                return
+            self._write(state, u)
+
+    def finish(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Write the row of the end, if the last one is before it, and return all rows."""
+        rows = self.recorder.table()
+        if not len(rows) or rows[-1, 0] < state.t - 1e-12 * self.until:
+            self._write(state, u)
+        return self.recorder.table()
+
+    def _write(self, state: State, u: np.ndarray) -> None:
+        self.count += 1
+        self.recorder.row(state.t, self.feed.model.measure(state), u)
+        if not self.frames or state.t >= self.frames[-1].t + self.until / _FRAMES * (1 - 1e-9):
+            self.frames.append(state)
