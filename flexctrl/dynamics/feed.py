@@ -14,6 +14,7 @@ from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
 _SMALL = 1e-7
+_NEAR = 1e-10
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,12 @@ class Feed:
         """Return the inputs at the end of a step of length h; the controller's state follows the trapezoidal rule."""
         if not self.continuous:
             return before
-        return self._answer(state.t, self.measured(state), before, h)
+        return self._answer(self._short_of_break(state.t), self.measured(state), before, h)
+
+    def _short_of_break(self, t: float) -> float:
+        """Return t, or just before where the command jumps there: a step that ends at a jump does not feel it."""
+        near = _NEAR * (1.0 + abs(t))
+        return t - near if any(abs(t - b) < near for b in self.breaks) else t
 
     def _answer(self, t: float, y: np.ndarray, before: Supply, h: float) -> Supply:
         c = self.controller

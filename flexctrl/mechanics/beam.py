@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.mechanics.matrices import PlaneMass
 from flexctrl.mechanics.rotation import inverse_tangent, rotation_vector
 
 if TYPE_CHECKING:
@@ -20,9 +21,10 @@ if TYPE_CHECKING:
 
 PARAMETERS = (
     *("axes00", "axes01", "axes02", "axes10", "axes11", "axes12", "axes20", "axes21", "axes22"),
-    *("L", "EA", "GJ", "a_y", "b_y", "a_z", "b_z", "mass", "polar", "rotary_y", "rotary_z"),
+    *("L", "EA", "GJ", "a_y", "b_y", "a_z", "b_z", "mass", "polar"),
+    *(f"{plane}_{entry}" for plane in ("z", "y") for entry in PlaneMass._fields),
 )
-"""Per element: axes at rest (row by row), length, EA, GJ, bending coefficients, mass coefficients."""
+"""Per element: axes at rest (row by row), length, EA, GJ, bending coefficients, mass, and that in bending by plane."""
 
 
 @dataclass(frozen=True)
@@ -245,8 +247,8 @@ def momentum(m: BeamMotion, rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]) -> tuple[c
 
     (vx1, vy1, vz1), (wx1, wy1, wz1), (vx2, vy2, vz2), (wx2, wy2, wz2) = (_components(r) for r in rates)
     mass, polar = m.p["mass"], m.p["polar"]
-    py1, lz1, py2, lz2 = _bending_momentum(m, (vy1, wz1, vy2, wz2), m.p["rotary_z"])
-    pz1, ly1, pz2, ly2 = _bending_momentum(m, (vz1, -wy1, vz2, -wy2), m.p["rotary_y"])
+    py1, lz1, py2, lz2 = _bending_momentum(m, (vy1, wz1, vy2, wz2), "z")
+    pz1, ly1, pz2, ly2 = _bending_momentum(m, (vz1, -wy1, vz2, -wy2), "y")
     return (
         ca.vertcat(mass / 6.0 * (2.0 * vx1 + vx2), py1, pz1),
         ca.vertcat(polar / 6.0 * (2.0 * wx1 + wx2), -ly1, lz1),
@@ -255,18 +257,15 @@ def momentum(m: BeamMotion, rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]) -> tuple[c
     )
 
 
-def _bending_momentum(m: BeamMotion, rates: tuple, rotary: ca.SX) -> tuple:
-    """Consistent cubic mass in one plane (Przemieniecki 1968, with rotary inertia ρI)."""
+def _bending_momentum(m: BeamMotion, rates: tuple, about: str) -> tuple:
+    """Consistent mass in one plane on the rates of (v₁, θ₁, v₂, θ₂)."""
     v1, w1, v2, w2 = rates
-    L, c = m.p["L"], m.p["mass"] / 420.0
-    r = rotary / (30.0 * L)
+    vv, tv, tt, other_vv, other_tv, other_tt = (m.p[f"{about}_{entry}"] for entry in PlaneMass._fields)
     return (
-        c * (156.0 * v1 + 22.0 * L * w1 + 54.0 * v2 - 13.0 * L * w2) + r * (36.0 * (v1 - v2) + 3.0 * L * (w1 + w2)),
-        c * L * (22.0 * v1 + 4.0 * L * w1 + 13.0 * v2 - 3.0 * L * w2)
-        + r * L * (3.0 * (v1 - v2) + 4.0 * L * w1 - L * w2),
-        c * (54.0 * v1 + 13.0 * L * w1 + 156.0 * v2 - 22.0 * L * w2) - r * (36.0 * (v1 - v2) + 3.0 * L * (w1 + w2)),
-        c * L * (-13.0 * v1 - 3.0 * L * w1 - 22.0 * v2 + 4.0 * L * w2)
-        + r * L * (3.0 * (v1 - v2) - L * w1 + 4.0 * L * w2),
+        vv * v1 + tv * w1 + other_vv * v2 - other_tv * w2,
+        tv * v1 + tt * w1 + other_tv * v2 + other_tt * w2,
+        other_vv * v1 + other_tv * w1 + vv * v2 - tv * w2,
+        -other_tv * v1 + other_tt * w1 - tv * v2 + tt * w2,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -61,36 +62,83 @@ def beam_stiffness(section: Section, length: float) -> np.ndarray:
 
 
 def beam_mass(section: Section, length: float) -> np.ndarray:
-    """Return the consistent M_e (12 × 12) in the element's axes, with rotary inertia (Przemieniecki 1968, §11.3)."""
-    L = length
-    m, j = section.rhoA * L, section.rhoJ * L
+    """Return the consistent M_e (12 × 12) in the element's axes, with rotary inertia (Przemieniecki 1968, §11.3).
+
+    With shear deformation the shapes are those of Timoshenko's beam: rotary inertia belongs to the sections, which
+    do not turn as the axis does.
+    """
+    m, j = section.rhoA * length, section.rhoJ * length
     M = np.zeros((12, 12))
     M[np.ix_([0, 6], [0, 6])] = m / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
     M[np.ix_([3, 9], [3, 9])] = j / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
-    for freedoms, sign, rotary in (([1, 5, 7, 11], 1.0, section.rhoI_z), ([2, 4, 8, 10], -1.0, section.rhoI_y)):
+    about_z, about_y = plane_masses(section, length)
+    for freedoms, sign, mass in (([1, 5, 7, 11], 1.0, about_z), ([2, 4, 8, 10], -1.0, about_y)):
         turn = np.array([1.0, sign, 1.0, sign])
-        M[np.ix_(freedoms, freedoms)] = np.outer(turn, turn) * _plane_mass(m, rotary, L)
+        M[np.ix_(freedoms, freedoms)] = np.outer(turn, turn) * mass.matrix
     return M
 
 
-def _plane_mass(mass: float, rotary: float, L: float) -> np.ndarray:
-    translation = np.array(
-        [
-            [156.0, 22.0 * L, 54.0, -13.0 * L],
-            [22.0 * L, 4.0 * L**2, 13.0 * L, -3.0 * L**2],
-            [54.0, 13.0 * L, 156.0, -22.0 * L],
-            [-13.0 * L, -3.0 * L**2, -22.0 * L, 4.0 * L**2],
-        ]
+class PlaneMass(NamedTuple):
+    """Consistent mass in one plane of bending, over (v₁, θ₁, v₂, θ₂).
+
+    Own end, then other end: displacement on displacement [kg], rotation on displacement [kg m], rotation on
+    rotation [kg m²].
+    """
+
+    vv: float
+    tv: float
+    tt: float
+    other_vv: float
+    other_tv: float
+    other_tt: float
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """The matrix, shape (4, 4); the second end is the mirror image of the first."""
+        m = self
+        return np.array(
+            [
+                [m.vv, m.tv, m.other_vv, -m.other_tv],
+                [m.tv, m.tt, m.other_tv, m.other_tt],
+                [m.other_vv, m.other_tv, m.vv, -m.tv],
+                [-m.other_tv, m.other_tt, -m.tv, m.tt],
+            ]
+        )
+
+
+def plane_masses(section: Section, length: float) -> tuple[PlaneMass, PlaneMass]:
+    """Return the mass of an element in bending about its z axis (v, θz) and about y (w, −θy).
+
+    Parameters
+    ----------
+    section : Section
+    length : float
+        [m]
+
+    Returns
+    -------
+    tuple of PlaneMass
+    """
+    s = section
+    return (
+        _plane_mass(s.rhoA, s.rhoI_z, 12.0 * s.EI_z / (s.GA_y * length**2), length),
+        _plane_mass(s.rhoA, s.rhoI_y, 12.0 * s.EI_y / (s.GA_z * length**2), length),
     )
-    rotation = np.array(
-        [
-            [36.0, 3.0 * L, -36.0, 3.0 * L],
-            [3.0 * L, 4.0 * L**2, -3.0 * L, -(L**2)],
-            [-36.0, -3.0 * L, 36.0, -3.0 * L],
-            [3.0 * L, -(L**2), -3.0 * L, 4.0 * L**2],
-        ]
-    )
-    return mass / 420.0 * translation + rotary / (30.0 * L) * rotation
+
+
+@lru_cache(maxsize=256)
+def _plane_mass(mass: float, rotary: float, phi: float, length: float) -> PlaneMass:
+    """∫ρA w² + ρI ψ²: deflection and turn of the sections as in a beam without load (Friedman & Kosmatka 1993)."""
+    points, weights = np.polynomial.legendre.leggauss(4)
+    x, weights = 0.5 * (points + 1.0), 0.5 * length * weights / (1.0 + phi) ** 2
+    far = x * x * (3.0 - 2.0 * x) + phi * x
+    lean = length * (x * (1.0 - x) ** 2 + 0.5 * phi * x * (1.0 - x))
+    lean_far = -length * (x * x * (1.0 - x) + 0.5 * phi * x * (1.0 - x))
+    w = np.array([1.0 + phi - far, lean, far, lean_far])
+    tilt = 6.0 * x * (1.0 - x) / length
+    psi = np.array([-tilt, (1.0 - x) * (1.0 - 3.0 * x + phi), tilt, x * (3.0 * x - 2.0 + phi)])
+    M = (mass * (w * weights) @ w.T + rotary * (psi * weights) @ psi.T).tolist()
+    return PlaneMass(M[0][0], M[0][1], M[1][1], M[0][2], M[1][2], M[1][3])
 
 
 def to_space(matrix: np.ndarray, axes: np.ndarray) -> np.ndarray:

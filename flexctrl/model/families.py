@@ -9,7 +9,7 @@ import numpy as np
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility
-from flexctrl.mechanics.matrices import bending
+from flexctrl.mechanics.matrices import bending, plane_masses
 from flexctrl.model import kinds
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
@@ -105,8 +105,9 @@ def _beams(s: Structure, effects: tuple[Effect, ...], beams: list[Beam], rigid: 
 def _beam_parameters(b: Beam, length: float) -> list[float]:
     s = b.section
     y, z = bending(s.EI_y, s.GA_z, length), bending(s.EI_z, s.GA_y, length)
-    inertia = (s.rhoA * length, s.rhoJ * length, s.rhoI_y, s.rhoI_z)
-    return [*b.axes.ravel().tolist(), length, s.EA, s.GJ, *y, *z, *inertia]
+    about_z, about_y = plane_masses(s, length)
+    axes = b.axes.ravel().tolist()
+    return [*axes, length, s.EA, s.GJ, *y, *z, s.rhoA * length, s.rhoJ * length, *about_z, *about_y]
 
 
 def _lines(kind: Kind, s: Structure, effects: tuple[Effect, ...], lines: Sequence[Rope | Spring]) -> Family:

@@ -141,13 +141,14 @@ def _local(c: Closure | Fit, local: dict[int, int]) -> Loop | Fit:
 
 
 def _line_axes(along: Vector) -> np.ndarray:
-    """Axes (columns) whose main one is the line; ties hold the turn about it."""
+    """Axes (columns) whose main one is the line; ties hold the turn about it. They point as the global ones do."""
     main = main_axis(along)
+    line = np.sign(along[main]) * np.array(along)
     axes = np.eye(3)
-    side = np.cross(along, axes[:, (main + 1) % 3])
+    side = np.cross(line, axes[:, (main + 1) % 3])
     axes[:, (main + 2) % 3] = side / np.linalg.norm(side)
-    axes[:, (main + 1) % 3] = np.cross(axes[:, (main + 2) % 3], along)
-    axes[:, main] = along
+    axes[:, (main + 1) % 3] = np.cross(axes[:, (main + 2) % 3], line)
+    axes[:, main] = line
     return axes
 
 

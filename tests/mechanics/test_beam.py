@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
 from flexctrl.mechanics import beam
-from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, to_space
+from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, plane_masses, to_space
 
 SECTION = fc.Section(
     EA=900.0, EI_y=40.0, EI_z=70.0, GJ=30.0, rhoA=1.3, rhoJ=0.05, rhoI_y=0.02, rhoI_z=0.03, GA_y=400.0, GA_z=250.0
@@ -25,7 +25,8 @@ REST = np.concatenate([slot(x, np.eye(3)) for x in ENDS])
 
 def parameters() -> ca.DM:
     y, z = bending(SECTION.EI_y, SECTION.GA_z, L), bending(SECTION.EI_z, SECTION.GA_y, L)
-    rho = (SECTION.rhoA * L, SECTION.rhoJ * L, SECTION.rhoI_y, SECTION.rhoI_z)
+    about_z, about_y = plane_masses(SECTION, L)
+    rho = (SECTION.rhoA * L, SECTION.rhoJ * L, *about_z, *about_y)
     return ca.DM([*AXES.ravel(), L, SECTION.EA, SECTION.GJ, *y, *z, *rho])
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
+from scipy.linalg import eigvals
 
 import flexctrl as fc
 from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, drive_stiffness, to_space
@@ -130,3 +131,28 @@ def test_drive_matrix_of_a_wheel_has_the_ratio_over_the_radius():
 
 def test_infinite_shear_stiffness_is_euler_bernoulli():
     assert bending(2.0, math.inf, L) == pytest.approx((8.0 / L, 4.0 / L))
+
+
+@pytest.mark.parametrize("elements", [10, 20])
+def test_sections_that_shear_turn_apart_from_the_axis(elements):
+    """Simply supported Timoshenko beam, h/L = 0.2, ν = 0.3, k = 5/6: the closed form's frequencies over Euler's.
+
+    The ratio is the lower root of (ω²ρ/(kG) − β²)(ω² − c²β²) = ω² kG/(r²ρ), β = nπ/L (Timoshenko 1921).
+    """
+    E, rho, kG, length, r2 = 1.0, 1.0, 5 / 6 / 2.6, 1.0, 0.2**2 / 12
+    section = fc.Section(E, E * r2, E * r2, 1.0, rho, 1.0, rho * r2, rho * r2, kG, kG)
+    h = length / elements
+    K, M = np.zeros((2, 2 * elements + 2, 2 * elements + 2))
+    plane = np.ix_([1, 5, 7, 11], [1, 5, 7, 11])
+    for i in range(elements):
+        cells = np.ix_(range(2 * i, 2 * i + 4), range(2 * i, 2 * i + 4))
+        K[cells] += beam_stiffness(section, h)[plane]
+        M[cells] += beam_mass(section, h)[plane]
+    free = [i for i in range(2 * elements + 2) if i not in (0, 2 * elements)]
+    found = np.sqrt(eigvals(K[np.ix_(free, free)], M[np.ix_(free, free)]).real)
+    for n in (1, 2, 3):
+        beta = n * math.pi / length
+        b = 1.0 + r2 * beta**2 * (1.0 + E / kG)
+        square = kG / (2 * r2 * rho) * (b - math.sqrt(b * b - 4 * E / kG * r2**2 * beta**4))
+        nearest = found[np.argmin(np.abs(found - math.sqrt(square)))]
+        assert nearest == pytest.approx(math.sqrt(square), rel=2e-3 * n**2 * (10 / elements) ** 2)

@@ -122,3 +122,15 @@ def test_a_plain_machine_needs_no_followers():
     T = model.motion.jacobian(model.displace(0.3 * np.ones(model.n)))
     assert set(np.unique(T.data)) == {1.0}
     assert T.sum(axis=1).max() == 1.0
+
+
+@pytest.mark.parametrize("end", [(0, 0, -1), (0, 0, 1), (-1, 0, 0), (0.2, -0.9, 0.1)])
+def test_freedoms_of_a_rigid_line_turn_about_the_axes_they_are_named_after(end):
+    rope = fc.Rope("rope", (0, 0, 0), end, EA=1.0)
+    load = fc.PointMass("load", end, 1.0)
+    joints = [fc.Support(rope.start), fc.Pin(rope.end, load.node)]
+    model = fc.assemble(fc.Structure([rope, load], joints), [fc.LargeRotation()], fc.CasadiVM())
+    for name in model.coordinates:
+        turned = model.displace({name: 1e-3}).R[0]
+        axial = np.array([turned[2, 1], turned[0, 2], turned[1, 0]])
+        assert axial[("rx", "ry", "rz").index(name[-2:])] > 0.9e-3
