@@ -81,6 +81,7 @@ _HOMES = {
     "flexctrl.study.root_locus": ("CriticalGain", "critical_gains", "root_locus"),
     "flexctrl.study.zeros": ("SensorChoice", "Zeros", "sensor_choices", "zeros"),
     "flexctrl.study.compare": ("Comparison", "compare"),
+    "flexctrl.study.ledger": ("Ledger", "ledger"),
     "flexctrl.study.spillover": ("Spillover", "spillover"),
     "flexctrl.study.confirm": ("Confirmation",),
     "flexctrl.study.amplitudes": ("ConstantLoad", "InitialDisplacement", "InitialMode", "InitialSpeed"),

@@ -317,3 +317,15 @@ def test_shipped_scenes_answer(call, command, name):
         for side in (data["flexible"], data["rigid"]):
             assert max(re for re, _ in side["closed_loop_poles"]) < 0.0
             assert side["margins"]["stable"]
+
+
+@pytest.mark.slow
+def test_ledger_tells_what_each_effect_changes(told, tmp_path):
+    data = told("ledger", "--tolerance", "0.02", "--out", tmp_path)
+    assert {"effects", "minimal_set"} <= set(data)
+    for entry in data["effects"]:
+        assert {"name", "output_change", "cost_ratio", "keep"} <= set(entry)
+    assert data["minimal_set"] == [e["name"] for e in data["effects"] if e["keep"]]
+    assert data["minimal"]["output_change"] <= 0.02
+    assert json.loads((tmp_path / "ledger.json").read_text())["minimal_set"] == data["minimal_set"]
+    assert (tmp_path / "ledger.png").stat().st_size > 10_000

@@ -70,10 +70,17 @@ COMMANDS = {
         "rigid against flexible: curves and numbers",
         "flexctrl compare examples/bridge_crane.toml --out results",
     ),
+    "ledger": Command(
+        "flexctrl.cli.ledger",
+        "every effect: what leaving it out changes, what it costs, and the smallest set that will do",
+        "flexctrl ledger examples/ceiling_crane.toml --tolerance 0.01 --out results",
+        ("tolerance",),
+    ),
 }
 
 _OPTIONS: dict[str, dict[str, object]] = {
     "count": {"type": int, "default": 12, "metavar": "N", "help": "how many modes to show, lowest first (12)"},
+    "tolerance": {"type": float, "default": 0.01, "metavar": "X", "help": "relative change that is borne (0.01)"},
     "input": {"default": "", "metavar": "NAME", "help": "input where the loop is looked at or cut"},
     "output": {"default": "", "metavar": "NAME", "help": "output of the response"},
 }
@@ -91,6 +98,7 @@ class Request:
         Directory for pictures and data.
     count : int
     input, output : str
+    tolerance : float
     """
 
     scene: str
@@ -98,6 +106,7 @@ class Request:
     count: int = 12
     input: str = ""
     output: str = ""
+    tolerance: float = 0.01
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -35,14 +35,18 @@ class Sampled(Wrapper):
         Continuous; replaced by its sampled form.
     sample_time : float
         Seconds; 0.0 leaves it continuous.
+    original : Controller
+        As it was given: what runs without a computer in between.
     """
 
     sample_time: float = 0.0
+    original: Controller = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 <= self.sample_time < np.inf:
             raise ControllerError(f"Sampled: the sample time {self.sample_time} must be a number of seconds, 0 or more")
+        object.__setattr__(self, "original", self.controller)
         object.__setattr__(self, "controller", discretised(self.controller, self.sample_time))
 
     def sampled(self, sample_time: float) -> Controller:

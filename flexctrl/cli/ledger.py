@@ -1,0 +1,58 @@
+"""``flexctrl ledger``: what each effect changes and costs."""
+
+from __future__ import annotations
+
+from flexctrl.cli.answer import Answer, plain, write_json
+from flexctrl.cli.program import Request
+from flexctrl.cli.progress import progress
+from flexctrl.errors import SceneError
+from flexctrl.scene import load_scene
+from flexctrl.study.ledger import Entry, Ledger, ledger
+
+
+def answer(request: Request) -> Answer:
+    """Leave every effect out in turn."""
+    if not request.tolerance > 0.0:
+        raise SceneError(f"--tolerance {request.tolerance}: expected a relative change > 0, e.g. 0.01")
+    scene = load_scene(request.scene)
+    with progress(f"{scene.name}: ledger") as tell:
+        found = ledger(scene, request.tolerance, progress=tell)
+    data = _data(found)
+    write_json(request.out, "ledger.json", data)
+    if request.out is not None:
+        found.plot().savefig(request.out / "ledger.png", dpi=150)
+    return Answer(f"{scene.name}: what each effect changes and costs\n\n{found}", data)
+
+
+def _data(found: Ledger) -> dict[str, object]:
+    minimal = {
+        "output_change": found.minimal_change.outputs_worst,
+        "outputs": found.minimal_change.outputs,
+        "poles_change": found.minimal_change.poles,
+        "margins_change": found.minimal_change.margins,
+        "speedup": found.speedup,
+        "states": found.minimal_size.states,
+        "nonzeros": found.minimal_size.nonzeros,
+    }
+    return plain(
+        {
+            "scene": found.name,
+            "tolerance": found.tolerance,
+            "effects": [_entry(e) for e in found.entries],
+            "minimal_set": found.minimal_set,
+            "minimal": minimal,
+            "full": {"states": found.size.states, "nonzeros": found.size.nonzeros, "steps": found.size.steps},
+        }
+    )
+
+
+def _entry(e: Entry) -> dict[str, object]:
+    base: dict[str, object] = {"name": e.name, "output_change": None, "cost_ratio": e.cost_ratio, "keep": e.keep}
+    if e.change is None or e.size is None:
+        return {**base, "failure": e.failure}
+    change = {"output_change": e.change.outputs_worst, "outputs": e.change.outputs, "poles_change": e.change.poles}
+    size = {"states": e.size.states, "nonzeros": e.size.nonzeros, "instructions": e.size.instructions}
+    return {**base, **change, "margins_change": e.change.margins, **size}
+
+
+__all__ = ["answer"]

@@ -1,0 +1,320 @@
+"""The effect ledger: what leaving out each effect changes, what it saves, and the smallest set that will do."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.dynamics.run import Run, Status
+from flexctrl.errors import FlexctrlError, StructureError
+from flexctrl.study.answers import Answer, Change, answer_of, change_between
+from flexctrl.study.omissions import Omission, Subject, omissions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Entry", "Ledger", "ledger"]
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a model is made of and what running it took.
+
+    Attributes
+    ----------
+    states : int
+        Of plant and controller.
+    nonzeros : int
+        Of the assembled tangent.
+    instructions : int
+        Of all force kernels, once over the machine.
+    steps, newton_iterations : int
+    work : float
+        Newton iterations × (instructions + nonzeros): a cost that does not depend on the clock.
+    """
+
+    states: int
+    nonzeros: int
+    instructions: int
+    steps: int
+    newton_iterations: int
+
+    @property
+    def work(self) -> float:
+        return float(self.newton_iterations) * (self.instructions + self.nonzeros)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One effect.
+
+    Attributes
+    ----------
+    name : str
+    change : Change or None
+        What the answer loses without it; None if the scene cannot be run without it.
+    cost_ratio : float
+        Time of the full scene over the time without the effect, in the same process; NaN if it cannot be run.
+    size : Size or None
+        Of the scene without it.
+    keep : bool
+        Whether the minimal set has it.
+    failure : str
+        Why the scene cannot do without it; empty if it can.
+    """
+
+    name: str
+    change: Change | None
+    cost_ratio: float
+    size: Size | None
+    keep: bool
+    failure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Ledger:
+    """Every effect of a scene, and the smallest set that keeps the answer.
+
+    Attributes
+    ----------
+    name : str
+        The scene's.
+    tolerance : float
+        Largest change of an output that is borne, over its largest magnitude.
+    entries : tuple of Entry
+        In the scene's order.
+    full : Answer
+    size : Size
+        Of the full scene.
+    minimal : Answer
+        From the scene with the minimal set alone.
+    minimal_change : Change
+        Of the minimal set against the full one: interactions included.
+    speedup : float
+        Time of the full scene over that of the minimal set.
+    minimal_size : Size
+    scene : Scene
+        The scene with the minimal set.
+    """
+
+    name: str
+    tolerance: float
+    entries: tuple[Entry, ...]
+    full: Answer
+    size: Size
+    minimal: Answer
+    minimal_change: Change
+    speedup: float
+    minimal_size: Size
+    scene: Subject = field(repr=False)
+
+    @property
+    def minimal_set(self) -> tuple[str, ...]:
+        """Names of the effects that are kept."""
+        return tuple(e.name for e in self.entries if e.keep)
+
+    def __getitem__(self, name: str) -> Entry:
+        from flexctrl.errors import did_you_mean
+
+        for entry in self.entries:
+            if entry.name == name:
+                return entry
+        raise StructureError(f"the ledger has no effect {name!r}{did_you_mean(name, [e.name for e in self.entries])}")
+
+    def plot(self) -> Figure:
+        """Draw what each effect changes against what it costs.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        return importlib.import_module("flexctrl.plots.ledger").ledger_figure(self)
+
+    def __str__(self) -> str:
+        wide = max([len(e.name) for e in self.entries], default=6)
+        heads = ("outputs", "poles", "margins", "time", "states", "nonzeros")
+        lines = [f"{'without':<{wide}}" + "".join(f"  {head:>9}" for head in heads)]
+        lines += [self._line(e, wide) for e in self.entries]
+        kept = ", ".join(self.minimal_set) or "nothing"
+        change, asked = _percent(self.minimal_change.outputs_worst), _percent(self.tolerance)
+        size = f"{self.minimal_size.states} of {self.size.states} states"
+        lines += [f"kept: {kept}", f"outputs within {change} (asked: {asked}), {self.speedup:.1f} × faster, {size}"]
+        return "\n".join(lines)
+
+    def _line(self, e: Entry, wide: int) -> str:
+        if e.change is None or e.size is None:
+            return f"{e.name:<{wide}}  kept: {e.failure}"
+        changes = (_percent(c) for c in (e.change.outputs_worst, e.change.poles, e.change.margins))
+        cells = (*changes, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)
+        return (f"{e.name:<{wide}}" + "".join(f"  {c:>9}" for c in cells) + ("  keep" if e.keep else "")).rstrip()
+
+
+def ledger(
+    scene: Subject,
+    tolerance: float = 0.01,
+    *,
+    margin_tolerance: float = np.inf,
+    progress: Callable[[float], None] | None = None,
+) -> Ledger:
+    """Draw up the ledger of a scene.
+
+    Every effect is left out in turn and the scene run again. What changes an output by no more than ``tolerance``
+    is a candidate to go. All candidates are left out together; where they do more together than alone, they are
+    taken back, the weightiest first, until the answer holds. An effect whose absence makes the run dearer stays.
+
+    Parameters
+    ----------
+    scene : Scene
+    tolerance : float
+        Largest change of an output over its largest magnitude in the full run.
+    margin_tolerance : float
+        Largest relative change of gain and phase margins; default: margins are told but do not count.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Returns
+    -------
+    Ledger
+
+    Raises
+    ------
+    StructureError
+        For a tolerance that is not positive, or a scene without a simulation.
+    FlexctrlError
+        If the full scene itself cannot be run.
+    """
+    if not tolerance > 0.0:
+        raise StructureError(f"ledger: tolerance = {tolerance}; expected a relative change > 0, e.g. 0.01")
+    return _Auditor(_prepared(scene), tolerance, margin_tolerance, progress or (lambda done: None)).drawn_up()
+
+
+def _prepared(scene: Subject) -> Subject:
+    """The scene with its controller built once, and outputs at even instants."""
+    simulation = scene.simulation
+    if simulation is None:
+        raise StructureError(f"ledger: scene {scene.name!r} has no simulation; give at least until = … (seconds)")
+    every = simulation.every or simulation.until / 1000
+    return scene.with_(controller=scene.law, simulation=replace(simulation, every=every, rigid_twin=False))
+
+
+@dataclass
+class _Trial:
+    """A scene that was run."""
+
+    scene: Subject
+    answer: Answer
+    size: Size
+    wall: float
+
+
+class _Auditor:
+    """The ledger being drawn up."""
+
+    def __init__(self, scene: Subject, tolerance: float, margins: float, progress: Callable[[float], None]) -> None:
+        self.tolerance, self.margins, self.progress = tolerance, margins, progress
+        self.items = omissions(scene)
+        self.done, self.expected = 0, 2 * len(self.items) + 4
+        self.full = self._tried(scene)
+
+    def drawn_up(self) -> Ledger:
+        trials = {o.name: self._without([o]) for o in self.items}
+        gone = self._smallest(trials)
+        minimal = self._without(gone) if gone else self.full
+        assert isinstance(minimal, _Trial)
+        names = {o.name for o in gone}
+        entries = tuple(self._entry(o.name, trials[o.name], o.name not in names) for o in self.items)
+        speedup = self._ratio(minimal)
+        self.progress(1.0)
+        return Ledger(
+            self.full.scene.name,
+            self.tolerance,
+            entries,
+            self.full.answer,
+            self.full.size,
+            minimal.answer,
+            change_between(self.full.answer, minimal.answer),
+            speedup,
+            minimal.size,
+            minimal.scene,
+        )
+
+    def _smallest(self, trials: dict[str, _Trial | str]) -> list[Omission]:
+        """What may go, all at once."""
+        fit = [o for o in self.items if self._may_go(trials[o.name])]
+        fit.sort(key=lambda o: self._weight(trials[o.name]))
+        while fit:
+            together = self._without(fit)
+            if isinstance(together, _Trial) and self._holds(together):
+                return fit
+            fit.pop()
+        return []
+
+    def _may_go(self, trial: _Trial | str) -> bool:
+        if not isinstance(trial, _Trial) or not self._holds(trial):
+            return False
+        return trial.size.work <= 1.05 * self.full.size.work
+
+    def _weight(self, trial: _Trial | str) -> float:
+        assert isinstance(trial, _Trial)
+        return change_between(self.full.answer, trial.answer).outputs_worst
+
+    def _holds(self, trial: _Trial) -> bool:
+        change = change_between(self.full.answer, trial.answer)
+        return change.outputs_worst <= self.tolerance and not change.margins > self.margins
+
+    def _entry(self, name: str, trial: _Trial | str, keep: bool) -> Entry:
+        if isinstance(trial, str):
+            return Entry(name, None, np.nan, None, True, trial)
+        return Entry(name, change_between(self.full.answer, trial.answer), self._ratio(trial), trial.size, keep)
+
+    def _without(self, gone: Iterable[Omission]) -> _Trial | str:
+        """Run the scene without some effects, or say why that cannot be done."""
+        scene = self.full.scene
+        try:
+            for omission in gone:
+                scene = omission.without(scene)
+            return self._tried(scene)
+        except FlexctrlError as error:
+            self._tick()
+            return str(error).splitlines()[0]
+
+    def _tried(self, scene: Subject) -> _Trial:
+        run = scene.run()
+        if run.status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        if run.status is not Status.FINISHED:
+            raise FlexctrlError(f"the run ended early: {run.report.message}")
+        trial = _Trial(scene, answer_of(scene, run), _size(scene, run), run.report.wall_s)
+        self._tick()
+        return trial
+
+    def _ratio(self, trial: _Trial) -> float:
+        """Time of the full scene over that of another, run in turn; each by its quickest run."""
+        if trial is self.full:
+            return 1.0
+        walls = [(self.full.scene.run().report.wall_s, trial.scene.run().report.wall_s) for _ in range(1)]
+        self.full.wall = min(self.full.wall, *(w[0] for w in walls))
+        trial.wall = min(trial.wall, *(w[1] for w in walls))
+        self._tick()
+        return self.full.wall / trial.wall
+
+    def _tick(self) -> None:
+        self.done += 1
+        self.progress(min(0.99, self.done / self.expected))
+
+
+def _size(scene: Subject, run: Run) -> Size:
+    model = scene.model
+    still = np.zeros(model.n)
+    slope = model.slope(model.rest, still, still, (1.0, 1.0, 1.0), np.zeros(len(model.inputs)))
+    instructions = sum(f.count * f.kernels.force.instructions for f in model.forces.families) if model.large else 0
+    states = 2 * model.n + (0 if scene.law is None else len(scene.law.initial()))
+    return Size(states, int(slope.count_nonzero()), instructions, run.report.steps, run.report.newton_iterations)
+
+
+def _percent(value: float) -> str:
+    return "–" if not np.isfinite(value) else f"{100.0 * value:.3g} %"

@@ -1,0 +1,229 @@
+"""What can be left out of a scene: its effects, parts of its damping, the hardware round its controller."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+from flexctrl.design.controller import Controller
+from flexctrl.design.hardware import Sampled
+from flexctrl.design.wrapping import Wrapper
+from flexctrl.dynamics.run import Run
+from flexctrl.effects.damping import RayleighDamping
+from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import BeamFlexibility, Deforming
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
+from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.errors import ControllerError
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.model import Model
+from flexctrl.structure.elements import Beam
+from flexctrl.structure.structure import Structure
+
+__all__ = ["Omission", "Subject", "omissions"]
+
+_STIFF = 1e3
+_RIGIDITIES = {"stretch": ("EA",), "torsion": ("GJ",), "bending": ("EI_y", "EI_z")}
+
+S = TypeVar("S", bound="Subject")
+
+
+class Subject(Protocol):
+    """What a ledger is drawn up for: a `Scene`."""
+
+    @property
+    def structure(self) -> Structure: ...
+
+    @property
+    def effects(self) -> tuple[Effect, ...]: ...
+
+    @property
+    def law(self) -> Controller | None: ...
+
+    @property
+    def model(self) -> Model: ...
+
+    @property
+    def linear(self) -> LinearModel: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def simulation(self) -> Any: ...
+
+    @property
+    def loads(self) -> Mapping[str, Any]: ...
+
+    def run(self, model: Model | None = None, progress: Callable[[float], None] | None = None) -> Run:
+        """Simulate."""
+
+    def with_(
+        self: S,
+        *,
+        structure: Structure | None = ...,
+        effects: Sequence[Effect] | None = ...,
+        controller: Any = ...,
+        loads: Mapping[str, Any] | None = ...,
+        simulation: Any = ...,
+    ) -> S:
+        """Return a copy with some fields replaced."""
+
+
+@dataclass(frozen=True)
+class Omission:
+    """One thing that may be left out of a scene.
+
+    Attributes
+    ----------
+    name : str
+    without : callable
+        Scene → the same without it.
+    """
+
+    name: str
+    without: Callable[[Subject], Subject]
+
+
+def omissions(scene: Subject) -> tuple[Omission, ...]:
+    """Return everything that can be left out of a scene, each once.
+
+    Effects; flexibility part by part; stretch, torsion and bending of the beams (made a thousand times stiffer);
+    large rotation (small motion about the loaded equilibrium instead) and geometric stiffness; each kind of
+    damping; the hardware round the controller.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its controller built.
+
+    Returns
+    -------
+    tuple of Omission
+    """
+    found = [o for e in scene.effects for part in e.parts() for o in _of_effect(part, scene.structure)]
+    if any(d.damping for d in scene.structure.drives):
+        found.append(Omission("drive_damping", _undamped_drives))
+    return (*found, *_of_controller(scene.law))
+
+
+def _of_effect(effect: Effect, structure: Structure) -> list[Omission]:
+    if isinstance(effect, Deforming):
+        return _of_deforming(effect, structure)
+    if isinstance(effect, RayleighDamping):
+        shares = {"mass_damping": "alpha", "stiffness_damping": "beta"}
+        return [
+            Omission(name, partial(_without_share, RayleighDamping, share))
+            for name, share in shares.items()
+            if getattr(effect, share)
+        ]
+    if isinstance(effect, LargeRotation):
+        return [Omission("large_rotation", _small), Omission("geometric_stiffness", _unloaded)]
+    kind = type(effect)
+    return [Omission(snake(kind), partial(_without_effect, kind))]
+
+
+def _of_deforming(effect: Deforming, structure: Structure) -> list[Omission]:
+    """Part by part where there are several; a beam's stretch and torsion also by themselves."""
+    parts = [p for p in (*structure.elements, *structure.drives) if effect.bends(p)]
+    kind = type(effect)
+    if not parts:
+        return []
+    found = [Omission(snake(kind), partial(_without_effect, kind))]
+    if len(parts) > 1:
+        found = [Omission(f"{snake(kind)}_{p.name}", partial(_stiffened_part, kind, p.name)) for p in parts]
+    if isinstance(effect, BeamFlexibility):
+        found += [Omission(f"beam_{name}", partial(_stiffened_section, name)) for name in _RIGIDITIES]
+    return found
+
+
+def _stiffened_part(kind: type[Deforming], name: str, scene: Subject) -> Subject:
+    """One part fewer that deforms; the effect goes with the last."""
+    effect = next((e for e in _flat(scene) if type(e) is kind), None)
+    if effect is None:
+        return scene
+    parts = [p.name for p in (*scene.structure.elements, *scene.structure.drives) if effect.bends(p) and p.name != name]
+    if not parts:
+        return _without_effect(kind, scene)
+    return scene.with_(effects=[kind(parts) if type(e) is kind else e for e in _flat(scene)])
+
+
+def _stiffened_section(name: str, scene: Subject) -> Subject:
+    """All beams hardly give in one way: they keep their freedoms, so nothing is saved."""
+    elements = [
+        replace(e, section=replace(e.section, **{k: _STIFF * getattr(e.section, k) for k in _RIGIDITIES[name]}))
+        if isinstance(e, Beam)
+        else e
+        for e in scene.structure.elements
+    ]
+    return scene.with_(structure=scene.structure.with_(elements=elements))
+
+
+def snake(kind: type) -> str:
+    """Return a type's name as scenes write it: ``rope_stretch``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower()
+
+
+def _flat(scene: Subject) -> list[Effect]:
+    return [part for e in scene.effects for part in e.parts()]
+
+
+def _without_effect(kind: type[Effect], scene: Subject) -> Subject:
+    return scene.with_(effects=[e for e in _flat(scene) if type(e) is not kind])
+
+
+def _small(scene: Subject) -> Subject:
+    """Small motion about the loaded equilibrium."""
+    return scene.with_(effects=[GeometricStiffness() if isinstance(e, LargeRotation) else e for e in _flat(scene)])
+
+
+def _unloaded(scene: Subject) -> Subject:
+    """Small motion as if nothing were loaded."""
+    kinds = (LargeRotation, GeometricStiffness)
+    return scene.with_(effects=[e for e in _flat(scene) if not isinstance(e, kinds)])
+
+
+def _without_share(kind: type[Effect], share: str, scene: Subject) -> Subject:
+    """Leave out one share of an effect."""
+    changed = [replace(e, **{share: 0.0}) if type(e) is kind else e for e in _flat(scene)]  # type: ignore[type-var]
+    return scene.with_(effects=changed)
+
+
+def _undamped_drives(scene: Subject) -> Subject:
+    return scene.with_(
+        structure=scene.structure.with_(drives=[replace(d, damping=0.0) for d in scene.structure.drives])
+    )
+
+
+def _of_controller(law: Controller | None) -> list[Omission]:
+    found = []
+    for kind in dict.fromkeys(type(w) for w in _wrappers(law) if type(w).__module__ == Sampled.__module__):
+        try:
+            _peeled(law, kind)
+        except ControllerError:  # what is wrapped round it cannot do without
+            continue
+        found.append(Omission(snake(kind), partial(_without_hardware, kind)))
+    return found
+
+
+def _without_hardware(kind: type[Wrapper], scene: Subject) -> Subject:
+    return scene.with_(controller=_peeled(scene.law, kind))
+
+
+def _wrappers(law: Controller | None) -> list[Wrapper]:
+    return [law, *_wrappers(law.controller)] if isinstance(law, Wrapper) else []
+
+
+def _peeled(law: Any, kind: type[Wrapper]) -> Any:
+    """Return a controller without one kind of wrapper."""
+    if not isinstance(law, Wrapper):
+        return law
+    if isinstance(law, Sampled) and kind is Sampled:
+        return law.original
+    inner = _peeled(law.controller, kind)
+    if type(law) is kind:
+        return inner
+    return law if inner is law.controller else replace(law, controller=inner)

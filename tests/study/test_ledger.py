@@ -1,0 +1,132 @@
+"""The effect ledger: what it says of each effect is what happens without it."""
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import TROLLEY
+
+import flexctrl as fc
+from flexctrl.errors import StructureError
+from flexctrl.scene.files import scene_from
+from flexctrl.scene.reading import Place
+from flexctrl.study.answers import answer_of, change_between
+
+
+def trolley(**changes) -> fc.Scene:
+    content = tomllib.loads(TROLLEY)
+    content["simulation"] |= {"until": 0.1, "step": 5e-3}
+    content["effects"] |= changes.pop("effects", {})
+    return scene_from(content | changes, Place("trolley.toml"), "trolley")
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return trolley()
+
+
+@pytest.fixture(scope="module")
+def drawn_up(scene):
+    return fc.ledger(scene, 0.01)
+
+
+def test_every_effect_has_a_line(drawn_up):
+    assert [e.name for e in drawn_up.entries] == [
+        "gravity",
+        "shaft_elasticity",
+        "rope_stretch",
+        "large_rotation",
+        "geometric_stiffness",
+        "stiffness_damping",
+        "saturated",
+        "sampled",
+    ]
+
+
+def test_the_change_is_that_of_a_run_without(scene, drawn_up):
+    full = scene.run()
+    without = scene.with_(effects=[fc.Gravity(), fc.ShaftElasticity(), fc.LargeRotation(), scene.effects[-1]]).run()
+    for name, change in drawn_up["rope_stretch"].change.outputs.items():
+        size = np.abs(full[name]).max()
+        expected = np.abs(np.interp(full.t, without.t, without[name]) - full[name]).max() / size
+        assert change == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_poles_are_those_of_the_closed_loop(scene, drawn_up):
+    """The slow pole of the controlled trolley, from the closed loop's own state matrix."""
+    from flexctrl.study.broken_loop import broken_loop, linear_law
+
+    loop = broken_loop(scene.linear, linear_law(scene.law), "torque")
+    poles = np.log(loop.closed_poles(1.0)) / scene.law.sample_time
+    for pole in drawn_up.full.poles:
+        assert np.abs(poles - pole).min() < 1e-6 * abs(pole)
+
+
+def test_the_minimal_set_was_run_against_the_full_one(scene, drawn_up):
+    again = change_between(answer_of(scene, scene.run()), answer_of(drawn_up.scene, drawn_up.scene.run()))
+    assert again.outputs_worst == pytest.approx(drawn_up.minimal_change.outputs_worst, rel=1e-6)
+    assert again.outputs_worst <= drawn_up.tolerance
+
+
+def test_what_matters_is_kept_and_what_does_not_is_not(drawn_up):
+    for entry in drawn_up.entries:
+        if entry.change is None or entry.change.outputs_worst > drawn_up.tolerance:
+            assert entry.keep
+    assert not drawn_up["saturated"].keep  # the limit is never reached
+    assert drawn_up["saturated"].change.outputs_worst == 0.0
+
+
+def test_a_tight_tolerance_keeps_what_a_loose_one_drops(scene, drawn_up):
+    tight = fc.ledger(scene, 1e-9)
+    assert set(tight.minimal_set) > set(drawn_up.minimal_set)
+    assert "saturated" not in tight.minimal_set
+
+
+@pytest.mark.slow
+def test_an_effect_of_no_strength_changes_nothing():
+    scene = trolley(effects={"rayleigh_damping": {"alpha": 1e-15, "beta": 0.0}})
+    entry = fc.ledger(scene, 1e-6)["mass_damping"]
+    assert entry.change.outputs_worst < 1e-12
+
+
+def test_leaving_out_flexibility_takes_states_away(drawn_up):
+    full = drawn_up.size.states
+    assert drawn_up["shaft_elasticity"].size.states == full - 2
+    assert drawn_up["rope_stretch"].size.states == full - 2
+    assert drawn_up["saturated"].size == drawn_up.size
+
+
+@pytest.mark.slow
+def test_margins_can_be_held_too(scene):
+    held = fc.ledger(scene, 0.01, margin_tolerance=1e-12)
+    for entry in held.entries:
+        if not entry.keep:
+            assert not entry.change.margins > 1e-12
+    assert not held.minimal_change.margins > 1e-12
+
+
+def test_its_words_and_picture(drawn_up):
+    text = str(drawn_up)
+    assert "rope_stretch" in text
+    assert "× faster" in text
+    figure = drawn_up.plot()
+    assert len(figure.axes) == 2
+
+
+def test_wrong_questions_are_answered(scene, drawn_up):
+    with pytest.raises(StructureError, match="tolerance"):
+        fc.ledger(scene, 0.0)
+    with pytest.raises(StructureError, match="did you mean 'rope_stretch'"):
+        drawn_up["rope_strech"]
+    with pytest.raises(StructureError, match="no simulation"):
+        fc.ledger(replace(scene, simulation=None))
+
+
+@pytest.mark.slow
+def test_what_cannot_be_left_out_is_kept_with_the_reason():
+    """Without its rope's stretch the crane has no tension to measure: the output is gone."""
+    outputs = tomllib.loads(TROLLEY)["outputs"] | {"pull": {"kind": "tension", "line": "rope"}}
+    entry = fc.ledger(trolley(outputs=outputs), 0.01)["rope_stretch"]
+    assert entry.keep
+    assert entry.change.outputs["pull"] == 1.0
