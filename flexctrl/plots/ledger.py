@@ -56,7 +56,7 @@ def change_bars(ax: Axes, ledger: Ledger) -> Axes:
     ax.barh(rows, changes, left=_LEAST, color=[_colour(e) for e in ledger.entries], height=0.66)
     for row, entry in zip(rows, ledger.entries, strict=True):
         if entry.change is None:
-            ax.text(2 * _LEAST, row, "cannot be left out", va="center", fontsize=8, color=INK)
+            ax.text(2 * _LEAST, float(row), "cannot be left out", va="center", fontsize=8, color=INK)
     ax.axvline(ledger.tolerance, color=RIGID, linewidth=1.2)
     ax.set_xscale("log")
     ax.set_yticks(rows, [e.name.replace("_", " ") for e in ledger.entries])
