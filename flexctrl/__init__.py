@@ -19,6 +19,8 @@ _HOMES = {
         "AngularVelocity",
         "DriveAngle",
         "DriveSpeed",
+        "FollowerForce",
+        "FollowerTorque",
         "Force",
         "MotorTorque",
         "Position",

@@ -110,7 +110,7 @@ class Balance:
 
     def scale(self, state: State) -> float:
         """Return the forces at work: all loads and weights together [N]."""
-        loads = np.abs(self.model.signals.loads @ self.u).sum()
+        loads = np.abs(self.model.signals.loads_at(state) @ self.u).sum()
         weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
         return float(max(loads, weights, np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0), 1e-300))
 

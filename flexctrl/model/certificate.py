@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,7 +26,7 @@ class Certificate:
     residual : float
         Largest unbalanced force at the equilibrium over the forces at work.
     asymmetry : float
-        max |K − Kᵀ| / max |K| before K was made symmetric.
+        max |K − Kᵀ| / max |K|, before K was made symmetric where no load explains it.
     definiteness : float
         Smallest pivot of the scaled mass matrix; not negative.
     taylor_slope : float
@@ -36,6 +36,8 @@ class Certificate:
         Motions without stiffness, in words.
     condition_mass, condition_stiffness : float
         Condition numbers (1-norm) after scaling by the diagonal; infinite where singular.
+    loads : tuple of str
+        Loads at work without a potential; they may make K unsymmetric, and what they add is kept.
     """
 
     residual: float
@@ -45,11 +47,13 @@ class Certificate:
     rigid_modes: tuple[str, ...]
     condition_mass: float
     condition_stiffness: float
+    loads: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         rigid = "; ".join(self.rigid_modes) or "none"
+        why = f" (by {', '.join(self.loads)})" if self.loads else ""
         return (
-            f"equilibrium residual {self.residual:.1e}, asymmetry of K {self.asymmetry:.1e}, "
+            f"equilibrium residual {self.residual:.1e}, asymmetry of K {self.asymmetry:.1e}{why}, "
             f"smallest pivot of M {self.definiteness:.1e}, Taylor slope {self.taylor_slope:.2f}, "
             f"condition of M {self.condition_mass:.1e}, of K {self.condition_stiffness:.1e}; rigid-body modes: {rigid}"
         )
@@ -92,6 +96,7 @@ def certify(
     residual: float,
     asymmetry: float,
     slope: float,
+    loads: tuple[str, ...],
     motion: Motion,
     state: State,
 ) -> Certificate:
@@ -103,10 +108,10 @@ def certify(
         If a point of it fails: says which and what to do.
     """
     definiteness = _smallest_pivot(linear.M)
-    if asymmetry > _ASYMMETRY:
+    if asymmetry > _ASYMMETRY and not loads:
         raise LinearizationError(
-            f"linearize: K is not symmetric ({asymmetry:.1e} of its largest entry): a load that turns with the machine "
-            "or a torque about a fixed axis has no energy. Leave that input out of the equilibrium, or analyse in time"
+            f"linearize: K is not symmetric ({asymmetry:.1e} of its largest entry) though every load has a potential: "
+            "an effect whose force is not the gradient of its energy"
         )
     if definiteness < -1e-10:
         raise LinearizationError(f"linearize: M is not positive (pivot {definiteness:.1e} after scaling)")
@@ -123,6 +128,7 @@ def certify(
         rigid_modes(linear, motion, state),
         _condition(linear.M),
         _condition(linear.K),
+        loads,
     )
 
 
@@ -158,6 +164,7 @@ def _condition(A: sp.csc_matrix) -> float:
 
 def rigid_modes(linear: LinearModel, motion: Motion, state: State) -> tuple[str, ...]:
     """Say in words which motions have no stiffness: of the whole machine first, then of what is left."""
+    linear = replace(linear, K=(0.5 * (linear.K + linear.K.T)).tocsc())
     modes = linear.modes(min(linear.M.shape[0], 20))
     if not modes.rigid:
         return ()

@@ -91,7 +91,8 @@ def complete_pairs(
         scale = _first_flexible(pencil, lam, phi, sigma)
         if scale == 0.0 or 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
             break
-        sigma = pencil.below_all(-scale)
+        # twice: at −scale there may be an eigenvalue, the negative one that set the scale
+        sigma = pencil.below_all(-2.0 * scale)
     return _settled(pencil, lam, phi, sigma)
 
 
@@ -123,7 +124,7 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
         if scale == 0.0 and 2 * wanted < n - 2:
             wanted *= 2
         elif scale > 0.0 and not 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
-            sigma = -scale
+            sigma = -2.0 * scale
         elif _none_missed(pencil, lam, count):
             pairs = _settled(pencil, lam, phi, sigma)
             return Eigenpairs(pairs.values, pairs.shapes[np.argsort(order)], pairs.rigid)

@@ -15,12 +15,17 @@ from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linear import LinearModel, PartMatrices
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque
 
-_BALANCED = 1e-6
+_BALANCED, _ROUND_OFF = 1e-6, 1e-12
 
 
 def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str, float] | None = None) -> LinearModel:
     """Return the linear model about an equilibrium: M q̈ + C q̇ + K q = B u, geometric stiffness in K.
+
+    K is symmetric unless loads without a potential are at work (`FollowerForce`, `FollowerTorque`, or a
+    `Torque` about a fixed axis): then what they add is kept, the certificate names them, and the damped poles
+    tell flutter from divergence.
 
     Parameters
     ----------
@@ -56,22 +61,34 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     held = set(range(model.n)) - set(free.tolist())
     balance = Balance(model, u, {i: float(state.q[i]) for i in sorted(held)})
     residual = _check_balance(balance, state)
-    linear, asymmetry = _derivative(model, state, u, free)
+    loads = _without_energy(model, u)
+    linear, asymmetry = _derivative(model, state, u, free, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
-    return replace(linear, certificate=certify(linear, residual, asymmetry, slope, model.motion, state))
+    return replace(linear, certificate=certify(linear, residual, asymmetry, slope, loads, model.motion, state))
 
 
-def _derivative(model: Model, state: State, u: np.ndarray, free: np.ndarray) -> tuple[LinearModel, float]:
+def _without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:
+    """The loads at work that have no potential: they may make K unsymmetric."""
+    kinds = (FollowerForce, FollowerTorque, Torque)
+    signals = model.structure.inputs if model.large else ()
+    return tuple(s.name for s, value in zip(signals, u, strict=False) if value and isinstance(s, kinds))
+
+
+def _derivative(
+    model: Model, state: State, u: np.ndarray, free: np.ndarray, unsymmetric: bool
+) -> tuple[LinearModel, float]:
     zero = np.zeros(model.n)
     seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     K, C, M = (-model.slope(state, zero, zero, seed, u)[free][:, free] for seed in seeds)
+    largest = float(abs(K).max()) if K.nnz else 0.0
+    asymmetry = float(abs(K - K.T).max()) / max(largest, 1e-300) if K.nnz else 0.0
     T = model.motion.jacobian(state if model.large else model.rest)[:, free]
     on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=zero)), model.motion.raw)
     linear = LinearModel(
         M=_symmetric(M),
         C=C.tocsc(),
-        K=_symmetric(K),
-        B=(T.T @ model.signals.loads).toarray(),
+        K=K.tocsc() if unsymmetric and asymmetry > _ROUND_OFF else _symmetric(K),
+        B=(T.T @ model.signals.loads_at(state if model.large else model.rest)).toarray(),
         Cq=(on_place @ T).toarray(),
         Cv=(on_rates @ T).toarray(),
         D=np.zeros((len(model.outputs), len(model.inputs))),
@@ -81,8 +98,7 @@ def _derivative(model: Model, state: State, u: np.ndarray, free: np.ndarray) -> 
         name=model.structure.name,
         parts=_parts(model, state, free),
     )
-    gap = float(abs(K - K.T).max()) if K.nnz else 0.0
-    return linear, gap / max(float(abs(K).max()) if K.nnz else 0.0, 1e-300)
+    return linear, asymmetry
 
 
 def _push(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarray]:

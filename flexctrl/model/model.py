@@ -194,7 +194,8 @@ class Model:
         -------
         numpy.ndarray, shape (n,)
         """
-        return self.motion.collect(state if self.large else self.rest, self.signals.loads @ u)
+        place = state if self.large else self.rest
+        return self.motion.collect(place, self.signals.loads_at(place) @ u)
 
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the sum of all forces on the degrees of freedom except the inputs; zero when they obey.
@@ -244,7 +245,10 @@ class Model:
         scipy.sparse.csr_matrix, shape (n, n)
         """
         if self.large:
-            slope = self.forces.slope(state, v, a, seeds, self.signals.loads @ u, excess)
+            slope = self.forces.slope(state, v, a, seeds, self.signals.loads_at(state) @ u, excess)
+            if seeds[0] and self.signals.follows:
+                T = self.motion.jacobian(state)
+                slope = (slope + seeds[0] * (T.T @ self.signals.turning(state, u) @ T)).tocsr()
             return slope - seeds[1] * self.viscous if self.viscous.nnz else slope
         small = self._small
         return -(seeds[0] * small.K + seeds[1] * small.C + seeds[2] * small.M).tocsr()

@@ -204,7 +204,10 @@ def modes(linear: LinearModel, count: int | None = None) -> Modes:
     MechanismError
         For a motion with neither mass nor stiffness.
     """
-    return modes_of(linear, scaled(linear), count)
+    base = scaled(linear)
+    if linear.certificate is not None and linear.certificate.loads:
+        refuse_unsymmetric(base.model.K, 1e-13)
+    return modes_of(linear, base, count)
 
 
 def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
@@ -242,15 +245,16 @@ def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenp
     return Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid)
 
 
-def refuse_unsymmetric(K: sp.spmatrix) -> None:
-    """Raise LinearizationError if K is not symmetric to 1e-9 of its largest entry (scaled).
+def refuse_unsymmetric(K: sp.spmatrix, limit: float = 1e-9) -> None:
+    """Raise LinearizationError if K is not symmetric to a share of its largest entry (scaled).
 
     Parameters
     ----------
     K : sparse matrix, shape (n, n)
+    limit : float
     """
     skew = abs(K - K.T).max() / max(abs(K).max(), np.finfo(float).tiny) if K.nnz else 0.0
-    if skew > 1e-9:
+    if skew > limit:
         raise LinearizationError(
             f"K is not symmetric (relative difference {skew:.1e}; follower loads?): undamped modes do not "
             "exist as real shapes; use damped_poles()"

@@ -262,6 +262,6 @@ def _rest(course: Course, station: Station) -> Rest:
     model = balance.model
     outputs = dict(zip(model.outputs, model.measure(station.state).tolist(), strict=True))
     held = tuple(model.coordinates[i] for i in balance.held)
-    loads = float(np.abs(model.signals.loads @ (course.factor_scale * course.load)).sum())
+    loads = float(np.abs(model.signals.loads_at(station.state) @ (course.factor_scale * course.load)).sum())
     residual = balance.relative(balance.force(station.state), max(balance.scale(station.state), loads))
     return Rest(station.state, residual, outputs, balance.u, station.iterations, held, station.unstable)

@@ -19,6 +19,8 @@ from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
+    FollowerForce,
+    FollowerTorque,
     Force,
     Input,
     MotorTorque,
@@ -47,18 +49,49 @@ class Measure:
 
 
 @dataclass(frozen=True)
+class Following:
+    """An input that turns with a node: number of input and node, first raw cell it pushes, direction at rest."""
+
+    input: int
+    node: int
+    cell: int
+    direction: np.ndarray
+
+
+@dataclass(frozen=True)
 class Signals:
     """What acts on a model and what is measured of it.
 
     Attributes
     ----------
     loads : scipy.sparse.csr_matrix, shape (raw, inputs)
-        Raw forces of unit inputs.
+        Raw forces of unit inputs that keep their directions.
+    follows : tuple of Following
+        Those that turn with their nodes.
     measures : tuple of Measure
     """
 
     loads: sp.csr_matrix
+    follows: tuple[Following, ...]
     measures: tuple[Measure, ...]
+
+    def loads_at(self, state: State) -> sp.csr_matrix:
+        """Return the raw forces of unit inputs in a state, shape (raw, inputs)."""
+        if not self.follows:
+            return self.loads
+        turned = [(f.cell + k, f.input, v) for f in self.follows for k, v in enumerate(state.R[f.node] @ f.direction)]
+        raw, inputs = self.loads.shape
+        return self.loads + _matrix(turned, raw, inputs)
+
+    def turning(self, state: State, u: np.ndarray) -> sp.csr_matrix:
+        """Return ∂(raw forces of the inputs)/∂(raw motion): those that follow turn with their nodes, F → F + δ×F."""
+        entries = []
+        for f in self.follows:
+            x, y, z = u[f.input] * (state.R[f.node] @ f.direction)
+            skew = ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
+            spins = 6 * f.node + 3
+            entries += [(f.cell + i, spins + j, skew[i][j]) for i in range(3) for j in range(3)]
+        return _matrix(entries, self.loads.shape[0], self.loads.shape[0])
 
     def outputs(self, state: State, rates: np.ndarray) -> np.ndarray:
         """Return the outputs of a state with raw rates."""
@@ -87,14 +120,24 @@ def signals_of(structure: Structure, effects: tuple[Effect, ...], motion: Motion
         for cell, value in _load(structure, motion, signal)
     ]
     loads = _matrix(entries, motion.raw, len(structure.inputs))
-    return Signals(loads, tuple(_measure(structure, effects, motion, o) for o in structure.outputs))
+    follows = tuple(f for i, signal in enumerate(structure.inputs) for f in _follow(structure, i, signal))
+    return Signals(loads, follows, tuple(_measure(structure, effects, motion, o) for o in structure.outputs))
 
 
 def _load(s: Structure, motion: Motion, signal: Input) -> list[tuple[int, float]]:
     if isinstance(signal, MotorTorque):
         return [(motion.source_base + _drive(s, signal.drive), 1.0)]
+    if isinstance(signal, FollowerForce | FollowerTorque):
+        return []
     offset = 0 if isinstance(signal, Force) else 3
     return [(6 * s.number(n) + offset + k, d) for n in signal.at for k, d in enumerate(signal.direction) if d]
+
+
+def _follow(s: Structure, number: int, signal: Input) -> list[Following]:
+    if not isinstance(signal, FollowerForce | FollowerTorque):
+        return []
+    offset, direction = 0 if isinstance(signal, FollowerForce) else 3, np.array(signal.direction)
+    return [Following(number, s.number(n), 6 * s.number(n) + offset, direction) for n in signal.at]
 
 
 def _drive(s: Structure, name: str) -> int:

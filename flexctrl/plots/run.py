@@ -15,6 +15,7 @@ from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
+    FollowerForce,
     Force,
     Position,
     Rotation,
@@ -34,6 +35,7 @@ _UNITS: dict[type, str] = {
     DriveSpeed: "rad/s",
     SwayAngle: "rad",
     Tension: "N",
+    FollowerForce: "N",
     Force: "N",
 }
 

@@ -35,6 +35,8 @@ from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
+    FollowerForce,
+    FollowerTorque,
     Force,
     MotorTorque,
     Position,
@@ -250,6 +252,8 @@ def _input_kinds(node: Reader) -> dict[str, Kind]:
     return {
         "force": Kind(Force, {"at": nodes, "direction": direction}),
         "torque": Kind(Torque, {"at": nodes, "axis": direction}),
+        "follower_force": Kind(FollowerForce, {"at": nodes, "direction": direction}),
+        "follower_torque": Kind(FollowerTorque, {"at": nodes, "axis": direction}),
         "motor_torque": Kind(MotorTorque, {"drive": text}),
     }
 

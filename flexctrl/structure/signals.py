@@ -83,6 +83,55 @@ class Torque:
 
 
 @dataclass(frozen=True)
+class FollowerForce:
+    """Input: a force that turns with its node, in N, on one node or on each of several.
+
+    Such a load has no energy: the stiffness of a machine under it is not symmetric, and it may flutter
+    (thrusters, jets, contact forces square to a surface).
+
+    Parameters
+    ----------
+    name : str
+    at : Node or sequence of Node
+    direction : str or sequence of 3 floats
+        Direction in the machine as drawn; it turns with the node.
+    """
+
+    name: str
+    at: tuple[Node, ...]
+    direction: Vector
+
+    def __init__(self, name: str, at: Node | Sequence[Node], direction: str | Sequence[float]) -> None:
+        owner = f"FollowerForce {check_signal(name, 'FollowerForce')!r}"
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "at", _nodes(at, owner, rotations=True))
+        object.__setattr__(self, "direction", parse_direction(direction, owner))
+
+
+@dataclass(frozen=True)
+class FollowerTorque:
+    """Input: a torque about an axis that turns with its node, in N m, on one node or on each of several.
+
+    Parameters
+    ----------
+    name : str
+    at : Node or sequence of Node
+    axis : str or sequence of 3 floats
+        Axis in the machine as drawn; it turns with the node.
+    """
+
+    name: str
+    at: tuple[Node, ...]
+    direction: Vector
+
+    def __init__(self, name: str, at: Node | Sequence[Node], axis: str | Sequence[float]) -> None:
+        owner = f"FollowerTorque {check_signal(name, 'FollowerTorque')!r}"
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "at", _nodes(at, owner, rotations=True))
+        object.__setattr__(self, "direction", parse_direction(axis, owner))
+
+
+@dataclass(frozen=True)
 class MotorTorque:
     """Input: the torque M_d of a drive's motor on its source angle θ_d, in N m.
 
@@ -305,13 +354,15 @@ class Tension:
         object.__setattr__(self, "line", _name_of(line, (Rope, Spring), f"Tension {name!r}: line"))
 
 
-Input: TypeAlias = Force | Torque | MotorTorque
+Input: TypeAlias = Force | Torque | FollowerForce | FollowerTorque | MotorTorque
 Output: TypeAlias = Position | Velocity | Rotation | AngularVelocity | DriveAngle | DriveSpeed | SwayAngle | Tension
 
 __all__ = [
     "AngularVelocity",
     "DriveAngle",
     "DriveSpeed",
+    "FollowerForce",
+    "FollowerTorque",
     "Force",
     "Input",
     "MotorTorque",

@@ -19,6 +19,8 @@ from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
+    FollowerForce,
+    FollowerTorque,
     Force,
     Input,
     MotorTorque,
@@ -45,7 +47,7 @@ class Structure:
     joints : sequence of Support, Weld, Pin, Hinge or Slide, or a JoinTable
         How nodal freedoms are tied. A `JoinTable` made from rows may stand in place of joints.
     drives : sequence of RotaryDrive or LinearDrive
-    inputs : sequence of Force, Torque or MotorTorque
+    inputs : sequence of Force, Torque, FollowerForce, FollowerTorque or MotorTorque
     outputs : sequence of Position, Velocity, Rotation, …
     name : str
 
@@ -272,7 +274,7 @@ def _check_nodes(s: Structure) -> None:
 
 
 def _signal_nodes(signal: Input | Output) -> tuple[Node | None, ...]:
-    if isinstance(signal, Force | Torque):
+    if isinstance(signal, Force | Torque | FollowerForce | FollowerTorque):
         return signal.at
     if isinstance(signal, Position | Velocity | Rotation | AngularVelocity):
         return (signal.at, signal.minus)
