@@ -81,7 +81,7 @@ _HOMES = {
     "flexctrl.study.loop": ("Loop", "open_loop"),
     "flexctrl.study.broken_loop": ("broken_loop",),
     "flexctrl.study.frequency": ("Margins", "margins", "peak_gain"),
-    "flexctrl.study.root_locus": ("CriticalGain", "critical_gains", "root_locus"),
+    "flexctrl.study.root_locus": ("CriticalGain", "RootLocus", "critical_gains", "root_locus"),
     "flexctrl.study.zeros": ("SensorChoice", "Zeros", "sensor_choices", "zeros"),
     "flexctrl.study.compare": ("Comparison", "compare"),
     "flexctrl.study.ledger": ("Ledger", "ledger"),
@@ -90,6 +90,10 @@ _HOMES = {
     "flexctrl.study.amplitudes": ("ConstantLoad", "InitialDisplacement", "InitialMode", "InitialSpeed"),
     "flexctrl.study.predictions": ("CurveDifference", "Deflection", "FinalValue", "Frequency", "Peak", "Period"),
     "flexctrl.study.envelope": ("Envelope", "validity_envelope"),
+    "flexctrl.plots.frequency": ("plot_bode",),
+    "flexctrl.plots.loops": ("plot_nichols", "plot_nyquist", "plot_sensitivities"),
+    "flexctrl.plots.root_locus": ("plot_root_locus",),
+    "flexctrl.plots.reduction": ("plot_reduction",),
     "flexctrl.scene": ("Scene", "Simulation", "Start", "load_scene"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
-from flexctrl.cli.loops import Cut, cut_of, in_s
+from flexctrl.cli.loops import Cut, cut_of
 from flexctrl.cli.program import Request
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.response import FrequencyResponse
-from flexctrl.plots.frequency import mark_margins, plot_bode
+from flexctrl.plots.frequency import plot_bode
+from flexctrl.plots.loops import mark_margins
 from flexctrl.scene import load_scene
 from flexctrl.study.frequency import Margins, loop_grid, margins
 from flexctrl.study.loop import Loop
+from flexctrl.study.root_locus import in_s
 
 
 def answer(request: Request) -> Answer:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -101,12 +100,4 @@ def _chosen(kind: str, wanted: str, known: tuple[str, ...], first: tuple[str, ..
     return wanted or first[0]
 
 
-def in_s(z: Any, dt: float) -> np.ndarray:
-    """Return poles or zeros of a sampled loop where they would be in the s-plane, ln(z)/dt; s stays s."""
-    points = np.asarray(z, complex)
-    if not dt:
-        return points
-    return np.log(np.where(points == 0, 1e-300, points)) / dt
-
-
-__all__ = ["Cut", "cut_of", "in_s"]
+__all__ = ["Cut", "cut_of"]

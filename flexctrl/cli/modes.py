@@ -31,7 +31,8 @@ def answer(request: Request) -> Answer:
 
     def draw(figure: object) -> None:
         chosen = range(first, first + shown)
-        modes_figure(figure, scene.model, scene.linear, scene.rest.state, modes, chosen)  # type: ignore[arg-type]
+        assert modes.place is not None
+        modes_figure(figure, modes.place, modes, chosen)  # type: ignore[arg-type]
 
     write_picture(request.out, "modes.png", draw, size=(12.0, 10.0))
     return Answer(_text(scene, data), data)

@@ -8,8 +8,12 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from flexctrl.errors import ControllerError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Constant", "PiecewisePolynomial", "Sum", "Trajectory"]
 
@@ -37,6 +41,22 @@ class Trajectory(ABC):
     def breaks(self) -> tuple[float, ...]:
         """Instants at which the value or a derivative jumps, s."""
         return ()
+
+    def plot(self, until: float | None = None) -> Figure:
+        """Draw value, rate and acceleration.
+
+        Parameters
+        ----------
+        until : float, optional
+            End of the time axis [s]; default: a tenth past the last break.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.design import trajectory_figure
+
+        return trajectory_figure(self, until)
 
     @property
     def shortest_period(self) -> float:

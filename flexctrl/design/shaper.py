@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
 from flexctrl.errors import ControllerError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Mode", "Shaper", "check_mode", "convolve"]
 
@@ -51,6 +54,17 @@ class Shaper:
             raise ControllerError(f"the times of a shaper must increase from 0 or later: {self.times}")
         if abs(sum(self.amplitudes) - 1) > 1e-9:
             raise ControllerError(f"the amplitudes of a shaper must sum to 1, not {sum(self.amplitudes)}")
+
+    def plot(self) -> Figure:
+        """Draw the impulses, and what vibration they leave over frequency.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.design import shaper_figure
+
+        return shaper_figure(self)
 
     @property
     def duration(self) -> float:

@@ -14,6 +14,8 @@ from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.motion import State
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from flexctrl.dynamics.checkpoint import Checkpoint
     from flexctrl.dynamics.dense import Track
     from flexctrl.dynamics.events import Occurrence
@@ -248,7 +250,7 @@ class Run:
         values = (*track.feed.model.measure(state).tolist(), *u.tolist())
         return Moment(state.t, state, dict(zip((*self.outputs, *self.inputs), values, strict=True)))
 
-    def plot(self, signals: tuple[str, ...] | None = None) -> np.ndarray:
+    def plot(self, signals: tuple[str, ...] | None = None) -> Figure:
         """Draw curves over time, one axes a signal.
 
         Parameters
@@ -258,11 +260,11 @@ class Run:
 
         Returns
         -------
-        numpy.ndarray of matplotlib.axes.Axes
+        matplotlib.figure.Figure
         """
-        import importlib
+        from flexctrl.plots.run import run_figure
 
-        return importlib.import_module("flexctrl.plots.run").plot_run(self, signals)
+        return run_figure(self, signals)
 
     def save_csv(self, path: str | Path) -> None:
         """Write time, outputs and inputs as columns.

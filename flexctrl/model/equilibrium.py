@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.pivots import holds, negative_pivots
 from flexctrl.model.search import Found, Newton, follow
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _SOFT_REACH = 0.3
 
@@ -32,6 +36,7 @@ class Rest:
     inputs : numpy.ndarray, shape (inputs,)
         The inputs it is in equilibrium with.
     iterations : int
+    model : Model
     held : tuple of str
         Coordinates that were held.
     unstable : int
@@ -45,6 +50,7 @@ class Rest:
     outputs: dict[str, float]
     inputs: np.ndarray
     iterations: int
+    model: Model = field(repr=False)
     held: tuple[str, ...] = ()
     unstable: int = 0
 
@@ -52,6 +58,17 @@ class Rest:
     def stable(self) -> bool:
         """Whether no small disturbance alone makes the machine leave; loads that follow it may still flutter."""
         return self.unstable == 0
+
+    def plot(self) -> Figure:
+        """Draw the machine at rest over the machine as drawn; small displacements are enlarged.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.overview import rest_figure
+
+        return rest_figure(self)
 
 
 def equilibrium(
@@ -109,7 +126,7 @@ def rest_of(balance: Balance, found: Found) -> Rest:
     outputs = dict(zip(model.outputs, model.measure(found.state).tolist(), strict=True))
     held = tuple(model.coordinates[i] for i in balance.held)
     unstable = negative_pivots(balance.among_free(balance.slope(found.state)))
-    return Rest(found.state, found.residual, outputs, balance.u, found.iterations, held, unstable)
+    return Rest(found.state, found.residual, outputs, balance.u, found.iterations, model, held, unstable)
 
 
 def _found(balance: Balance, start: State, tolerance: float) -> Found:

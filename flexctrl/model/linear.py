@@ -15,17 +15,20 @@ from flexctrl.errors import LinearizationError, StructureError, did_you_mean
 
 if TYPE_CHECKING:
     import control
+    from matplotlib.figure import Figure
 
     from flexctrl.model.certificate import Certificate
     from flexctrl.model.condense import Audit
     from flexctrl.model.discrete import Hold
     from flexctrl.model.modal import ModalSystem
+    from flexctrl.model.model import Model
     from flexctrl.model.modes import Modes
+    from flexctrl.model.motion import State
     from flexctrl.model.reduction import Method, Reduced, RelativeError
     from flexctrl.model.response import FrequencyResponse
     from flexctrl.model.statespace import Form
 
-__all__ = ["LinearModel", "PartMatrices"]
+__all__ = ["LinearModel", "PartMatrices", "Place"]
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,24 @@ class PartMatrices:
 
     stiffness: sp.csc_matrix
     mass: sp.csc_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """The machine that a linear model is of: for drawing its modes.
+
+    Attributes
+    ----------
+    model : Model
+    state : State
+        The equilibrium.
+    basis : scipy.sparse.csc_matrix, shape (model.n, n)
+        Displacements of the machine's degrees of freedom for one of each coordinate.
+    """
+
+    model: Model
+    state: State
+    basis: sp.csc_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +85,8 @@ class LinearModel:
         Each part's share of K and M; empty where unknown.
     certificate : Certificate, optional
         What `linearize` checked; absent in models made from matrices.
+    place : Place, optional
+        The machine; absent in models made from matrices.
     """
 
     M: sp.csc_matrix
@@ -79,6 +102,7 @@ class LinearModel:
     name: str = "linear"
     parts: Mapping[str, PartMatrices] = field(default_factory=dict)
     certificate: Certificate | None = None
+    place: Place | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         n, m, p = len(self.coordinates), len(self.inputs), len(self.outputs)
@@ -155,6 +179,7 @@ class LinearModel:
             Cv=(T.T @ self.Cv.T).T,
             coordinates=tuple(coordinates),
             parts=parts,
+            place=self.place and replace(self.place, basis=sp.csc_matrix(self.place.basis @ T)),
         )
 
     # -- analysis
@@ -221,6 +246,17 @@ class LinearModel:
         from flexctrl.model.reduction import ModalTruncation, reduce
 
         return reduce(self, to, using or ModalTruncation)
+
+    def plot(self) -> Figure:
+        """Draw the poles and the frequency response of every channel.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.frequency import linear_figure
+
+        return linear_figure(self)
 
     # -- export
 

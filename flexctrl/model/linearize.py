@@ -12,7 +12,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.model.balance import Balance
 from flexctrl.model.certificate import certify, taylor_slope
 from flexctrl.model.equilibrium import Rest, equilibrium
-from flexctrl.model.linear import LinearModel, PartMatrices
+from flexctrl.model.linear import LinearModel, PartMatrices, Place
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque
@@ -97,6 +97,7 @@ def _derivative(
         outputs=model.outputs,
         name=model.structure.name,
         parts=_parts(model, state, free),
+        place=Place(model, state, sp.identity(model.n, format="csc")[:, free]),
     )
     return linear, asymmetry
 

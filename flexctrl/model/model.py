@@ -28,6 +28,7 @@ from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:
     import control
+    from matplotlib.figure import Figure
 
     from flexctrl.model.equilibrium import Rest
 
@@ -368,6 +369,17 @@ class Model:
         if name not in self.coordinates:
             raise StructureError(f"model has no coordinate {name!r}{did_you_mean(name, self.coordinates)}")
         return self.coordinates.index(name)
+
+    def plot(self) -> Figure:
+        """Draw the machine: what some effect bends in blue, what is rigid in black.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.overview import model_figure
+
+        return model_figure(self)
 
     def to_nlsys(self, at: Rest | State | None = None) -> control.NonlinearIOSystem:
         """Return the model as a state space for python-control; see :func:`flexctrl.model.nlsys.to_nlsys`.

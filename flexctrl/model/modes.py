@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,8 +13,11 @@ from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.model.basis import canonical, clusters
 from flexctrl.model.condense import Scaled, scaled, static_map
 from flexctrl.model.eigen import EPS, Eigenpairs, complete_pairs, lowest_pairs, stiffness_noise
-from flexctrl.model.linear import LinearModel
+from flexctrl.model.linear import LinearModel, Place
 from flexctrl.model.massless import STIFFNESS_RANK, null_split
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Modes", "modes"]
 
@@ -47,6 +51,8 @@ class Modes:
     coordinates, inputs, outputs : tuple of str
     strain_shares, kinetic_shares : mapping of part name to numpy.ndarray, shape (k,)
         Part of the mode's strain (kinetic) energy that lives in the part; 0 strain in rigid-body modes.
+    place : Place, optional
+        The machine they are modes of; absent in models made from matrices.
     """
 
     omega_squared: np.ndarray
@@ -63,6 +69,7 @@ class Modes:
     outputs: tuple[str, ...]
     strain_shares: Mapping[str, np.ndarray] = field(default_factory=dict)
     kinetic_shares: Mapping[str, np.ndarray] = field(default_factory=dict)
+    place: Place | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return self.omega_squared.size
@@ -128,19 +135,16 @@ class Modes:
         if index.size and (index[0] < 0 or index[-1] >= len(self)):
             raise StructureError(f"mode numbers run from 0 to {len(self) - 1}; got {index.tolist()}")
         kinds = [self.kinds[i] for i in index]
-        return Modes(
+        return replace(
+            self,
             omega_squared=self.omega_squared[index],
             shapes=self.shapes[:, index],
             rigid=kinds.count("rigid"),
             unstable=kinds.count("unstable"),
-            massless=self.massless,
             decay=self.decay[index],
             input_gain=self.input_gain[index],
             output_gain=self.output_gain[:, index],
             output_rate_gain=self.output_rate_gain[:, index],
-            coordinates=self.coordinates,
-            inputs=self.inputs,
-            outputs=self.outputs,
             strain_shares={k: v[index] for k, v in self.strain_shares.items()},
             kinetic_shares={k: v[index] for k, v in self.kinetic_shares.items()},
         )
@@ -174,6 +178,22 @@ class Modes:
         str
         """
         return self.coordinates[int(np.argmax(np.abs(self.shapes[:, mode])))]
+
+    def plot(self, count: int = 6) -> Figure:
+        """Draw the lowest flexible mode shapes on the machine; frequencies and energy shares where there is none.
+
+        Parameters
+        ----------
+        count : int
+            How many shapes; unstable modes come first, rigid-body modes fill up what is left.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.modes import modes_picture
+
+        return modes_picture(self, count)
 
     def __str__(self) -> str:
         return _table(self)
@@ -312,6 +332,7 @@ def _described(linear: LinearModel, base: Scaled, pairs: Eigenpairs, count: int)
         outputs=linear.outputs,
         strain_shares=_by_part({name: np.where(rigid, 0.0, e) for name, e in strain.items()}),
         kinetic_shares=_by_part(kinetic),
+        place=linear.place,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -136,7 +135,9 @@ class EquilibriumPath:
         -------
         matplotlib.figure.Figure
         """
-        return importlib.import_module("flexctrl.plots.path").path_figure(self, over)
+        from flexctrl.plots.path import path_figure
+
+        return path_figure(self, over)
 
     def __str__(self) -> str:
         limits = ", ".join(f"{p.factor:.6g}" for p in self.limits) or "none"
@@ -264,4 +265,4 @@ def _rest(course: Course, station: Station) -> Rest:
     held = tuple(model.coordinates[i] for i in balance.held)
     loads = float(np.abs(model.signals.loads_at(station.state) @ (course.factor_scale * course.load)).sum())
     residual = balance.relative(balance.force(station.state), max(balance.scale(station.state), loads))
-    return Rest(station.state, residual, outputs, balance.u, station.iterations, held, station.unstable)
+    return Rest(station.state, residual, outputs, balance.u, station.iterations, model, held, station.unstable)

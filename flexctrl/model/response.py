@@ -17,6 +17,7 @@ from flexctrl.model.transfer import routed, transfer
 
 if TYPE_CHECKING:
     import control
+    from matplotlib.figure import Figure
 
 __all__ = ["FrequencyResponse", "frequency_response", "response_span"]
 
@@ -86,9 +87,16 @@ class FrequencyResponse:
             name=self.name,
         )
 
-    def plot(self) -> control.ControlPlot:
-        """Bode plot by python-control."""
-        return self.to_control().plot(plot_type="bode")
+    def plot(self) -> Figure:
+        """Draw magnitude and phase, of several outputs the magnitudes; ``to_control().plot()`` is python-control's.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.frequency import response_figure
+
+        return response_figure(self)
 
 
 def frequency_response(

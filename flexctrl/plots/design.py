@@ -6,11 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from flexctrl.design.piecewise import Trajectory
 from flexctrl.design.shaper import Shaper
+from flexctrl.plots.style import CYCLE, INK, new_figure, tidy
 
-__all__ = ["shaper_impulses", "shaper_sensitivity", "trajectory_curves", "trajectory_panels"]
+__all__ = [
+    "shaper_figure",
+    "shaper_impulses",
+    "shaper_sensitivity",
+    "trajectory_curves",
+    "trajectory_figure",
+    "trajectory_panels",
+]
 
 
 def shaper_sensitivity(
@@ -127,6 +136,55 @@ def trajectory_panels(axes: Sequence[Axes], trajectories: Mapping[str, Trajector
         ax.set_ylabel(names[order] if order < len(names) else f"derivative {order}")
         curves = {label: curve.derivative for label, curve in curves.items()}
     return axes
+
+
+def shaper_figure(shaper: Shaper) -> Figure:
+    """Draw a shaper in a new figure: its impulses, and the vibration it leaves over frequency.
+
+    Parameters
+    ----------
+    shaper : Shaper
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = new_figure(9.0, 3.4)
+    left, right = figure.subplots(1, 2)
+    tidy(shaper_impulses(left, shaper)).set_title("impulses", fontsize=10, color=INK)
+    omega = max((mode.omega for mode in shaper.modes), default=np.pi / max(shaper.duration, 1e-9))
+    zeta = shaper.modes[0].zeta if shaper.modes else 0.0
+    grid = np.linspace(0.0, 2.0 * omega, 1201)[1:]
+    right.plot(grid / (2.0 * np.pi), 100.0 * shaper.residual(grid, zeta), color=CYCLE[0])
+    for mode in shaper.modes:
+        right.axvline(mode.omega / (2.0 * np.pi), color=CYCLE[1], linewidth=1.0)
+    tidy(right).set(xlabel="frequency (Hz)", ylabel="residual vibration (%)", xlim=(0.0, grid[-1] / (2.0 * np.pi)))
+    right.set_ylim(bottom=0.0)
+    right.set_title("vibration left; red: designed for" if shaper.modes else "vibration left", fontsize=10, color=INK)
+    return figure
+
+
+def trajectory_figure(trajectory: Trajectory, until: float | None = None) -> Figure:
+    """Draw a trajectory in a new figure: value, rate and acceleration.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    until : float, optional
+        End of the time axis [s]; default: a tenth past the last break.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = new_figure(7.0, 6.0)
+    end = until or 1.1 * max(trajectory.breaks, default=0.0) or 1.0
+    axes = figure.subplots(3, 1, sharex=True)
+    trajectory_panels(axes, {"": trajectory}, end)
+    for ax in axes:
+        tidy(ax).lines[0].set_color(CYCLE[0])
+        ax.label_outer()
+    return figure
 
 
 def _instants(breaks: Sequence[float], start: float, until: float) -> np.ndarray:

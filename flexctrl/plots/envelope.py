@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.plots.style import FLEXIBLE, INK, RIGID, tidy
+from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
 from flexctrl.study.envelope import Envelope
 
 __all__ = ["compared_curves", "envelope_figure", "error_curve"]
@@ -24,7 +24,7 @@ def envelope_figure(envelope: Envelope) -> Figure:
     matplotlib.figure.Figure
     """
     panels = 2 if envelope.last.t.size else 1
-    figure = Figure(figsize=(5.0 * panels, 3.6), layout="constrained")
+    figure = new_figure(5.0 * panels, 3.6)
     axes = np.atleast_1d(figure.subplots(1, panels))
     error_curve(axes[0], envelope)
     if panels > 1:

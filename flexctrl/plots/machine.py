@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Protocol
@@ -16,7 +16,7 @@ from matplotlib.transforms import offset_copy
 
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
 from flexctrl.structure.drives import RotaryDrive
-from flexctrl.structure.elements import Beam, PointMass, RigidBody, Rope, Spring
+from flexctrl.structure.elements import Beam, Part, PointMass, RigidBody, Rope, Spring
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Hinge, Joint, Pin, Slide, Support, Weld, main_axis
 from flexctrl.structure.structure import Structure
@@ -157,8 +157,9 @@ def draw_machine(
     *,
     numbers: bool = True,
     symbols: bool = True,
-    color: str = INK,
+    color: str | Callable[[Part], str] = INK,
     width: float = 2.4,
+    plane: tuple[int, int] | None = None,
 ) -> Axes:
     """Draw a machine.
 
@@ -173,10 +174,12 @@ def draw_machine(
         Whether to write the join table's node numbers (of a large machine: where parts are joined).
     symbols : bool
         Whether to draw joints and drives, with a legend.
-    color : str
-        Of beams.
+    color : str or callable
+        Of parts, or part ↦ colour.
     width : float
         Of beams [points].
+    plane : (int, int), optional
+        Axes shown in a plane picture; default: see `best_plane`.
 
     Returns
     -------
@@ -184,18 +187,19 @@ def draw_machine(
         The same axes.
     """
     shown = pose or Drawn.of(structure)
-    plane = None if ax.name == "3d" else best_plane(structure) or (0, 2)
+    plane = None if ax.name == "3d" else plane or best_plane(structure) or (0, 2)
     pen = Pen(ax, plane)
     for part in structure.elements:
+        tint = color(part) if callable(color) else color
         nodes = [structure.number(n) for n in part.nodes]
         if isinstance(part, Beam):
-            pen.line(_axis_curve(part, shown, nodes), color=color, linewidth=width, solid_capstyle="round", zorder=2)
-            pen.mark(shown.x[nodes], marker="o", color=color, markersize=2.2 + 0.4 * width, zorder=3)
+            pen.line(_axis_curve(part, shown, nodes), color=tint, linewidth=width, solid_capstyle="round", zorder=2)
+            pen.mark(shown.x[nodes], marker="o", color=tint, markersize=2.2 + 0.4 * width, zorder=3)
         elif isinstance(part, Rope | Spring):
             curve = shown.x[nodes] if isinstance(part, Rope) else _zigzag(shown.x[nodes], structure.size)
-            pen.line(curve, color=ROPE if symbols else color, linewidth=0.55 * width, zorder=2)
+            pen.line(curve, color=ROPE if symbols and not callable(color) else tint, linewidth=0.55 * width, zorder=2)
         else:
-            _draw_body(pen, part, shown.x[nodes], _heaviest(structure), color)
+            _draw_body(pen, part, shown.x[nodes], _heaviest(structure), tint)
     if symbols:
         _draw_symbols(pen, structure, shown)
     if numbers:
@@ -253,7 +257,8 @@ def _draw_symbols(pen: Pen, structure: Structure, pose: Pose) -> None:
         seen["drive"] = Line2D([], [], linestyle="none", markersize=9.0, **ring)
     if seen:
         look = {"frameon": False, "fontsize": 9, "labelcolor": INK, "handletextpad": 0.4}
-        pen.ax.legend(list(seen.values()), list(seen), loc="upper right", **look)
+        place = {"loc": "upper right"} if pen.plane is None else {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+        pen.ax.legend(list(seen.values()), list(seen), **place, **look)
 
 
 def _symbol(joint: Joint) -> tuple[str, dict[str, Any]]:
@@ -294,7 +299,9 @@ def _frame(ax: Any, structure: Structure, plane: tuple[int, int] | None) -> None
     ax.set_box_aspect(sides, zoom=1.15)
 
 
-def draw_deformed(ax: Axes, structure: Structure, pose: Pose, color: str, *, label: str = "") -> Axes:
+def draw_deformed(
+    ax: Axes, structure: Structure, pose: Pose, color: str, *, label: str = "", plane: tuple[int, int] | None = None
+) -> Axes:
     """Draw a machine as it is drawn, pale, and deformed over it.
 
     Parameters
@@ -305,14 +312,16 @@ def draw_deformed(ax: Axes, structure: Structure, pose: Pose, color: str, *, lab
     color : str
     label : str
         Title of the axes.
+    plane : (int, int), optional
+        Axes shown in a plane picture; default: see `best_plane`.
 
     Returns
     -------
     matplotlib.axes.Axes
         The same axes.
     """
-    draw_machine(ax, structure, numbers=False, symbols=False, color=PALE, width=1.4)
-    draw_machine(ax, structure, pose, numbers=False, symbols=False, color=color)
+    draw_machine(ax, structure, numbers=False, symbols=False, color=PALE, width=1.4, plane=plane)
+    draw_machine(ax, structure, pose, numbers=False, symbols=False, color=color, plane=plane)
     if label:
         ax.set_title(label, fontsize=10, color=INK, pad=2.0)
     for axis in (getattr(ax, f"{name}axis") for name in _NAMES[: 3 if ax.name == "3d" else 2]):

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flexctrl.model.path import EquilibriumPath
-from flexctrl.plots.style import DRIVE, FLEXIBLE, INK, RIGID, tidy
+from flexctrl.plots.style import DRIVE, FLEXIBLE, INK, RIGID, new_figure, tidy
 
 __all__ = ["path_figure", "plot_path"]
 
@@ -25,7 +25,7 @@ def path_figure(path: EquilibriumPath, over: str | None = None) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(5.6, 4.0), layout="constrained")
+    figure = new_figure(5.6, 4.0)
     plot_path(figure.subplots(), path, over)
     return figure
 

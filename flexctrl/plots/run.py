@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flexctrl.dynamics.run import Run
-from flexctrl.plots.style import FLEXIBLE, INK, RIGID, tidy
+from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
 from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
@@ -54,8 +54,8 @@ def units(structure: Structure) -> dict[str, str]:
     return {s.name: _UNITS.get(type(s), "N m") for s in (*structure.outputs, *structure.inputs)}
 
 
-def plot_run(run: Run, signals: Sequence[str] | None = None) -> np.ndarray:
-    """Draw a run in a new figure of pyplot, one axes a signal.
+def run_figure(run: Run, signals: Sequence[str] | None = None) -> Figure:
+    """Draw a run in a new figure, one axes a signal.
 
     Parameters
     ----------
@@ -65,16 +65,15 @@ def plot_run(run: Run, signals: Sequence[str] | None = None) -> np.ndarray:
 
     Returns
     -------
-    numpy.ndarray of matplotlib.axes.Axes
+    matplotlib.figure.Figure
     """
-    import matplotlib.pyplot as plt
-
-    names = tuple(signals or run.outputs)
-    return run_curves(panels(plt.figure(), len(names)), run, names)
+    figure, names = new_figure(8.0, 4.0), tuple(signals or run.outputs)
+    run_curves(panels(figure, len(names)), run, names)
+    return figure
 
 
 def comparison_figure(comparison: Comparison, signals: Sequence[str] | None = None) -> Figure:
-    """Draw a comparison in a new figure of pyplot.
+    """Draw a comparison in a new figure.
 
     Parameters
     ----------
@@ -86,9 +85,7 @@ def comparison_figure(comparison: Comparison, signals: Sequence[str] | None = No
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure()
+    figure = new_figure(8.0, 4.0)
     names = tuple(signals or comparison.flexible.outputs)
     comparison_curves(panels(figure, len(names)), comparison, names)
     return figure
@@ -191,4 +188,4 @@ def _label(ax: Axes, name: str, unit: Mapping[str, str] | None) -> None:
     ax.ticklabel_format(useOffset=False)
 
 
-__all__ = ["comparison_curves", "comparison_figure", "panels", "plot_run", "run_curves", "units"]
+__all__ = ["comparison_curves", "comparison_figure", "panels", "run_curves", "run_figure", "units"]

@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.plots.style import FLEXIBLE, INK, PALE, RIGID, tidy
+from flexctrl.plots.style import FLEXIBLE, INK, PALE, RIGID, new_figure, tidy
 from flexctrl.study.confirm import Confirmation
 from flexctrl.study.critical_mode import CriticalMode
 from flexctrl.study.spillover import Spillover
 
-__all__ = ["energy_bars", "gain_curve", "growth_curves", "spillover_figure"]
+__all__ = ["confirmation_figure", "energy_bars", "gain_curve", "growth_curves", "spillover_figure"]
 
 _SHOWN = 6
 
@@ -31,7 +31,7 @@ def spillover_figure(certificate: Spillover, confirmation: Confirmation | None =
     matplotlib.figure.Figure
     """
     panels = 1 + (certificate.mode is not None) + (confirmation is not None)
-    figure = Figure(figsize=(4.4 * panels, 3.8), layout="constrained")
+    figure = new_figure(4.4 * panels, 3.8)
     axes = list(np.atleast_1d(figure.subplots(1, panels)))
     gain_curve(axes.pop(0), certificate)
     if certificate.mode is not None:
@@ -39,6 +39,23 @@ def spillover_figure(certificate: Spillover, confirmation: Confirmation | None =
     if confirmation is not None:
         growth_curves(axes.pop(0), confirmation)
     figure.suptitle(str(certificate).splitlines()[0], fontsize=10, color=INK, wrap=True)
+    return figure
+
+
+def confirmation_figure(confirmation: Confirmation) -> Figure:
+    """Draw the two runs that confirm a critical gain in a new figure.
+
+    Parameters
+    ----------
+    confirmation : Confirmation
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = new_figure(6.4, 4.0)
+    growth_curves(figure.subplots(), confirmation)
+    figure.suptitle(str(confirmation).splitlines()[0], fontsize=9, color=INK, wrap=True)
     return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 INK = "#1f2937"
 PALE = "#b6bec9"
@@ -14,6 +15,23 @@ GROUND = "#3f7d58"
 
 CYCLE = ("#1d4ed8", "#d9480f", "#3f7d58", "#7048a8", "#b45309", "#0f766e", "#be185d", "#4b5563")
 """Line colours in order."""
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of pyplot, so that ``plt.show()`` shows it.
+
+    Parameters
+    ----------
+    width, height : float
+        Inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    import matplotlib.pyplot as plt
+
+    return plt.figure(figsize=(width, height), layout="constrained")
 
 
 def tidy(ax: Axes) -> Axes:
@@ -38,4 +56,4 @@ def tidy(ax: Axes) -> Axes:
     return ax
 
 
-__all__ = ["CYCLE", "DRIVE", "FLEXIBLE", "GROUND", "INK", "PALE", "RIGID", "ROPE", "tidy"]
+__all__ = ["CYCLE", "DRIVE", "FLEXIBLE", "GROUND", "INK", "PALE", "RIGID", "ROPE", "new_figure", "tidy"]

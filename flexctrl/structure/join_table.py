@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError
 from flexctrl.structure.drives import Drive
@@ -13,6 +14,10 @@ from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector, check_who
 from flexctrl.structure.joints import Joint, main_axis
 from flexctrl.structure.relations import Copy, Follow, Group, Ride, Turn
 from flexctrl.structure.ties import tie
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 Row = tuple[int, int, int, int, int, int]
 
@@ -131,6 +136,17 @@ class JoinTable:
         """
         places = _columns(columns)
         return tuple(tuple(row[i] for i in places) for row in self.rows)
+
+    def plot(self) -> Figure:
+        """Draw the table: what is tied has one colour, what is held is grey.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.join_table import join_table_figure
+
+        return join_table_figure(self)
 
     def __str__(self) -> str:
         everything = (*self.rows, *self.drives)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.drives import Drive, RotaryDrive
@@ -32,6 +33,9 @@ from flexctrl.structure.signals import (
     Torque,
     Velocity,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _COINCIDE = 1e-6
 
@@ -203,6 +207,17 @@ class Structure:
     @cached_property
     def _places(self) -> dict[tuple[str, int], int]:
         return {(n.part, n.index): i for i, n in enumerate(self.nodes)}
+
+    def plot(self) -> Figure:
+        """Draw the machine: parts, node numbers of the join table, joints and drives.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.overview import structure_figure
+
+        return structure_figure(self)
 
 
 def planar(structure: Structure, normal: str = "z") -> Structure:

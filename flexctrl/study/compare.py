@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -184,7 +183,9 @@ class Comparison:
         -------
         matplotlib.figure.Figure
         """
-        return importlib.import_module("flexctrl.plots.run").comparison_figure(self, signals)
+        from flexctrl.plots.run import comparison_figure
+
+        return comparison_figure(self, signals)
 
     def save_csv(self, path: str | Path) -> None:
         """Write time and every signal of both runs as columns ``signal`` and ``signal_rigid``.

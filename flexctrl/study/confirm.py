@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from flexctrl.model.motion import State
 from flexctrl.study.critical_mode import CriticalMode, critical_mode
 from flexctrl.study.gain_family import Crossing, gain_family
 from flexctrl.study.spillover import Spillover
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Confirmation", "Growth", "confirm"]
 
@@ -67,6 +71,17 @@ class Confirmation:
     gain: float
     predicted: float
     confirmed: bool
+
+    def plot(self) -> Figure:
+        """Draw the amplitudes of the two runs, dots, and what the eigenvalues predict, lines.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.spillover import confirmation_figure
+
+        return confirmation_figure(self)
 
     def __str__(self) -> str:
         verdict = "confirmed" if self.confirmed else "NOT confirmed"

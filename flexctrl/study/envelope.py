@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -103,7 +102,9 @@ class Envelope:
         -------
         matplotlib.figure.Figure
         """
-        return importlib.import_module("flexctrl.plots.envelope").envelope_figure(self)
+        from flexctrl.plots.envelope import envelope_figure
+
+        return envelope_figure(self)
 
     def __str__(self) -> str:
         percent, last = f"{100 * self.error:.3g} %", self.last

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -14,6 +15,9 @@ from flexctrl.model.reduction import Reduced
 from flexctrl.model.response import response_span
 from flexctrl.model.transfer import transfer
 from flexctrl.study.loop import Loop
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Crossing", "Margins", "Peak", "loop_grid", "margins", "peak_gain"]
 
@@ -75,6 +79,7 @@ class Margins:
         Ms = max |1/(1 + L)| and Mt = max |L/(1 + L)|.
     gain_crossings, phase_crossings : tuple of Crossing
         All of them: |L| = 1 with phase margins, and negative real L with gain factors.
+    loop : Loop
     """
 
     stable: bool
@@ -87,6 +92,18 @@ class Margins:
     complementary: Peak
     gain_crossings: tuple[Crossing, ...]
     phase_crossings: tuple[Crossing, ...]
+    loop: Loop = field(repr=False)
+
+    def plot(self) -> Figure:
+        """Draw the loop with its margins: Bode, Nyquist, sensitivities.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.loops import margins_figure
+
+        return margins_figure(self)
 
     def __str__(self) -> str:
         hz = 2 * np.pi
@@ -159,6 +176,7 @@ def margins(loop: Loop) -> Margins:
         complementary=_inverse(mt),
         gain_crossings=gains,
         phase_crossings=phases,
+        loop=loop,
     )
 
 

@@ -20,6 +20,7 @@ from flexctrl.study.zeros import deflated_zeros, zeros
 
 if TYPE_CHECKING:
     import control
+    from matplotlib.figure import Figure
 
 __all__ = ["Loop", "open_loop"]
 
@@ -154,6 +155,17 @@ class Loop:
         """
         omega = np.asarray(omega, float)
         return self.curve(np.exp(1j * omega * self.dt) if self.dt else 1j * omega)
+
+    def plot(self) -> Figure:
+        """Draw the loop with its margins: Bode, Nyquist, sensitivities.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.loops import loop_figure
+
+        return loop_figure(self)
 
     def frd(self, omega: np.ndarray) -> control.FrequencyResponseData:
         """L as python-control's data object, for its Nyquist and Nichols plots.

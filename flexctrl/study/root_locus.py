@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +16,9 @@ from flexctrl.study.loop import Loop
 
 if TYPE_CHECKING:
     import control
+    from matplotlib.figure import Figure
 
-__all__ = ["CriticalGain", "critical_gains", "root_locus"]
+__all__ = ["CriticalGain", "RootLocus", "critical_gains", "in_s", "root_locus"]
 
 MOST_GAINS = 400
 START = 50
@@ -45,7 +47,95 @@ class CriticalGain:
     unstable_above: bool
 
 
-def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) -> control.pzmap.PoleZeroData:
+@dataclass(frozen=True, eq=False)
+class RootLocus:
+    """Closed-loop poles over the gain.
+
+    Attributes
+    ----------
+    gains : numpy.ndarray, shape (N,)
+        Ascending from 0.
+    loci : numpy.ndarray of complex, shape (N, n)
+        One column a branch.
+    poles, zeros : numpy.ndarray of complex
+        Of the open loop.
+    loop : Loop
+    """
+
+    gains: np.ndarray
+    loci: np.ndarray
+    poles: np.ndarray
+    zeros: np.ndarray
+    loop: Loop = field(repr=False)
+
+    @property
+    def dt(self) -> float:
+        """Sampling time, s; 0 for continuous time."""
+        return self.loop.dt
+
+    @cached_property
+    def critical(self) -> tuple[CriticalGain, ...]:
+        """Gains at which a branch crosses the stability boundary, see `critical_gains`."""
+        return critical_gains(self.loop, self)
+
+    def in_s(self) -> RootLocus:
+        """The same with every z as s = ln(z)/dt, for drawing; branches are cut where they pass z = −1.
+
+        Returns
+        -------
+        RootLocus
+        """
+        if not self.dt:
+            return self
+        poles, zeros, loci = (in_s(points, self.dt) for points in (self.poles, self.zeros, self.loci))
+        jumps = np.abs(np.diff(loci.imag, axis=0, prepend=loci.imag[:1])) > 0.5 * np.pi / self.dt
+        return replace(self, poles=poles, zeros=zeros, loci=np.where(jumps, np.nan, loci))
+
+    def to_control(self) -> control.pzmap.PoleZeroData:
+        """As python-control's data object."""
+        from control.pzmap import PoleZeroData
+
+        return PoleZeroData(
+            self.poles, self.zeros, self.gains, self.loci, dt=self.dt, sysname=self.loop.name, sort_loci=False
+        )
+
+    def plot(self, top: float | None = None) -> Figure:
+        """Draw poles, zeros and branches, and where they cross the stability boundary.
+
+        Parameters
+        ----------
+        top : float, optional
+            Largest imaginary part shown, rad/s; default: some way above the first critical gain's, else as high as
+            there are poles that move.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.root_locus import locus_figure
+
+        return locus_figure(self, top)
+
+
+def in_s(z: np.ndarray, dt: float) -> np.ndarray:
+    """Poles or zeros of a sampled loop where they would be in the s-plane.
+
+    Parameters
+    ----------
+    z : array_like of complex
+    dt : float
+        Sampling time, s; with 0 the points are s already.
+
+    Returns
+    -------
+    numpy.ndarray of complex
+        ln(z)/dt.
+    """
+    points = np.asarray(z, complex)
+    return np.log(np.where(points == 0, 1e-300, points)) / dt if dt else points
+
+
+def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) -> RootLocus:
     """Closed-loop poles eig(A − k B (1 + kD)⁻¹ C) over the gain, one column a branch.
 
     The states are in scaled modal form, so eigenvalues stay right where polynomial coefficients overflow
@@ -61,22 +151,19 @@ def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) ->
 
     Returns
     -------
-    control.PoleZeroData
-        With ``.gains`` (N,), ``.loci`` (N, n), ``.poles``, ``.zeros`` and ``.plot()``.
+    RootLocus
 
     Raises
     ------
     StructureError
         For gains that are not ascending positive numbers.
     """
-    from control.pzmap import PoleZeroData
-
     wanted = _gain_range(loop) if gains is None else _checked(gains)
     used, loci = _followed(loop.closed_poles, np.concatenate([[0.0], wanted[wanted > 0]]))
-    return PoleZeroData(loop.poles, loop.zeros, used, loci, dt=loop.dt, sysname=loop.name, sort_loci=False)
+    return RootLocus(used, loci, loop.poles, loop.zeros, loop)
 
 
-def critical_gains(loop: Loop, locus: control.pzmap.PoleZeroData | None = None) -> tuple[CriticalGain, ...]:
+def critical_gains(loop: Loop, locus: RootLocus | None = None) -> tuple[CriticalGain, ...]:
     """Gains at which a branch of the root locus crosses the stability boundary, ascending.
 
     Bracketed by the branches, bisected on the eigenvalue, and finished on 1 + k L(iω) = 0 itself.
@@ -84,7 +171,7 @@ def critical_gains(loop: Loop, locus: control.pzmap.PoleZeroData | None = None) 
     Parameters
     ----------
     loop : Loop
-    locus : control.PoleZeroData, optional
+    locus : RootLocus, optional
         From :func:`root_locus`, if already computed.
 
     Returns

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -102,7 +101,9 @@ class Spillover:
         -------
         matplotlib.figure.Figure
         """
-        return importlib.import_module("flexctrl.plots.spillover").spillover_figure(self, confirmation)
+        from flexctrl.plots.spillover import spillover_figure
+
+        return spillover_figure(self, confirmation)
 
     def __str__(self) -> str:
         return "\n".join([f"{self.linear.name} {self._verdict()}", *self._twin()])

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
 from flexctrl.model.linear import LinearModel
 from flexctrl.study.channel import Quadruple, channel_states
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["SensorChoice", "Zeros", "deflated_zeros", "sensor_choices", "zeros"]
 
@@ -39,6 +43,17 @@ class Zeros:
     def nonminimum_phase(self) -> np.ndarray:
         """Zeros in the open right half-plane, beyond their uncertainty."""
         return self.finite[self.finite.real > 10 * self.uncertainty * abs(self.finite)]
+
+    def plot(self) -> Figure:
+        """Draw the finite zeros in the complex plane, with their uncertainty.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.root_locus import zeros_figure
+
+        return zeros_figure(self)
 
 
 def zeros(linear: LinearModel, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Zeros:

@@ -272,7 +272,7 @@ def test_stiff_machines_run_with_an_implicit_method():
     """A stiff rope's axial vibration, 40 rad/s and more, is no burden for Radau."""
     model = fc.assemble(crane("v w"), FLEXIBLE)
     rest = fc.equilibrium(model, hold={"cart_0_u": 0.0})
-    system = model.to_nlsys(fc.Rest(rest.state, rest.residual, rest.outputs, rest.inputs, 0))
+    system = model.to_nlsys(fc.Rest(rest.state, rest.residual, rest.outputs, rest.inputs, 0, model))
     t = np.linspace(0.0, 1.0, 11)
     found = ct.input_output_response(
         system, t, np.full(11, 4.0), solve_ivp_kwargs={"method": Radau, "rtol": 1e-6, "atol": 1e-9}

@@ -12,10 +12,13 @@ import scipy.sparse as sp
 from flexctrl.errors import StructureError
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.reduction import ModalTruncation
-from flexctrl.plots.frequency import mark_margins, plot_bode, plot_nyquist, plot_reduction, plot_root_locus
+from flexctrl.plots.frequency import plot_bode
+from flexctrl.plots.loops import mark_margins, plot_nichols, plot_nyquist, plot_sensitivities
+from flexctrl.plots.reduction import plot_reduction
+from flexctrl.plots.root_locus import plot_root_locus
 from flexctrl.study.frequency import loop_grid, margins
 from flexctrl.study.loop import open_loop
-from flexctrl.study.root_locus import critical_gains, root_locus
+from flexctrl.study.root_locus import root_locus
 
 mpl.use("Agg")
 
@@ -91,13 +94,34 @@ def test_nyquist_touches_the_modulus_circle(machine):
 def test_root_locus_draws_every_branch_and_the_critical_gain(machine):
     loop = open_loop(machine, ct.tf([1.0, 0.5], [0.1, 1]), output="z")
     locus = root_locus(loop)
-    critical = critical_gains(loop, locus)
+    critical = locus.critical
     ax = plot_root_locus({"flexible": locus}, critical=critical)
     branches = [line for line in ax.lines if len(line.get_xdata()) == len(locus.gains)]
     assert len(branches) == len(loop.A)
     labels = {text.get_text() for text in ax.texts}
     shown = [c for c in critical if c.unstable_above and c.omega <= ax.get_ylim()[1]]
     assert labels == {f"k = {c.gain:.3g}" for c in shown}
+
+
+def test_nichols_passes_the_critical_point_at_the_margins(machine):
+    loop = open_loop(machine, ct.tf([2.0, 1.0], [0.01, 1]), output="x")
+    found = margins(loop)
+    ax = plot_nichols({"L": loop})
+    angle, size = ax.lines[0].get_data()
+    crossed = np.flatnonzero(np.diff(np.sign(size)))
+    share = size[crossed] / (size[crossed] - size[crossed + 1])
+    margin = angle[crossed] + share * (angle[crossed + 1] - angle[crossed]) + 180.0
+    expected = [np.degrees(g.margin) for g in found.gain_crossings]
+    np.testing.assert_allclose((margin - expected + 180.0) % 360.0 - 180.0, 0.0, atol=0.5)
+    assert ax.get_ylim() == (-40.0, 40.0)
+
+
+def test_sensitivities_peak_at_ms_and_mt(machine):
+    loop = open_loop(machine, ct.tf([2.0, 1.0], [0.01, 1]), output="x")
+    found = margins(loop)
+    ax = plot_sensitivities({"L": loop}, margins=found)
+    for line, peak in zip(ax.lines, (found.sensitivity, found.complementary), strict=False):
+        np.testing.assert_allclose(10 ** (line.get_ydata().max() / 20), peak.value, rtol=1e-3)
 
 
 def test_reduction_shows_full_reduced_and_difference(machine):

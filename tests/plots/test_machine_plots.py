@@ -67,10 +67,10 @@ def test_mode_shapes_are_as_large_as_asked_and_small_turns():
     linear = fc.linearize(model, at=rest)
     modes = linear.modes()
     for k in (0, 6, 12):
-        pose = mode_pose(model, linear, rest.state, modes.shapes[:, k], fraction=0.1)
+        pose = mode_pose(linear.place, modes.shapes[:, k], fraction=0.1)
         moved = np.abs(pose.x - rest.state.x).max()
         assert moved == pytest.approx(0.1 * 6.0, rel=1e-9) or moved < 1e-9  # a link spins about itself
-    axes = modes_figure(Figure(), model, linear, rest.state, modes, (5, 6))
+    axes = modes_figure(Figure(), linear.place, modes, (5, 6))
     assert [ax.get_title() for ax in axes] == [mode_label(modes, 5), mode_label(modes, 6)]
     assert "Hz" in mode_label(modes, 6)
 
@@ -107,7 +107,7 @@ def test_a_run_draws_itself(runs):
     import matplotlib
 
     matplotlib.use("Agg")
-    axes = runs[0].plot()
+    axes = runs[0].plot().axes
     assert [ax.get_ylabel() for ax in axes] == ["x1_minus_x4", "load_z", "travel"]
     run_curves(axes[:1], runs[0], ("load_z",))
     figure = Comparison.between(*runs).plot(("load_z",))

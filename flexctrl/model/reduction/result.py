@@ -17,6 +17,7 @@ from flexctrl.model.transfer import Transfer, transfer
 
 if TYPE_CHECKING:
     import control
+    from matplotlib.figure import Figure
 
     from flexctrl.model.modes import Modes
     from flexctrl.model.reduction.error import ErrorReport
@@ -93,6 +94,17 @@ class Reduced(ABC):
     @abstractmethod
     def to_ss(self) -> control.StateSpace:
         """The reduced model for python-control."""
+
+    def plot(self) -> Figure:
+        """Draw full and reduced responses and their difference, channel by channel.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.reduction import reduction_figure
+
+        return reduction_figure(self)
 
     @cached_property
     def error(self) -> ErrorReport:

@@ -1,0 +1,85 @@
+"""How wrong reduced models are over frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from flexctrl.model.reduction import Reduced
+from flexctrl.plots.frequency import HZ, channel_values, line_style
+from flexctrl.plots.style import INK, new_figure, tidy
+
+__all__ = ["plot_reduction", "reduction_figure"]
+
+_FLOOR = 1e-12
+
+
+def plot_reduction(
+    reduced: Reduced | Mapping[str, Reduced], ax: Axes | None = None, *, channel: tuple[str, str] | None = None
+) -> Axes:
+    """Draw a full model and how far reductions of it are from it.
+
+    Parameters
+    ----------
+    reduced : Reduced or mapping of str to Reduced
+        One reduction is drawn itself, too; of several (label → reduction) of one model the differences only.
+    ax : matplotlib.axes.Axes, optional
+        Drawn into; a new figure if left out.
+    channel : tuple of str, optional
+        (output, input); may be left out for single channels.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = new_figure(7.5, 4.5).subplots() if ax is None else ax
+    several = {"difference": reduced} if isinstance(reduced, Reduced) else dict(reduced)
+    full = next(iter(several.values())).full
+    response = full.frequency_response()
+    exact, hertz = channel_values(response, channel), response.omega / HZ
+    ax.loglog(hertz, abs(exact), label=f"full, {len(full.coordinates)} coordinates", **line_style(7))
+    least = _FLOOR * abs(exact).max()
+    bottom = float(abs(exact).min())
+    for number, (label, one) in enumerate(several.items()):
+        mine = channel_values(one.frequency_response(response.omega), channel)
+        if isinstance(reduced, Reduced):
+            ax.loglog(hertz, abs(mine), label=f"reduced, order {one.order}", **line_style(0))
+        gap = np.maximum(abs(exact - mine), least)
+        ax.loglog(hertz, gap, label=label, **line_style(number + 1))
+        bottom = min(bottom, float(np.quantile(gap, 0.02)))
+    ax.set_ylim(bottom=max(least, 0.3 * bottom))
+    tidy(ax).set(xlabel="frequency (Hz)", ylabel="magnitude")
+    ax.legend(frameon=False, fontsize="small")
+    return ax
+
+
+def reduction_figure(reduced: Reduced) -> Figure:
+    """Draw every channel of a reduction in a new figure, up to nine.
+
+    Parameters
+    ----------
+    reduced : Reduced
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    full = reduced.full
+    channels = [(output, name) for output in full.outputs for name in full.inputs][:9]
+    columns = min(len(channels), 1 if len(channels) < 2 else 2 if len(channels) <= 4 else 3)
+    rows = -(-len(channels) // columns)
+    figure = new_figure(3.0 + 3.8 * columns, 1.4 + 2.6 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, channel in zip(axes, channels, strict=False):
+        plot_reduction(reduced, ax, channel=channel)
+        ax.set_title(f"{channel[0]} from {channel[1]}", fontsize=9, color=INK)
+        if ax is not axes[0]:
+            ax.get_legend().remove()
+    for ax in axes[len(channels) :]:
+        ax.set_visible(False)
+    title = f"{full.name}: order {reduced.order}, error {reduced.error.worst:.2g} of the peak at worst"
+    figure.suptitle(title, fontsize=10, color=INK)
+    return figure

@@ -1,0 +1,137 @@
+"""Root loci of several models in the same axes, and zeros."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from flexctrl.plots.style import CYCLE, INK, new_figure, tidy
+from flexctrl.study.root_locus import CriticalGain, RootLocus
+from flexctrl.study.zeros import Zeros
+
+__all__ = ["locus_figure", "plot_root_locus", "zeros_figure"]
+
+_CANCELLED = 0.02
+
+
+def plot_root_locus(
+    loci: Mapping[str, RootLocus],
+    ax: Axes | None = None,
+    *,
+    critical: Sequence[CriticalGain] = (),
+    top: float | None = None,
+) -> Axes:
+    """Draw root loci of several models: open-loop poles ×, zeros ○, branches between.
+
+    Loci of sampled loops are drawn as s = ln(z)/dt.
+
+    Parameters
+    ----------
+    loci : mapping of str to RootLocus
+        Label → locus, e.g. of the rigid twin and of the flexible machine.
+    ax : matplotlib.axes.Axes, optional
+        Drawn into; a new figure if left out.
+    critical : sequence of CriticalGain, optional
+        Marked on the imaginary axis; those that end stability with their gains.
+    top : float, optional
+        Largest imaginary part shown, rad/s; default: as high as there are poles that move.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = new_figure(7.0, 5.6).subplots() if ax is None else ax
+    shown = {label: locus.in_s() for label, locus in loci.items()}
+    for number, (label, locus) in enumerate(shown.items()):
+        color = CYCLE[number % len(CYCLE)]
+        ax.plot(locus.loci.real, locus.loci.imag, color=color, linewidth=1.3, zorder=2 + 0.1 * number)
+        ax.plot([], [], color=color, linewidth=1.3, label=label)
+        poles, zeros = np.asarray(locus.poles), np.asarray(locus.zeros)
+        ax.plot(poles.real, poles.imag, "x", color=color, markersize=7, markeredgewidth=1.6, zorder=4)
+        ax.plot(zeros.real, zeros.imag, "o", color=color, markerfacecolor="white", markersize=6, zorder=3)
+    width, height = _window(shown, _top(shown) if top is None else top)
+    ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1)
+    plane = ", of s = ln(z)/T" if any(locus.dt for locus in loci.values()) else ""
+    tidy(ax).set(xlabel=f"real part{plane} (1/s)", ylabel=f"imaginary part{plane} (rad/s)")
+    ax.set(xlim=width, ylim=(-height, height))
+    for crossing in [c for c in critical if c.omega <= height]:
+        ax.plot(0.0, crossing.omega, "s", color=INK, markersize=5, zorder=5)
+        if crossing.unstable_above:
+            note = f"k = {crossing.gain:.3g}"
+            ax.annotate(note, (0.0, crossing.omega), (7, -4), textcoords="offset points", fontsize=9)
+    if len(loci) > 1:
+        ax.legend(frameon=False, loc="upper left")
+    return ax
+
+
+def locus_figure(locus: RootLocus, top: float | None = None) -> Figure:
+    """Draw one root locus in a new figure, with the gains at which stability ends.
+
+    Parameters
+    ----------
+    locus : RootLocus
+    top : float, optional
+        See :func:`plot_root_locus`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = new_figure(7.0, 5.6)
+    ending = [c.omega for c in locus.critical if c.unstable_above and c.omega > 0.0]
+    near = 2.5 * ending[0] if top is None and ending else top
+    ax = plot_root_locus({locus.loop.name: locus}, figure.subplots(), critical=locus.critical, top=near)
+    ax.set_title(locus.loop.name, fontsize=10, color=INK)
+    return figure
+
+
+def zeros_figure(zeros: Zeros) -> Figure:
+    """Draw zeros in the complex plane; in the open right half plane in another colour.
+
+    Parameters
+    ----------
+    zeros : Zeros
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = new_figure(6.0, 5.2)
+    ax = tidy(figure.subplots())
+    right = np.isin(zeros.finite, zeros.nonminimum_phase)
+    for chosen, color, label in ((~right, CYCLE[0], "minimum phase"), (right, CYCLE[1], "right half plane")):
+        s, doubt = zeros.finite[chosen], (zeros.uncertainty * abs(zeros.finite))[chosen]
+        ax.errorbar(s.real, s.imag, doubt, doubt, "o", color=color, markerfacecolor="white", label=label)
+    ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1)
+    ax.set(xlabel="real part (1/s)", ylabel="imaginary part (rad/s)")
+    ax.set_title(f"{len(zeros.finite)} finite zeros, {zeros.infinite} at infinity", fontsize=10, color=INK)
+    if right.any():
+        ax.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def _top(loci: Mapping[str, RootLocus]) -> float:
+    """As high as there are poles that move: those on a zero of their own are not worth the room."""
+    moving = [0.0]
+    for locus in loci.values():
+        poles, zeros = np.asarray(locus.poles), np.append(locus.zeros, np.inf)
+        gap = np.abs(poles[:, None] - zeros).min(axis=1)
+        moving += np.abs(poles.imag[gap > _CANCELLED * np.abs(poles)]).tolist()
+    return 1.4 * max(moving) or np.inf
+
+
+def _window(loci: Mapping[str, RootLocus], top: float) -> tuple[tuple[float, float], float]:
+    """Limits that show the poles and zeros and most of the branches between them."""
+    fixed = np.concatenate([np.concatenate([locus.poles, locus.zeros]) for locus in loci.values()])
+    moving = np.concatenate([locus.loci.ravel() for locus in loci.values()])
+    moving = moving[np.isfinite(moving)]
+    height = min(top, 1.12 * float(abs(fixed.imag).max(initial=0.0)))
+    height = height or 1.2 * float(np.quantile(abs(moving.imag), 0.9)) or 1.0
+    near = moving[(abs(moving.imag) <= height) & (abs(moving.real) <= 3 * height)].real
+    anchors = fixed.real[(abs(fixed.imag) <= height) & (abs(fixed.real) <= height)]
+    ends = np.concatenate([np.quantile(near, [0.03, 0.97]) if near.size else np.zeros(1), anchors, [0.0]])
+    pad = 0.12 * float(np.ptp(ends)) or 0.1 * height
+    return (float(ends.min()) - pad, float(ends.max()) + pad), height
