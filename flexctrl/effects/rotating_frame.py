@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, no_force, offset, offset_force
 from flexctrl.structure.freedoms import Vector, parse_point
+
+if TYPE_CHECKING:
+    import casadi as ca
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,9 @@ class RotatingFrame(Effect):
     `equilibrium` finds the shape stretched by its spin, and a linear model about it has centrifugal stiffening
     and spin softening in K and the Coriolis terms in C, which is skew. Rotors of drives count with their speed
     relative to what carries them.
+
+    Seen from outside, a beam element's inertia lies on its chord; in the turning frame the centrifugal force acts on
+    its bent axis as weight does, so that a blade's stiffening converges with the fourth power of the mesh.
 
     The stored energy includes the potential −½∫|Ω × (x − c)|² dm: what is conserved is the Jacobi integral.
     Drag on velocities (α of `RayleighDamping`) is that of air which turns with the frame.
@@ -39,8 +47,8 @@ class RotatingFrame(Effect):
     Raises
     ------
     StructureError
-        If a vector is not three finite numbers; by `assemble`, without `LargeRotation` (the pull that stiffens
-        what spins would be left out) or with gravity across the axis (it would turn in the frame).
+        If a vector is not three finite numbers; by `assemble`, without `LargeRotation` or `GeometricStiffness`
+        (the pull that stiffens what spins would be left out), or with gravity across the axis (it would turn).
     """
 
     rate: Vector
@@ -67,13 +75,38 @@ class RotatingFrame(Effect):
             node.b + ca.cross(spin, node.w),
         )
 
+    def beam(self, m: BeamMotion) -> BeamForce:
+        """Centrifugal force on the offset of the axis from its chord: what makes the pull vary along an element."""
+        import casadi as ca
+
+        if not any(self.rate):
+            return no_force()
+        spin, mass, none = ca.DM(self.rate), m.p["mass"], ca.SX(3, 1)
+        half = -0.5 * mass * (m.frame.T @ ca.cross(spin, ca.cross(spin, m.frame @ offset(m))))
+        nodal = BeamForce(ca.SX(7, 1), none, ca.vertcat(half, none, half, none))
+        return offset_force(m, mass * (m.frame.T @ self._pull(m.middle))) + nodal
+
+    def beam_energy(self, m: BeamMotion, middle: ca.SX) -> ca.SX:
+        """Centrifugal potential of the offset."""
+        import casadi as ca
+
+        return -m.p["mass"] * ca.dot(self._pull(middle), m.frame @ offset(m))
+
+    def _pull(self, x: ca.SX) -> ca.SX:
+        """Centrifugal acceleration −Ω × (Ω × (x − c))."""
+        import casadi as ca
+
+        spin = ca.DM(self.rate)
+        return -ca.cross(spin, ca.cross(spin, x - ca.DM(self.center)))
+
     def check_beside(self, others: Sequence[Effect]) -> None:
         """Refuse what cannot be steady in a turning frame, and a linear model that would lack the stiffening."""
         if not any(self.rate):
             return
-        if not any(isinstance(e, LargeRotation) for e in others):
+        if not any(isinstance(e, LargeRotation | GeometricStiffness) for e in others):
             raise StructureError(
-                "RotatingFrame: needs LargeRotation(), without which the pull that stiffens spinning parts is left out"
+                "RotatingFrame: needs LargeRotation() or GeometricStiffness(), without which the pull that stiffens "
+                "spinning parts is left out"
             )
         for g in (np.array(e.g) for e in others if isinstance(e, Gravity)):
             across = np.linalg.norm(np.cross(self.rate, g))

@@ -81,6 +81,8 @@ class BeamMotion:
         Parameters by name.
     frame : casadi.SX, 3 × 3
         R_e, columns in space axes.
+    middle : casadi.SX
+        Mean of the nodes' positions, in space axes.
     chord : casadi.SX
         Distance of the nodes [m].
     normal, arms : tuple
@@ -97,6 +99,7 @@ class BeamMotion:
 
     p: dict[str, ca.SX]
     frame: ca.SX
+    middle: ca.SX
     chord: ca.SX
     normal: tuple[ca.SX, ca.SX]
     arms: tuple[ca.SX, ca.SX]
@@ -163,6 +166,7 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Bea
     return BeamMotion(
         p=p,
         frame=frame,
+        middle=0.5 * (first.x + second.x),
         chord=chord,
         normal=normal,
         arms=arms,  # type: ignore[arg-type]
@@ -306,28 +310,40 @@ def weight(m: BeamMotion, g: np.ndarray) -> BeamForce:
     """Return the force of gravity g [m/s²], minus the gradient of `height_energy`."""
     import casadi as ca
 
-    local = m.frame.T @ g
-    half = 0.5 * m.p["mass"] * local
-    c = m.p["mass"] * m.p["L"] / 12.0
-    m1 = c * ca.vertcat(0, -local[2], local[1])
-    # the sag off the chord carries its weight about the frame
-    torque = m.p["mass"] * ca.cross(_sag(m), local)
-    return BeamForce(ca.vertcat(0, m1, -m1), torque, ca.vertcat(half, ca.SX(3, 1), half, ca.SX(3, 1)))
+    local = m.p["mass"] * (m.frame.T @ g)
+    none = ca.SX(3, 1)
+    halves = ca.vertcat(0.5 * local, none, 0.5 * local, none)
+    return offset_force(m, local) + BeamForce(ca.SX(7, 1), none, halves)
 
 
 def height_energy(m: BeamMotion, g: np.ndarray, middle: ca.SX) -> ca.SX:
     """Return −∫ρA g·x ds [J], with ``middle`` the mean of the nodal positions in space."""
     import casadi as ca
 
-    return -m.p["mass"] * ca.dot(ca.DM(g), middle + m.frame @ _sag(m))
+    return -m.p["mass"] * ca.dot(ca.DM(g), middle + m.frame @ offset(m))
 
 
-def _sag(m: BeamMotion) -> ca.SX:
-    """Return the mean deflection of the axis off the chord, in the frame."""
+def offset(m: BeamMotion) -> ca.SX:
+    """Return how far the mean of the axis lies off the middle of the chord, in the frame.
+
+    Across, the deflection of the cubic; along, what the bending of the more bent half draws in: ∫½(v'² + w'²)(ξ − ½).
+    """
     import casadi as ca
 
-    difference = m.theta[0] - m.theta[1]
-    return m.p["L"] / 12.0 * ca.vertcat(0, difference[2], -difference[1])
+    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
+    along = (y2 * y2 + z2 * z2 - y1 * y1 - z1 * z1) / 60.0
+    return m.p["L"] * ca.vertcat(along, (z1 - z2) / 12.0, (y2 - y1) / 12.0)
+
+
+def offset_force(m: BeamMotion, force: ca.SX) -> BeamForce:
+    """Return a force that acts on the `offset`, given in the frame."""
+    import casadi as ca
+
+    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
+    along, c = m.p["L"] * force[0] / 30.0, m.p["L"] / 12.0
+    m1 = ca.vertcat(0, -c * force[2] - along * y1, c * force[1] - along * z1)
+    m2 = ca.vertcat(0, c * force[2] + along * y2, along * z2 - c * force[1])
+    return BeamForce(ca.vertcat(0, m1, m2), ca.cross(offset(m), force), ca.SX(12, 1))
 
 
 def _components(v: ca.SX) -> tuple:

@@ -19,12 +19,18 @@ def floating() -> fc.Structure:
     """Nothing touches the ground, and every freedom is one of a node's."""
     beam = fc.Beam("beam", (0, 0, 0), (1, 0.5, 0), E, elements=2)
     body = fc.RigidBody("body", (1, 0.5, 0.3), 2.0, [[0.3, 0.02, 0.0], [0.02, 0.2, 0.01], [0.0, 0.01, 0.4]])
-    rope = fc.Rope("rope", beam.start, (0, -0.5, -1.0), EA=700.0)
-    load = fc.PointMass("load", rope.end, 1.5)
+    line = fc.Spring("line", beam.start, (0, -0.5, -1.0), stiffness=700.0)
+    load = fc.PointMass("load", line.end, 1.5)
     spring = fc.Spring("spring", beam.end, body.node, stiffness=300.0)
-    joints = [fc.Pin(beam.start, rope.start), fc.Pin(rope.end, load.node)]
+    joints = [fc.Pin(beam.start, line.start), fc.Pin(line.end, load.node)]
     joints += [fc.Pin(beam.end, spring.start), fc.Pin(body.node, spring.end)]
-    return fc.Structure([beam, body, rope, load, spring], joints)
+    return fc.Structure([beam, body, line, load, spring], joints)
+
+
+def bar(elements: int) -> fc.Structure:
+    beam = fc.Beam("bar", (0, 0, 0), (1, 0.5, 0), E, elements=elements)
+    load = fc.PointMass("load", beam.end, 1.5)
+    return fc.Structure([beam, load], [fc.Pin(beam.end, load.node)])
 
 
 def from_outside(model: fc.Model, state: fc.State, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -35,38 +41,42 @@ def from_outside(model: fc.Model, state: fc.State, v: np.ndarray, a: np.ndarray)
     speed, spin = v_raw[:, :3] + carried, v_raw[:, 3:] + SPIN
     pull = a_raw[:, :3] + 2 * np.cross(SPIN, v_raw[:, :3]) + np.cross(SPIN, carried)
     turn = a_raw[:, 3:] + np.cross(SPIN, v_raw[:, 3:])
-    pick = [np.argmax(T[:, i].toarray()) for i in range(model.n)]
+    nodes = [f"{node.part}_{node.index}" for node in model.structure.nodes]
+    places = [name.rsplit("_", 1) for name in model.coordinates]
+    pick = [6 * nodes.index(node) + ["u", "v", "w", "rx", "ry", "rz"].index(freedom) for node, freedom in places]
     return np.hstack([speed, spin]).ravel()[pick], np.hstack([pull, turn]).ravel()[pick]
 
 
+def gap(structure: fc.Structure, effects: list[fc.Effect], step: float) -> float:
+    """Farthest that a node is from itself after the same motion of 0.1 s, seen from inside and from outside."""
+    runs = []
+    for frame in ([FRAME], []):
+        model = fc.assemble(structure, [*effects, *frame], fc.CasadiVM())
+        v = 0.2 * np.ones(model.n)
+        v = v if frame else from_outside(model, model.rest, v, 0.0 * v)[0]
+        method = fc.GeneralizedAlpha(step=step, rho=1.0)
+        runs.append(fc.simulate(model, until=0.1, start=model.rest.with_(v=v), method=method).final.x[:-1])
+    back = Rotation.from_rotvec(-0.1 * SPIN).as_matrix()
+    return float(np.abs((runs[1] - CENTER) @ back.T + CENTER - runs[0]).max())
+
+
 def test_forces_are_those_of_the_same_motion_seen_from_outside():
-    turning, outside = (fc.assemble(floating(), e, fc.CasadiVM()) for e in ([*MOVING, FRAME], MOVING))
+    """To the last digit where nothing bends; beam elements agree up to their mesh, see the runs below."""
+    turning, outside = (fc.assemble(floating(), [fc.LargeRotation(), *e], fc.CasadiVM()) for e in ([FRAME], []))
     rng = np.random.default_rng(3)
-    state = turning.displace(0.2 * rng.normal(size=turning.n))
+    state = turning.displace(0.3 * rng.normal(size=turning.n))
     v, a = rng.normal(size=(2, turning.n))
     expected = outside.balance(state, *from_outside(turning, state, v, a))
     assert np.allclose(turning.balance(state, v, a), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
 def test_a_run_in_the_turning_frame_is_the_run_outside():
-    """Turned back into the frame at the end; both converge to the same place with the square of the step."""
-    gaps = []
-    for step in (2e-3, 1e-3):
-        runs = []
-        for effects in ([*MOVING, FRAME], MOVING):
-            model = fc.assemble(floating(), effects)
-            v = np.random.default_rng(0).normal(size=model.n)
-            if FRAME not in effects:
-                v, _ = from_outside(model, model.rest, v, 0.0 * v)
-            start = model.rest.with_(v=v)
-            method = fc.GeneralizedAlpha(step=step, rho=1.0)
-            runs.append(fc.simulate(model, until=0.2, start=start, method=method).final)
-        inside, outside = runs
-        back = Rotation.from_rotvec(-0.2 * SPIN).as_matrix()
-        nodes = slice(0, -1)
-        gaps.append(np.abs((outside.x[nodes] - CENTER) @ back.T + CENTER - inside.x[nodes]).max())
-    assert gaps[1] < 2e-5
-    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2.0, abs=0.2)
+    """Rigid: up to the square of the step. Bending: up to the mesh, which inertia feels differently."""
+    gaps = [gap(floating(), [fc.LargeRotation()], step) for step in (4e-3, 2e-3)]
+    assert gaps[1] < 1e-5
+    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2.0, abs=0.1)
+    gaps = [gap(bar(n), MOVING, 2e-3) for n in (1, 4)]
+    assert gaps[1] < min(1e-5, gaps[0] / 3.0)
 
 
 @pytest.mark.parametrize("effects", [MOVING, [fc.LargeRotation()]], ids=["flexible", "rigid"])
@@ -78,8 +88,8 @@ def test_the_jacobi_integral_is_kept(effects):
     kept = [sum(model.energy(state)[:2]) for state in (start, run.final)]
     kinetic = model.energy(start)[0]
     assert kept[1] == pytest.approx(kept[0], abs=1e-4 * kinetic)
-    assert abs(model.energy(run.final)[0] - kinetic) > 0.1 * kinetic
-    assert run.report.energy_residual < 1e-4
+    assert abs(model.energy(run.final)[0] - kinetic) > 0.02 * kinetic
+    assert run.report.energy_residual < 2e-4
 
 
 def test_a_point_on_springs_has_its_frequency_up_and_down_by_the_spin():
@@ -134,3 +144,16 @@ def test_gravity_along_the_axis_and_a_frame_at_rest_are_welcome():
 def test_frames_that_cannot_be_are_refused(vectors):
     with pytest.raises(StructureError, match=r"RotatingFrame: (rate|center)"):
         fc.RotatingFrame(*vectors)
+
+
+def test_small_motion_of_a_spinning_blade_has_the_same_poles():
+    """`GeometricStiffness` in the place of `LargeRotation`: the Coriolis terms come along."""
+    blade = fc.Beam("blade", (0.2, 0, 0), (1.2, 0, 0), E, elements=2)
+    structure = fc.Structure([blade], [fc.Support(blade.start)])
+    spin = fc.RotatingFrame((0, 0, 8.0))
+    large, small = (
+        fc.linearize(fc.assemble(structure, [fc.Flexible(), e, spin], fc.CasadiVM()))
+        for e in (fc.LargeRotation(), fc.GeometricStiffness())
+    )
+    assert abs(small.C).max() > 1.0
+    np.testing.assert_allclose(small.damped_poles().imag, large.damped_poles().imag, rtol=1e-9, atol=1e-9)
