@@ -13,6 +13,7 @@ from typing import Any
 _HOMES = {
     "flexctrl.structure.sections": ("STEEL", "Material", "Section"),
     "flexctrl.structure.elements": ("Beam", "Node", "PointMass", "RigidBody", "Rope", "Spring"),
+    "flexctrl.structure.chains": ("BeamChain", "arc"),
     "flexctrl.structure.joints": ("Hinge", "Pin", "Slide", "Support", "Weld"),
     "flexctrl.structure.drives": ("LinearDrive", "RotaryDrive"),
     "flexctrl.structure.signals": (
