@@ -86,6 +86,8 @@ _HOMES = {
     "flexctrl.study.zeros": ("SensorChoice", "Zeros", "sensor_choices", "zeros"),
     "flexctrl.study.compare": ("Comparison", "compare"),
     "flexctrl.study.ledger": ("Ledger", "ledger"),
+    "flexctrl.study.settings": ("Fidelity", "Setting", "sweep"),
+    "flexctrl.study.work_precision": ("WorkPrecision", "work_precision"),
     "flexctrl.study.spillover": ("Spillover", "spillover"),
     "flexctrl.study.confirm": ("Confirmation",),
     "flexctrl.study.amplitudes": ("ConstantLoad", "InitialDisplacement", "InitialMode", "InitialSpeed"),

@@ -329,3 +329,14 @@ def test_ledger_tells_what_each_effect_changes(told, tmp_path):
     assert data["minimal"]["output_change"] <= 0.02
     assert json.loads((tmp_path / "ledger.json").read_text())["minimal_set"] == data["minimal_set"]
     assert (tmp_path / "ledger.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_cost_tells_the_cheapest_setting(told, tmp_path):
+    data = told("cost", "--tolerance", "0.05", "--out", tmp_path)
+    assert {"points", "chosen"} <= set(data)
+    for point in data["points"]:
+        assert {"setting", "error", "time_ratio", "pareto"} <= set(point)
+    assert data["chosen"] in [p["setting"] for p in data["points"]]
+    assert (tmp_path / "cost.png").stat().st_size > 10_000
+    assert len((tmp_path / "cost.jsonl").read_text().splitlines()) == len(data["points"])

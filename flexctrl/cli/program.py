@@ -76,6 +76,12 @@ COMMANDS = {
         "flexctrl ledger examples/ceiling_crane.toml --tolerance 0.01 --out results",
         ("tolerance",),
     ),
+    "cost": Command(
+        "flexctrl.cli.cost",
+        "error against time for many settings, and the cheapest for the tolerance asked",
+        "flexctrl cost examples/ceiling_crane.toml --tolerance 0.01 --out results",
+        ("tolerance",),
+    ),
 }
 
 _OPTIONS: dict[str, dict[str, object]] = {

@@ -37,7 +37,7 @@ def refine(structure: Structure, factor: int) -> Structure:
         raise StructureError(f"refine: factor = {factor!r}; expected a whole number ≥ 1")
     if isinstance(structure.joints, JoinTable):
         raise StructureError(
-            f"refine: structure {structure.name!r} is tied by a join table of numbers, which has no rows for new nodes; "
+            f"refine: structure {structure.name!r} is tied by a join table of numbers, with no rows for new nodes; "
             "give it joints"
         )
     finer = {

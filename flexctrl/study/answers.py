@@ -16,7 +16,7 @@ from flexctrl.study.frequency import margins
 from flexctrl.study.gain_family import gain_family
 from flexctrl.study.omissions import Subject
 
-__all__ = ["Answer", "Change", "answer_of", "change_between"]
+__all__ = ["Answer", "Change", "answer_of", "change_between", "outputs_apart"]
 
 _SLOW = 6
 
@@ -120,8 +120,22 @@ def change_between(first: Answer, second: Answer) -> Change:
     -------
     Change
     """
-    outputs = {name: _apart(first.run, second.run, name) for name in first.run.outputs}
+    outputs = outputs_apart(first.run, second.run)
     return Change(outputs, _poles_apart(first.poles, second.poles), _margins_apart(first.margins, second.margins))
+
+
+def outputs_apart(first: Run, second: Run) -> dict[str, float]:
+    """Return max |Δy| over the largest |y| of the first run, by output; 1 for one that the second does not have.
+
+    Parameters
+    ----------
+    first, second : Run
+
+    Returns
+    -------
+    dict of str to float
+    """
+    return {name: _apart(first, second, name) for name in first.outputs}
 
 
 def _apart(first: Run, second: Run, name: str) -> float:

@@ -1,0 +1,56 @@
+"""``flexctrl cost``: what accuracy costs, and the cheapest setting for the tolerance asked."""
+
+from __future__ import annotations
+
+from flexctrl.cli.answer import Answer, plain, write_json
+from flexctrl.cli.program import Request
+from flexctrl.cli.progress import progress
+from flexctrl.errors import SceneError
+from flexctrl.scene import load_scene
+from flexctrl.study.work_precision import WorkPrecision, work_precision
+
+
+def answer(request: Request) -> Answer:
+    """Try many settings on a scene."""
+    if not request.tolerance > 0.0:
+        raise SceneError(f"--tolerance {request.tolerance}: expected a relative error > 0, e.g. 0.01")
+    scene = load_scene(request.scene)
+    store = None if request.out is None else request.out / "cost.jsonl"
+    with progress(f"{scene.name}: cost") as tell:
+        study = work_precision(scene, request.tolerance, store=store, progress=tell)
+    data = _data(study)
+    write_json(request.out, "cost.json", data)
+    if request.out is not None:
+        study.plot().savefig(request.out / "cost.png", dpi=150)
+    problem = "" if study.complete else "interrupted: not all settings were tried"
+    return Answer(f"{scene.name}: error against time\n\n{study}", data, problem)
+
+
+def _data(study: WorkPrecision) -> dict[str, object]:
+    front = set(map(id, study.pareto))
+    points = [
+        {
+            "setting": str(p.setting),
+            "error": p.error,
+            "time_ratio": p.time_ratio,
+            "pareto": id(p) in front,
+            "steps": p.steps,
+            "failure": p.failure,
+        }
+        for p in study.points
+    ]
+    reference = {"setting": str(study.reference.setting), "agreement": study.reference.agreement}
+    return plain(
+        {
+            "scene": study.name,
+            "tolerance": study.tolerance,
+            "points": points,
+            "chosen": str(study.chosen.setting) if study.chosen else None,
+            "held_out": study.held_out,
+            "reference": reference,
+            "complete": study.complete,
+        }
+    )
+
+
+__all__ = ["answer"]

@@ -1,0 +1,157 @@
+"""How accurately a scene is computed: fidelity, mesh, integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.steps import Fixed, Integrator
+from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import Deforming, ShaftElasticity
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
+from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.structure.elements import Beam
+from flexctrl.structure.refine import refine
+from flexctrl.study.omissions import Subject
+
+__all__ = ["Fidelity", "Setting", "sweep"]
+
+
+def _rigid(effects: Sequence[Effect]) -> list[Effect]:
+    return [e for e in effects if not isinstance(e, Deforming)]
+
+
+def _shafts(effects: Sequence[Effect]) -> list[Effect]:
+    return [e for e in effects if not isinstance(e, Deforming) or isinstance(e, ShaftElasticity)]
+
+
+def _linear(effects: Sequence[Effect]) -> list[Effect]:
+    return [GeometricStiffness() if isinstance(e, LargeRotation) else e for e in effects]
+
+
+class Fidelity(Enum):
+    """Rungs of physics on the same scene, the cheapest first."""
+
+    RIGID = "rigid"
+    RIGID_WITH_SHAFTS = "rigid, shafts"
+    LINEAR = "linear"
+    FULL = "full"
+
+    def effects(self, given: Sequence[Effect]) -> list[Effect]:
+        """Return the effects of this rung out of a scene's.
+
+        Parameters
+        ----------
+        given : sequence of Effect
+
+        Returns
+        -------
+        list of Effect
+        """
+        flat = [part for e in given for part in e.parts()]
+        rungs: dict[Fidelity, Callable[[Sequence[Effect]], list[Effect]]] = {
+            Fidelity.RIGID: _rigid,
+            Fidelity.RIGID_WITH_SHAFTS: _shafts,
+            Fidelity.LINEAR: _linear,
+            Fidelity.FULL: list,
+        }
+        return rungs[self](flat)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to compute a scene.
+
+    Attributes
+    ----------
+    fidelity : Fidelity
+    mesh : int
+        Elements of each beam over the scene's own.
+    method : Integrator
+    tolerance : Tolerance
+        For error-controlled methods.
+    """
+
+    fidelity: Fidelity
+    mesh: int
+    method: Integrator
+    tolerance: Tolerance
+
+    def __str__(self) -> str:
+        kind = type(self.method).__name__
+        pace = self.method.pace
+        accuracy = f"step {pace.step:.3g} s" if isinstance(pace, Fixed) else f"tolerance {self.tolerance.relative:.0e}"
+        return f"{self.fidelity.value}, mesh × {self.mesh}, {kind}, {accuracy}"
+
+    def of(self, scene: Subject) -> Subject:
+        """Return a scene computed this way.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        Scene
+        """
+        structure = refine(scene.structure, self.mesh) if self.mesh > 1 else scene.structure
+        simulation = replace(scene.simulation, method=self.method, tolerance=self.tolerance)
+        return scene.with_(structure=structure, effects=self.fidelity.effects(scene.effects), simulation=simulation)
+
+
+def sweep(
+    scene: Subject,
+    fidelities: Sequence[Fidelity] = tuple(Fidelity),
+    meshes: Sequence[int] = (1, 2, 4),
+    methods: Sequence[tuple[Integrator, Tolerance]] = (),
+) -> tuple[Setting, ...]:
+    """Return the settings to try on a scene, each once.
+
+    Parameters
+    ----------
+    scene : Scene
+    fidelities : sequence of Fidelity
+        Those that change nothing of the scene are left out.
+    meshes : sequence of int
+        Factors; a machine whose beams are rigid is tried with the first only.
+    methods : sequence of (Integrator, Tolerance)
+        Default: around the scene's own: steps from 8 times as long to half, or tolerances from 1e-2 to 1e-6.
+
+    Returns
+    -------
+    tuple of Setting
+    """
+    chosen = tuple(methods) or around(scene.simulation.method, scene.simulation.tolerance)
+    found: list[Setting] = []
+    seen: list[list[Effect]] = []
+    for fidelity in fidelities:
+        effects = fidelity.effects(scene.effects)
+        if effects in seen:
+            continue
+        seen.append(effects)
+        bends = any(e.bends(p) for e in effects for p in scene.structure.elements if isinstance(p, Beam))
+        finer = meshes if bends else meshes[:1]
+        found += [Setting(fidelity, mesh, method, tolerance) for mesh in finer for method, tolerance in chosen]
+    return tuple(found)
+
+
+def around(method: Integrator | None, tolerance: Tolerance) -> tuple[tuple[Integrator, Tolerance], ...]:
+    """Return methods coarser and finer than a scene's own.
+
+    Parameters
+    ----------
+    method : Integrator or None
+    tolerance : Tolerance
+
+    Returns
+    -------
+    tuple of (Integrator, Tolerance)
+    """
+    if isinstance(method, GeneralizedAlpha):
+        return tuple((replace(method, step=f * method.step), tolerance) for f in (8.0, 4.0, 2.0, 1.0, 0.5))
+    adaptive = method if method is not None else AdaptiveAlpha()
+    scale = tolerance.absolute / tolerance.relative if tolerance.relative else 1e-3
+    return tuple((adaptive, Tolerance(r, scale * r)) for r in (1e-2, 1e-3, 1e-4, 1e-5))
