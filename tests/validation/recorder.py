@@ -93,7 +93,7 @@ def compared(
     worst = float(gap.max())
     assert worst <= limit, f"{case}: {found} against {expected}, off by {worst:.2e}, tolerance {tolerance}"
     shown = str(tolerance) if isinstance(tolerance, Absolute) else f"{tolerance:.4g}"
-    return Row(case, module, test, _shown(expected), source, _shown(found), f"{worst:.1e}", shown)
+    return Row(case, module, test, _shown(expected), source, _shown(found), f"{worst:.1e}" if worst else "0", shown)
 
 
 def _shown(values: np.ndarray) -> str:
