@@ -152,27 +152,46 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Bea
     e3 = e3 / ca.sqrt(ca.dot(e3, e3))
     e2 = ca.cross(e3, e1)
     frame = ca.horzcat(e1, e2, e3)
-    normal = (ca.dot(mean, e1), ca.dot(mean, e2))
-    # q×e3 for the lever arms of the twist, in frame axes; q = (q1, q2, q3) there
-    local = [frame.T @ side for side in sides]
-    arms = tuple(ca.vertcat(q[1], -q[0], 0) for q in local)
-    rates = tuple(frame.T @ v for v in (first.v, first.w, second.v, second.w))
-    accelerations = tuple(frame.T @ a for a in (first.a, first.b, second.a, second.b))
+    rates, accelerations = (first.v, first.w, second.v, second.w), (first.a, first.b, second.a, second.b)
+    return framed_motion(
+        p,
+        frame,
+        chord,
+        tuple(frame.T @ side for side in sides),
+        tuple(rotation_vector(frame.T @ (node.R @ rest)) for node in (first, second)),
+        tuple(frame.T @ v for v in rates),
+        tuple(frame.T @ a for a in accelerations),
+    )
+
+
+def framed_motion(
+    p: dict[str, ca.SX],
+    frame: ca.SX,
+    chord: ca.SX,
+    sides: tuple[ca.SX, ...],
+    theta: tuple[ca.SX, ...],
+    rates: tuple[ca.SX, ...],
+    accelerations: tuple[ca.SX, ...],
+) -> BeamMotion:
+    """Return the motion of an element from what is seen in its frame; ``sides`` are the nodes' second axes."""
+    import casadi as ca
+
+    normal = tuple(0.5 * (sides[0][i] + sides[1][i]) for i in range(2))
+    # q×e3 for the lever arms of the twist, q = (q1, q2, q3)
+    arms = tuple(ca.vertcat(q[1], -q[0], 0) for q in sides)
     dv = rates[2] - rates[0]
     spin_y, spin_z = -dv[2] / chord, dv[1] / chord
     twist = 0.5 * (ca.dot(rates[1], arms[0]) + ca.dot(rates[3], arms[1]))
-    spin = ca.vertcat((twist + spin_y * normal[0]) / normal[1], spin_y, spin_z)
-    theta = tuple(rotation_vector(frame.T @ (node.R @ rest)) for node in (first, second))
     return BeamMotion(
         p=p,
         frame=frame,
         middle=0.5 * (first.x + second.x),
         chord=chord,
-        normal=normal,
+        normal=normal,  # type: ignore[arg-type]
         arms=arms,  # type: ignore[arg-type]
         stretch=chord - p["L"],
         theta=theta,  # type: ignore[arg-type]
-        spin=spin,
+        spin=ca.vertcat((twist + spin_y * normal[0]) / normal[1], spin_y, spin_z),
         rates=rates,  # type: ignore[arg-type]
         accelerations=accelerations,  # type: ignore[arg-type]
     )

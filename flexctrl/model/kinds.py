@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from flexctrl.effects.effect import Effect
 from flexctrl.mechanics import beam, pieces
 from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.beam_tangent import beam_slope
 from flexctrl.mechanics.kernel import Kernel
 
 if TYPE_CHECKING:
@@ -37,6 +38,9 @@ class Shares:
 Physics = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX"], Shares]
 """(effects, node motions, drive slot, parameters) → what acts on the piece."""
 
+Slope = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX"], "ca.SX"]
+"""(effects, node motions, parameters, seeds) → ∂force/∂(raw motion)."""
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -53,6 +57,8 @@ class Kind:
         Source angles a piece (0 or 1).
     parameters : int
     physics : callable
+    slope : callable, optional
+        The tangent, where there is a quicker way to it than differentiating the physics.
     """
 
     name: str
@@ -61,6 +67,7 @@ class Kind:
     drives: int
     parameters: int
     physics: Physics
+    slope: Slope | None = None
 
     @property
     def width(self) -> int:
@@ -103,13 +110,21 @@ class Kernels:
         """
         import casadi as ca
 
-        symbols, parameters, _ = self._rest
+        symbols, parameters = symbols_of(self.kind)
         seeds = ca.SX.sym("seeds", 3)
+        slope = self._slope(symbols, parameters, seeds)
+        return _kernel(f"{self.kind.name}_tangent", ca.vertcat(symbols, seeds), parameters, ca.vec(ca.densify(slope)))
+
+    def _slope(self, symbols: ca.SX, parameters: ca.SX, seeds: ca.SX) -> ca.SX:
+        import casadi as ca
+
+        zero = ca.SX(self.kind.width, 1)
+        if self.kind.slope is not None and not _turning(self.effects):
+            return self.kind.slope(self.effects, moved(self.kind, symbols, zero, seeds), parameters, seeds)
         increment = ca.SX.sym("increment", self.kind.width)
         shares = self._evaluate(symbols, parameters, increment, seeds)
         slope = ca.jacobian(ca.cse(shares.force + shares.inertia), increment)
-        slope = ca.substitute(slope, increment, ca.SX.zeros(self.kind.width))
-        return _kernel(f"{self.kind.name}_tangent", ca.vertcat(symbols, seeds), parameters, ca.vec(ca.densify(slope)))
+        return ca.substitute(slope, increment, ca.densify(zero))
 
     @cached_property
     def _rest(self) -> tuple[ca.SX, ca.SX, Shares]:
@@ -208,6 +223,13 @@ def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     return Shares(inertia, beam.nodal_force(m, force), beam.kinetic_energy(m), stored - carried)
 
 
+def _beam_slope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], parameters: ca.SX, seeds: ca.SX) -> ca.SX:
+    def force(m: beam.BeamMotion) -> beam.BeamForce:
+        return sum((e.beam(m) for e in effects), beam.inertial_force(m))
+
+    return beam_slope(nodes[0], nodes[1], parameters, seeds, force)
+
+
 def _turning(effects: tuple[Effect, ...]) -> bool:
     """Tell whether some effect lets inertia feel another motion than that of the nodes."""
     return any(type(e).inertial is not Effect.inertial for e in effects)
@@ -286,7 +308,7 @@ def _drive(effects: tuple[Effect, ...], m: pieces.DriveMotion) -> Shares:
     return Shares(inertia, force, 0.5 * m.p["inertia"] * m.source_rate**2, stored)
 
 
-BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam)
+BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam, _beam_slope)
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
 ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
 POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)
