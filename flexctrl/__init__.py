@@ -34,6 +34,7 @@ _HOMES = {
     "flexctrl.structure.join_table": ("JoinTable",),
     "flexctrl.structure.structure": ("Structure", "planar"),
     "flexctrl.structure.refine": ("refine",),
+    "flexctrl.effects.automatic": ("Automatic",),
     "flexctrl.effects.gravity": ("Gravity",),
     "flexctrl.effects.flexibility": ("BeamFlexibility", "Flexible", "RopeStretch", "ShaftElasticity"),
     "flexctrl.effects.large_rotation": ("LargeRotation",),

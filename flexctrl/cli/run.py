@@ -21,7 +21,7 @@ from flexctrl.study.compare import Comparison, numbers
 
 def answer(request: Request) -> Answer:
     """Run a scene."""
-    scene = load_scene(request.scene)
+    scene = load_scene(request.scene).settled
     wanted = scene.simulation is not None and scene.simulation.rigid_twin
     run, twin = run_both(scene, twin=wanted)
     data = plain({"scene": scene.name, **told(run)} | ({"rigid": told(twin)} if twin else {}))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from flexctrl.effects.automatic import Automatic
 from flexctrl.effects.damping import ModalDamping, RayleighDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Flexible, RopeStretch, ShaftElasticity
@@ -16,6 +17,7 @@ from flexctrl.errors import did_you_mean
 from flexctrl.scene.reading import Kind, Place, checked, number, one_or_several, positive, several, table, text, vector
 
 EFFECTS: dict[str, Kind] = {
+    "automatic": Kind(Automatic, {"tolerance": positive}),
     "gravity": Kind(Gravity, {"g": vector}),
     "flexible": Kind(Flexible),
     "beam_flexibility": Kind(BeamFlexibility, {"of": several(text)}),

@@ -14,6 +14,7 @@ from flexctrl.design.tracking import OpenLoop, Together
 from flexctrl.dynamics.alpha import Integrator
 from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.simulate import simulate
+from flexctrl.effects.automatic import Automatic
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import Flexible
 from flexctrl.effects.gravity import Gravity
@@ -28,6 +29,7 @@ from flexctrl.model.motion import State
 from flexctrl.scene.nodes import node_of
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
 from flexctrl.structure.structure import Structure
+from flexctrl.study.ledger import ledger
 
 Signal = Callable[[float], float]
 
@@ -183,6 +185,17 @@ class Scene:
             "simulation": simulation,
         }
         return replace(self, **{name: value for name, value in given.items() if value is not None})
+
+    @cached_property
+    def settled(self) -> Scene:
+        """The scene with the effects it needs: itself, unless it has `Automatic` among them."""
+        choice = next((e for e in self.effects if isinstance(e, Automatic)), None)
+        if choice is None:
+            return self
+        full = self.with_(effects=[e for e in self.effects if e is not choice])
+        found = ledger(full, choice.tolerance).scene.with_(simulation=self.simulation)
+        assert isinstance(found, Scene)
+        return found
 
     # -- models
 

@@ -130,3 +130,12 @@ def test_what_cannot_be_left_out_is_kept_with_the_reason():
     entry = fc.ledger(trolley(outputs=outputs), 0.01)["rope_stretch"]
     assert entry.keep
     assert entry.change.outputs["pull"] == 1.0
+
+
+@pytest.mark.slow
+def test_automatic_picks_the_minimal_set(scene, drawn_up):
+    chosen = scene.with_(effects=[*scene.effects, fc.Automatic(0.01)])
+    assert chosen.settled.effects == drawn_up.scene.effects
+    assert chosen.settled.simulation == scene.simulation
+    assert scene.settled is scene
+    assert chosen.model.effects == scene.model.effects  # by itself it adds nothing
