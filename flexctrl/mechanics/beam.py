@@ -156,6 +156,7 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Bea
     return framed_motion(
         p,
         frame,
+        0.5 * (first.x + second.x),
         chord,
         tuple(frame.T @ side for side in sides),
         tuple(rotation_vector(frame.T @ (node.R @ rest)) for node in (first, second)),
@@ -167,6 +168,7 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Bea
 def framed_motion(
     p: dict[str, ca.SX],
     frame: ca.SX,
+    middle: ca.SX,
     chord: ca.SX,
     sides: tuple[ca.SX, ...],
     theta: tuple[ca.SX, ...],
@@ -185,7 +187,7 @@ def framed_motion(
     return BeamMotion(
         p=p,
         frame=frame,
-        middle=0.5 * (first.x + second.x),
+        middle=middle,
         chord=chord,
         normal=normal,  # type: ignore[arg-type]
         arms=arms,  # type: ignore[arg-type]

@@ -24,6 +24,7 @@ class _Seen:
     """What is seen in the element frame, and the frame; symbols or values."""
 
     frame: ca.SX
+    middle: ca.SX
     chord: ca.SX
     sides: tuple[ca.SX, ...]
     theta: tuple[ca.SX, ...]
@@ -37,23 +38,23 @@ class _Seen:
         def some(name: str, count: int) -> tuple[ca.SX, ...]:
             return tuple(ca.SX.sym(f"{name}{i}", 3) for i in range(count))
 
-        frame, chord = ca.SX.sym("frame", 3, 3), ca.SX.sym("chord")
-        return cls(frame, chord, some("side", 2), some("theta", 2), some("rate", 4), some("acceleration", 4))
+        frame, middle, chord = ca.SX.sym("frame", 3, 3), ca.SX.sym("middle", 3), ca.SX.sym("chord")
+        return cls(frame, middle, chord, some("side", 2), some("theta", 2), some("rate", 4), some("acceleration", 4))
 
     @classmethod
     def of(cls, m: BeamMotion, first: NodeMotion, second: NodeMotion, rest: ca.SX) -> _Seen:
         sides = tuple(m.frame.T @ (node.R @ rest[:, 1]) for node in (first, second))
-        return cls(m.frame, m.chord, sides, m.theta, m.rates, m.accelerations)
+        return cls(m.frame, m.middle, m.chord, sides, m.theta, m.rates, m.accelerations)
 
     @property
     def all(self) -> ca.SX:
         """All but the frame."""
         import casadi as ca
 
-        return ca.vertcat(self.chord, *self.sides, *self.theta, *self.rates, *self.accelerations)
+        return ca.vertcat(self.middle, self.chord, *self.sides, *self.theta, *self.rates, *self.accelerations)
 
     def motion(self, p: dict[str, ca.SX], rates: tuple[ca.SX, ...] | None = None) -> BeamMotion:
-        seen = (self.chord, self.sides, self.theta, rates or self.rates, self.accelerations)
+        seen = (self.middle, self.chord, self.sides, self.theta, rates or self.rates, self.accelerations)
         return framed_motion(p, self.frame, *seen)
 
 
@@ -109,7 +110,7 @@ def _change(seen: _Seen, increment: ca.SX, turn: ca.SX, seeds: ca.SX) -> ca.SX:
     sides = [ca.cross(twist, side) for twist, side in zip(twists, seen.sides, strict=True)]
     # the rate of a rotation vector is T⁻¹ times the spin; T⁻¹(θ) = T⁻ᵀ(−θ)
     theta = [inverse_tangent(-t, twist) for t, twist in zip(seen.theta, twists, strict=True)]
-    place = ca.vertcat((u[2] - u[0])[0], *sides, *theta)
+    place = ca.vertcat(0.5 * seen.frame @ (u[0] + u[2]), (u[2] - u[0])[0], *sides, *theta)
     rates = [seeds[1] * d - seeds[0] * ca.cross(turn, v) for d, v in zip(u, seen.rates, strict=True)]
     accelerations = [seeds[2] * d - seeds[0] * ca.cross(turn, a) for d, a in zip(u, seen.accelerations, strict=True)]
     return ca.vertcat(seeds[0] * place, *rates, *accelerations)

@@ -10,11 +10,20 @@ from moving_nodes import random_slots
 from test_beam import ENDS, parameters
 
 import flexctrl as fc
+from flexctrl.effects.effect import Effect
 from flexctrl.model.kinds import BEAM, Kernels
+
+
+class Field(fc.RotatingFrame):
+    """Only the share of a turning frame that depends on where the element is."""
+
+    inertial = Effect.inertial
+
 
 EFFECTS = {
     "inertia": (),
     "flexible": (fc.BeamFlexibility(), fc.Gravity((1.0, -2.0, -9.0))),
+    "placed": (fc.BeamFlexibility(), Field((0.3, -0.2, 2.0), (0.1, 0.2, -0.3))),
     "damped": (fc.BeamFlexibility(), fc.RayleighDamping(0.3, 0.02)),
 }
 PLAIN = replace(BEAM, slope=None)
