@@ -126,12 +126,14 @@ def sweep(
     """
     chosen = tuple(methods) or around(scene.simulation.method, scene.simulation.tolerance)
     found: list[Setting] = []
+    parts = (*scene.structure.elements, *scene.structure.drives)
     seen: list[list[Effect]] = []
     for fidelity in fidelities:
         effects = fidelity.effects(scene.effects)
-        if effects in seen:
+        acting = [e for e in effects if not isinstance(e, Deforming) or any(e.bends(p) for p in parts)]
+        if acting in seen:
             continue
-        seen.append(effects)
+        seen.append(acting)
         bends = any(e.bends(p) for e in effects for p in scene.structure.elements if isinstance(p, Beam))
         finer = meshes if bends else meshes[:1]
         found += [Setting(fidelity, mesh, method, tolerance) for mesh in finer for method, tolerance in chosen]
