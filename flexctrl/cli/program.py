@@ -82,6 +82,12 @@ COMMANDS = {
         "flexctrl cost examples/ceiling_crane.toml --tolerance 0.01 --out results",
         ("tolerance",),
     ),
+    "report": Command(
+        "flexctrl.cli.report",
+        "one self-contained HTML page: machine, modes, loops, runs, ledger, cost, versions",
+        "flexctrl report examples/bridge_crane.toml --out results",
+        ("tolerance", "count", "input", "output"),
+    ),
 }
 
 _OPTIONS: dict[str, dict[str, object]] = {

@@ -23,6 +23,7 @@ HOUSE = (
     "study",
     "plots",
     "scene",
+    "report",
     "cli",
 )
 """Each may import from itself and from those before it."""

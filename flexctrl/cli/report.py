@@ -1,0 +1,118 @@
+"""``flexctrl report``: everything about a scene on one page."""
+
+from __future__ import annotations
+
+import importlib
+import platform
+import sys
+import tempfile
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import flexctrl
+from flexctrl.cli.answer import Answer, plain
+from flexctrl.cli.program import COMMANDS, Request
+from flexctrl.design.hardware import Noisy
+from flexctrl.errors import FlexctrlError
+from flexctrl.report.modes import animation
+from flexctrl.report.page import Section, page
+from flexctrl.scene import Scene, load_scene
+
+_TITLES = {
+    "table": "Machine",
+    "modes": "Modes",
+    "bode": "Bode",
+    "rlocus": "Root locus",
+    "compare": "Closed loop",
+    "run": "Numerical health",
+    "ledger": "Effects",
+    "cost": "Accuracy",
+}
+_MODES = 12
+_PACKAGES = ("numpy", "scipy", "control", "casadi", "matplotlib", "llvmlite", "slycot")
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What one command had to say."""
+
+    section: Section
+    data: dict[str, Any]
+
+
+def answer(request: Request) -> Answer:
+    """Let every command speak, and bind what they say into one page."""
+    scene = load_scene(request.scene)
+    out = request.out or Path()
+    with tempfile.TemporaryDirectory() as folder:
+        chapters = [_chapter(name, request, Path(folder)) for name in _TITLES if _applies(name, scene)]
+        sections = [*(c.section for c in chapters), Section("versions", "Versions", _versions(scene))]
+        motion = _motion(scene) if any(s.moving for s in sections) else {}
+        text = page(scene.name, " ".join(scene.notes), sections, motion)
+    path = out / f"{scene.name}.html"
+    path.write_text(text, encoding="utf-8")
+    failed = [c.section.title for c in chapters if c.section.failed]
+    data = {
+        "scene": scene.name,
+        "page": str(path),
+        "bytes": len(text.encode()),
+        "sections": [s.title for s in sections],
+        "failed": failed,
+    }
+    problem = f"no answer for: {', '.join(failed)} (the page says why)" if failed else ""
+    return Answer(f"{scene.name}: {path} ({len(text) // 1024} KiB), {len(sections)} sections", plain(data), problem)
+
+
+def _applies(name: str, scene: Scene) -> bool:
+    timed = name in ("compare", "run", "ledger", "cost")
+    looped = name in ("bode", "rlocus")
+    if looped and not (scene.structure.inputs and scene.structure.outputs):
+        return False
+    return not timed or scene.simulation is not None
+
+
+def _chapter(name: str, request: Request, folder: Path) -> Chapter:
+    own = folder / name
+    own.mkdir()
+    try:
+        found = importlib.import_module(COMMANDS[name].module).answer(replace(request, out=own))
+    except FlexctrlError as error:
+        return Chapter(Section(name, _TITLES[name], str(error), failed=True), {})
+    pictures = () if name == "run" else tuple(sorted(own.glob("*.png")))
+    return Chapter(Section(name, _TITLES[name], found.text, pictures, moving=name == "modes"), found.data)
+
+
+def _motion(scene: Scene) -> dict[str, Any]:
+    settled = scene.settled
+    modes = settled.linear.modes()
+    return animation(settled.structure, modes.select(list(range(min(_MODES, len(modes))))))
+
+
+def _versions(scene: Scene) -> str:
+    lines = [f"flexctrl {flexctrl.__version__}", f"Python {platform.python_version()} on {sys.platform}"]
+    lines += [f"{name} {_version(name)}" for name in _PACKAGES]
+    lines += [f"made {datetime.now(UTC):%Y-%m-%d %H:%M} UTC", f"seeds of noise: {_seeds(scene.law) or 'none'}"]
+    return "\n".join(lines)
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _seeds(law: Any) -> str:
+    """The seeds of all noise round a controller."""
+    found = []
+    while law is not None:
+        if isinstance(law, Noisy):
+            found.append(str(law.seed))
+        law = getattr(law, "controller", None)
+    return ", ".join(found)
+
+
+__all__ = ["answer"]

@@ -1,0 +1,42 @@
+"""Mode shapes as data that a page can move."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexctrl.model.modes import Modes
+from flexctrl.plots.modes import mode_label, mode_pose
+from flexctrl.structure.structure import Structure
+
+__all__ = ["animation"]
+
+
+def animation(structure: Structure, modes: Modes) -> dict[str, Any]:
+    """Return a machine's lines at rest and at full swing in each mode.
+
+    Parameters
+    ----------
+    structure : Structure
+    modes : Modes
+        With their place.
+
+    Returns
+    -------
+    dict
+        ``rest``: points of every node; ``lines``: node numbers, a list a part; ``modes``: label and displacements.
+    """
+    place = modes.place
+    assert place is not None
+    rest = place.state.x[: len(structure.nodes)]
+    lines = [[structure.number(node) for node in part.nodes] for part in structure.elements]
+    shapes = [
+        {"label": mode_label(modes, k), "moved": _rounded(mode_pose(place, modes.shapes[:, k]).x[: len(rest)] - rest)}
+        for k in range(len(modes))
+    ]
+    return {"rest": _rounded(rest), "lines": lines, "modes": shapes}
+
+
+def _rounded(values: np.ndarray) -> list[list[float]]:
+    return [[float(f"{v:.6g}") for v in row] for row in values.tolist()]

@@ -1,0 +1,109 @@
+"""The report: one page that needs nothing else, clicked through in a browser."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+from scenes import TROLLEY
+
+from flexctrl.cli import main
+from flexctrl.report.modes import animation
+from flexctrl.report.page import Section, page
+from flexctrl.scene.files import scene_from
+from flexctrl.scene.reading import Place
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    short = TROLLEY.replace("until = 0.2", "until = 0.05").replace("step = 2e-3", "step = 5e-3")
+    (folder / "trolley.toml").write_text(short, encoding="utf-8")
+    assert main(["report", str(folder / "trolley.toml"), "--out", str(folder), "--tolerance", "0.1"]) == 0
+    return folder / "trolley.html"
+
+
+def test_text_is_escaped_and_data_cannot_end_the_script():
+    made = page("a < b", "", [Section("one", "x & y", "<b>")], {"modes": "</script>"})
+    assert "a &lt; b" in made
+    assert "x &amp; y" in made
+    assert "&lt;b&gt;" in made
+    assert '"</script>' not in made
+
+
+def test_the_animation_is_the_mode_shape():
+    scene = scene_from(tomllib.loads(TROLLEY), Place("trolley.toml"), "trolley")
+    modes = scene.linear.modes()
+    found = animation(scene.structure, modes)
+    assert len(found["modes"]) == len(modes)
+    assert len(found["rest"]) == len(scene.structure.nodes)
+    assert {n for line in found["lines"] for n in line} == set(range(len(found["rest"])))
+    pendulum = next(m for m, kind in zip(found["modes"], modes.kinds, strict=True) if kind == "flexible")
+    moved = dict(zip([str(n) for n in scene.structure.nodes], pendulum["moved"], strict=True))
+    assert abs(moved["node 0 of load"][0]) > 10 * abs(moved["node 0 of load"][2])
+
+
+@pytest.mark.slow
+def test_the_page_needs_nothing_else(report):
+    text = report.read_text(encoding="utf-8")
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!data:)""", text)
+    assert "url(" not in text
+    for title in ("Machine", "Modes", "Bode", "Root locus", "Closed loop", "Effects", "Accuracy", "Versions"):
+        assert f">{title}<" in text
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    CHROMIUM is None or DRIVER is None, reason="no Chromium here: apt-get install chromium chromium-driver"
+)
+def test_a_browser_shows_every_section_without_errors(report):
+    webdriver = pytest.importorskip(
+        "selenium.webdriver", reason="selenium is not installed: pip install flexctrl[test]"
+    )
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=DRIVER))
+    try:
+        browser.get(report.as_uri())
+        tabs = browser.find_elements("css selector", "nav button")
+        assert len(tabs) == 9
+        for tab in tabs:
+            tab.click()
+            shown = [s for s in browser.find_elements("css selector", "main section") if s.is_displayed()]
+            assert [s.get_attribute("id") for s in shown] == [tab.get_attribute("data-section")]
+            assert shown[0].text.strip()
+            for picture in shown[0].find_elements("css selector", "img"):
+                assert browser.execute_script("return arguments[0].naturalWidth", picture) > 100
+        _modes_move(browser)
+        severe = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+        assert not severe, json.dumps(severe)
+    finally:
+        browser.quit()
+
+
+def _modes_move(browser) -> None:
+    """The canvas changes while it plays and stands still when it is paused."""
+    pixels = "return document.getElementById('swing').toDataURL()"
+    still = (
+        """const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 150)))"""
+    )
+    browser.find_element("css selector", "[data-section=modes]").click()
+    choices = browser.find_elements("css selector", "#mode option")
+    choices[-1].click()
+    before = browser.execute_script(pixels)
+    browser.execute_async_script(still)
+    assert browser.execute_script(pixels) != before
+    browser.find_element("id", "play").click()
+    browser.execute_async_script(still)
+    paused = browser.execute_script(pixels)
+    browser.execute_async_script(still)
+    assert browser.execute_script(pixels) == paused
