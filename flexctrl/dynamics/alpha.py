@@ -23,6 +23,7 @@ from flexctrl.model.solve import Plan, Solve, factorise, plan
 
 _TURNED = 0.02
 _POOR = 0.25
+_ASTRAY = 1.5
 _ITERATIONS = 12
 _NEWTON = 1e-10
 
@@ -158,7 +159,7 @@ class Stepper:
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
         step = h * now.v + h * h * ((0.5 - c.beta) * point.algorithmic + c.beta * algorithmic)
         v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
-        last, contraction = np.inf, 0.0
+        foreseen, last, contraction = step, np.inf, 0.0
         for iteration in range(_ITERATIONS):
             state = self.model.advance(now, step, v, now.t + h)
             supply = self.feed.at(state, point.supply, h)
@@ -172,10 +173,10 @@ class Stepper:
             self.counts.newton += 1
             step, v, rate = step + correction, v + to_v * correction, rate + to_rate * correction
             contraction = size / last if np.isfinite(last) else 0.0
+            if not np.isfinite(size) or (contraction > 2.0 and iteration > 3) or self._astray(step - foreseen):
+                break
             if size <= self.tolerance or (0.0 < contraction < 1.0 and size * contraction <= 0.5 * self.tolerance):
                 return self._finish(point, h, step, v, rate, worst)
-            if not np.isfinite(size) or (contraction > 2.0 and iteration > 3):
-                break
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
 
@@ -191,6 +192,10 @@ class Stepper:
             )
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
         return AlphaPoint(state, rate, self.feed.at(state, point.supply, h), algorithmic, _trend(point, rate))
+
+    def _astray(self, unforeseen: np.ndarray) -> bool:
+        """Tell whether Newton's method heads for a turn that the motion did not announce: another root."""
+        return bool(np.abs(unforeseen[self._turning]).max(initial=0.0) > _ASTRAY)
 
     def _stale(self, state: State, h: float) -> bool:
         made = self.memory

@@ -84,7 +84,6 @@ class Forces:
     ) -> sp.csr_matrix:
         """Return ∂(balance)/∂(own motion) for increments that add ``seeds`` × to place, rates and accelerations.
 
-        Exact where the machine is at rest; in motion the turning of levers of followers is left out of the rates.
         ``loads`` are raw forces of the inputs; ``excess`` stresses are borne beside those of the state.
         """
         blocks = self._blocks(state, v, a, seeds)
@@ -100,7 +99,24 @@ class Forces:
             acting = self.raw(state, v, a) + (0.0 if loads is None else loads)
             acting = acting if excess is None else acting + excess.raw
             slope = slope + seeds[0] * self.motion.stiffening(state, acting)
-        return sp.csr_matrix(slope)
+        slope = sp.csr_matrix(slope)
+        return slope + self._drifting(state, v, a, seeds) if v.any() or a.any() else slope
+
+    def _drifting(self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]) -> sp.csr_matrix:
+        """What levers that turn in motion add to the slope: rates and accelerations change with the place."""
+        speed, pull, coriolis = self.motion.drift(state, v, a)
+        on_rates, on_pull = (self._raw_slope(state, v, a, seed) for seed in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+        raw = on_rates @ (seeds[0] * speed) + on_pull @ (seeds[0] * pull + seeds[1] * coriolis)
+        small = self.motion.n <= DENSE_UP_TO
+        T = self.motion.dense_jacobian(state) if small else self.motion.jacobian(state)
+        return sp.csr_matrix(T.T @ raw)
+
+    def _raw_slope(
+        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]
+    ) -> sp.csr_matrix:
+        rows, columns = self._pattern
+        blocks, size = self._blocks(state, v, a, seeds), self.motion.raw
+        return sp.csr_matrix((blocks, (rows, columns)), shape=(size, size))
 
     @cached_property
     def mixed(self) -> Mixed:

@@ -97,15 +97,25 @@ class Linkage:
     @cached_property
     def accelerations(self) -> Callable[..., np.ndarray]:
         """(pose, independent rates, their rates) → raw accelerations."""
+
+        return _callable("accelerations", [self._pose, self._rate, self._change], self._accelerations)
+
+    @cached_property
+    def drift(self) -> Callable[..., np.ndarray]:
+        """(pose, independent rates, their rates) → how raw rates and accelerations change with the pose.
+
+        ∂(raw rates)/∂(own motion), ∂(raw accelerations)/∂(own motion), ∂(raw accelerations)/∂(own rates), each of
+        shape (raw, free), by columns: all of it the turning of levers.
+        """
         import casadi as ca
 
-        change = ca.SX.sym("change", self.free)
-        V = ca.reshape(self._raw[: 6 * self.count], 6, self.count)
-        turning = [ca.skew(V[3:, i]) @ _rotation(self._pose[:, i]) for i in range(self.count)]
-        moving = ca.vertcat(*[ca.vertcat(V[:3, i], ca.vec(w.T)) for i, w in enumerate(turning)])
-        carried = ca.jtimes(self._raw, ca.vec(self._pose), moving)
-        pushed = ca.substitute(self._raw, self._rate, change)
-        return _callable("accelerations", [self._pose, self._rate, change], pushed + carried)
+        step = ca.SX.sym("step", self.free)
+        d = ca.reshape(ca.substitute(self._raw, self._rate, step)[: 6 * self.count], 6, self.count)
+        after = ca.substitute(ca.vertcat(self._raw, self._accelerations), ca.vec(self._pose), self._moved(d))
+        by_pose = ca.substitute(ca.jacobian(after, step), step, ca.SX.zeros(self.free))
+        by_rate = ca.jacobian(self._accelerations, self._rate)
+        slopes = ca.vertcat(ca.vec(ca.densify(by_pose)), ca.vec(ca.densify(by_rate)))
+        return _callable("drift", [self._pose, self._rate, self._change], slopes)
 
     @cached_property
     def collect(self) -> Callable[..., np.ndarray]:
@@ -125,14 +135,7 @@ class Linkage:
         import casadi as ca
 
         d = ca.SX.sym("d", 6, self.count)
-        moved = [
-            ca.vertcat(
-                self._pose[:3, i] + d[:3, i],
-                ca.vec((_rotation(self._pose[:, i]) + ca.skew(d[3:, i]) @ _rotation(self._pose[:, i])).T),
-            )
-            for i in range(self.count)
-        ]
-        collected = ca.substitute(self._collected, ca.vec(self._pose), ca.vertcat(*moved))
+        collected = ca.substitute(self._collected, ca.vec(self._pose), self._moved(d))
         slope = ca.substitute(ca.jacobian(collected, ca.vec(d)), ca.vec(d), ca.SX.zeros(6 * self.count))
         return _callable("stiffening", [self._pose, self._force], ca.vec(ca.densify(slope)))
 
@@ -157,6 +160,14 @@ class Linkage:
         """Pose → how far loops are open [m or rad]."""
         return _callable("gaps", [self._pose], self._gaps(self._pose))
 
+    def _moved(self, d: ca.SX) -> ca.SX:
+        """Return the pose after a small raw motion of the nodes, shape (6, count), to first order."""
+        import casadi as ca
+
+        x, R = self._pose[:3, :], [_rotation(self._pose[:, i]) for i in range(self.count)]
+        turned = [r + ca.skew(d[3:, i]) @ r for i, r in enumerate(R)]
+        return ca.vertcat(*[ca.vertcat(x[:, i] + d[:3, i], ca.vec(r.T)) for i, r in enumerate(turned)])
+
     def placed(self, pose: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Return the pose after a step of any size, with loops closed as far as round-off lets them be."""
         new, gap = self.place(pose, step), np.inf
@@ -172,6 +183,13 @@ class Linkage:
     def stiffening_at(self, pose: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return ∂collected/∂(raw motion) at a pose under constant raw forces."""
         return self.stiffening(pose, force).reshape(6 * self.count, self.free).T
+
+    def drift_at(self, pose: np.ndarray, rate: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Return the three matrices of `drift` at a pose, shape (3, raw, free)."""
+        flat = self.drift(pose, rate, change)
+        rows = self._raw.shape[0]
+        by_pose = flat[: 2 * rows * self.free].reshape(self.free, 2, rows).transpose(1, 2, 0)
+        return np.concatenate([by_pose, flat[2 * rows * self.free :].reshape(1, self.free, rows).transpose(0, 2, 1)])
 
     @cached_property
     def _pose(self) -> ca.SX:
@@ -190,6 +208,23 @@ class Linkage:
         import casadi as ca
 
         return ca.SX.sym("force", self._raw.shape[0])
+
+    @cached_property
+    def _change(self) -> ca.SX:
+        import casadi as ca
+
+        return ca.SX.sym("change", self.free)
+
+    @cached_property
+    def _accelerations(self) -> ca.SX:
+        """Raw accelerations: T times the rates' rates, and T changing on its way."""
+        import casadi as ca
+
+        V = ca.reshape(self._raw[: 6 * self.count], 6, self.count)
+        turning = [ca.skew(V[3:, i]) @ _rotation(self._pose[:, i]) for i in range(self.count)]
+        moving = ca.vertcat(*[ca.vertcat(V[:3, i], ca.vec(w.T)) for i, w in enumerate(turning)])
+        carried = ca.jtimes(self._raw, ca.vec(self._pose), moving)
+        return ca.substitute(self._raw, self._rate, self._change) + carried
 
     @cached_property
     def _collected(self) -> ca.SX:

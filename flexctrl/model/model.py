@@ -228,8 +228,6 @@ class Model:
     ) -> sp.csr_matrix:
         """Return ∂(balance + loads)/∂(own motion) for a motion that adds ``seeds`` × increment to (place, v, a).
 
-        Exact at rest; in motion the turning of followers' levers is left out of the rates.
-
         Parameters
         ----------
         state : State

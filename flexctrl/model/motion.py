@@ -276,6 +276,29 @@ class Motion:
         motion = self.linkage.matrix_at(pose)[: 6 * len(self.nodes)] @ lead
         return lead.T @ (self.linkage.stiffening_at(pose, raw[self._linked]) @ motion)
 
+    def drift(self, state: State, v: np.ndarray, a: np.ndarray) -> tuple[sp.csr_matrix | np.ndarray, ...]:
+        """Return how raw rates and accelerations change as levers turn.
+
+        Parameters
+        ----------
+        state : State
+        v, a : numpy.ndarray, shape (n,)
+            Own rates and accelerations, held.
+
+        Returns
+        -------
+        tuple of 3 matrices, shape (raw, n), arrays while small
+            ∂(raw rates)/∂(own motion), ∂(raw accelerations)/∂(own motion), ∂(raw accelerations)/∂(own rates) less
+            what `jacobian` has.
+        """
+        pose = self._pose(state.x, state.R)
+        slopes = self.linkage.drift_at(pose, v[self.linked], a[self.linked])
+        if self.n > DENSE_UP_TO:
+            return tuple(self._spread @ sp.csr_matrix(slope @ self._lead) for slope in slopes)
+        spread = np.zeros((3, self.raw, self.n))
+        spread[:, self._linked] = slopes @ self._dense_lead
+        return tuple(spread)
+
     def dead_point(self, state: State) -> bool:
         """Tell whether a loop of rigid parts is near a position from which its coordinates cannot move it."""
         if not self.linkage.loops:

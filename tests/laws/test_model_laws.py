@@ -139,6 +139,17 @@ def test_damping_is_the_slope_over_the_rates(subject):
     close(found, differences(lambda v: model.balance(s.state, v, s.still), model.n))
 
 
+def test_slope_in_motion_is_that_of_place_rates_and_accelerations_together(subject):
+    """What an integrator's tangent mixes, levers that turn included."""
+    s, model, seeds = subject, subject.model, (0.7, 1.3, 0.4)
+
+    def force(d):
+        state = s.step(seeds[0] * d)
+        return model.balance(state, s.v + seeds[1] * d, s.a + seeds[2] * d) + model.loads(state, s.u)
+
+    close(model.slope(s.state, s.v, s.a, seeds, s.u).toarray(), differences(force, model.n))
+
+
 def test_mass_is_the_slope_over_the_accelerations_symmetric_and_positive(subject):
     s, model = subject, subject.model
     M = -model.slope(s.state, s.v, s.a, (0.0, 0.0, 1.0), s.u).toarray()
