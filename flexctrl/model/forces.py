@@ -94,7 +94,7 @@ class Forces:
             data = np.bincount(places, weights=blocks, minlength=len(indices) + 1)[:-1]
             return sp.csr_matrix((data, indices, indptr), shape=(self.motion.n, self.motion.n), copy=False)
         small = self.motion.n <= DENSE_UP_TO
-        slope = self._dense(state, blocks) if small else self._projected(state, blocks, *self._pattern)
+        slope = self._dense(state, blocks) if small else self._projected(state, blocks, *self.pattern)
         if seeds[0] != 0.0:
             acting = self.raw(state, v, a) + (0.0 if loads is None else loads)
             acting = acting if excess is None else acting + excess.raw
@@ -114,7 +114,7 @@ class Forces:
     def _raw_slope(
         self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]
     ) -> sp.csr_matrix:
-        rows, columns = self._pattern
+        rows, columns = self.pattern
         blocks, size = self._blocks(state, v, a, seeds), self.motion.raw
         return sp.csr_matrix((blocks, (rows, columns)), shape=(size, size))
 
@@ -124,7 +124,7 @@ class Forces:
         return Mixed(self)
 
     def _dense(self, state: State, blocks: np.ndarray) -> np.ndarray:
-        size, (rows, columns) = self.motion.raw, self._pattern
+        size, (rows, columns) = self.motion.raw, self.pattern
         T = self.motion.dense_jacobian(state)
         raw = np.bincount(rows * size + columns, weights=blocks, minlength=size * size).reshape(size, size)
         return T.T @ raw @ T
@@ -133,7 +133,7 @@ class Forces:
         self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]
     ) -> dict[str, sp.csr_matrix]:
         """Return each part's own share of `slope`, levers of followers left out."""
-        blocks, (rows, columns) = self._blocks(state, v, a, seeds), self._pattern
+        blocks, (rows, columns) = self._blocks(state, v, a, seeds), self.pattern
         owners = np.concatenate([np.repeat(f.parts, f.scatter(0).shape[1] ** 2) for f in self.families])
         return {
             str(name): self._projected(state, blocks[owners == name], rows[owners == name], columns[owners == name])
@@ -142,7 +142,7 @@ class Forces:
 
     def _blocks(self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]) -> np.ndarray:
         z = np.append(self.slots(state, v, a), seeds)
-        blocks = np.zeros(self._pattern[0].size)
+        blocks = np.zeros(self.pattern[0].size)
         for batch in self._tangent:
             batch(z, blocks)
         return blocks
@@ -195,10 +195,10 @@ class Forces:
     @property
     def entries(self) -> int:
         """Entries of all tangent blocks together."""
-        return int(self._pattern[0].size)
+        return int(self.pattern[0].size)
 
     @cached_property
-    def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
+    def pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Raw rows and columns of all tangent blocks, in the order in which they are written (column by column)."""
         rows, columns = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
         for f in self.families:
@@ -211,7 +211,7 @@ class Forces:
     def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where each entry of the tangent blocks goes in the assembled matrix (CSR): the join table at work."""
         n = self.motion.n
-        rows, columns = (self.motion.cells[cells] for cells in self._pattern)
+        rows, columns = (self.motion.cells[cells] for cells in self.pattern)
         kept = (rows < n) & (columns < n)
         keys, inverse = np.unique(rows[kept] * n + columns[kept], return_inverse=True)
         places = np.full(len(rows), len(keys))

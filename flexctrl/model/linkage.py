@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.kernel import Kernel
 from flexctrl.mechanics.pieces import DriveMotion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
 from flexctrl.structure.drives import Drive, RotaryDrive
@@ -24,6 +25,8 @@ from flexctrl.structure.relations import Copy, Fit, Follow, Ride, Turn
 if TYPE_CHECKING:
     import casadi as ca
 
+Terms = tuple[list["ca.SX"], "ca.SX"]
+"""Arguments of a function and what it gives."""
 _CLOSING = 4
 """Newton corrections that close loops after a step; the contraction is the turn within the step."""
 
@@ -87,18 +90,17 @@ class Linkage:
     @cached_property
     def place(self) -> Callable[..., np.ndarray]:
         """(old pose, step of the independent freedoms) → new pose (count, 12)."""
-        return _callable("place", [self._pose, self._rate], self._closed_place())
+        return _callable("place", *self._placing)
 
     @cached_property
     def rates(self) -> Callable[..., np.ndarray]:
         """(pose, independent rates) → raw rates: (count, 6), then the source angles of rigid shafts."""
-        return _callable("rates", [self._pose, self._rate], self._raw)
+        return _callable("rates", *self._rating)
 
     @cached_property
     def accelerations(self) -> Callable[..., np.ndarray]:
         """(pose, independent rates, their rates) → raw accelerations."""
-
-        return _callable("accelerations", [self._pose, self._rate, self._change], self._accelerations)
+        return _callable("accelerations", *self._accelerating)
 
     @cached_property
     def drift(self) -> Callable[..., np.ndarray]:
@@ -120,7 +122,48 @@ class Linkage:
     @cached_property
     def collect(self) -> Callable[..., np.ndarray]:
         """(pose, raw forces) → forces on the independent freedoms."""
-        return _callable("collect", [self._pose, self._force], self._collected)
+        return _callable("collect", *self._collecting)
+
+    @cached_property
+    def kernels(self) -> tuple[Kernel, Kernel, Kernel, Kernel, Kernel]:
+        """The same as kernels of one item: `place`, its rotations freed of drift, to `collect`, and `driven`."""
+        import casadi as ca
+
+        arguments, pose = self._placing
+        pose = ca.reshape(pose, 12, self.count)
+        square = [_orthonormal(_rotation(pose[:, i])) for i in range(self.count)]
+        kept = ca.vertcat(*[ca.vertcat(pose[:3, i], ca.vec(R.T)) for i, R in enumerate(square)])
+        return (
+            _kernel("place", arguments, kept),
+            _kernel("rates", *self._rating),
+            _kernel("accelerations", *self._accelerating),
+            _kernel("collect", *self._collecting),
+            _kernel("driven", *self._driving),
+        )
+
+    @property
+    def _placing(self) -> Terms:
+        return [self._pose, self._rate], self._closed_place()
+
+    @property
+    def _rating(self) -> Terms:
+        return [self._pose, self._rate], self._raw
+
+    @property
+    def _accelerating(self) -> Terms:
+        return [self._pose, self._rate, self._change], self._accelerations
+
+    @property
+    def _collecting(self) -> Terms:
+        return [self._pose, self._force], self._collected
+
+    @property
+    def _driving(self) -> Terms:
+        import casadi as ca
+
+        still = [(ca.SX.zeros(3), ca.SX.zeros(3))] * self.count
+        values = [self._drive_motion(link, self._pose, still).driven for link in self.links]
+        return [self._pose], ca.vertcat(*values, ca.SX(0, 1))
 
     @cached_property
     def matrix(self) -> Callable[..., np.ndarray]:
@@ -142,11 +185,7 @@ class Linkage:
     @cached_property
     def driven(self) -> Callable[..., np.ndarray]:
         """Pose → driven coordinates of all drives; angles between −π and π."""
-        import casadi as ca
-
-        still = [(ca.SX.zeros(3), ca.SX.zeros(3))] * self.count
-        values = [self._drive_motion(link, self._pose, still).driven for link in self.links]
-        return _callable("driven", [self._pose], ca.vertcat(*values, ca.SX(0, 1)))
+        return _callable("driven", *self._driving)
 
     @cached_property
     def grip(self) -> Callable[..., np.ndarray]:
@@ -401,6 +440,20 @@ def _opening(loop: Loop | Fit, pose: ca.SX, motion: Sequence[tuple[ca.SX, ca.SX]
         return ca.dot(w - mw, ca.cross(_rotation(pose[:, loop.node]) @ ca.DM(loop.axis), across))
     arm = pose[:3, loop.node] - pose[:3, loop.master]
     return ca.dot(across, v - mv) + ca.dot(mw, ca.cross(across, arm))
+
+
+def _orthonormal(R: ca.SX) -> ca.SX:
+    """Return R with its round-off drift from orthonormality removed."""
+    import casadi as ca
+
+    return R @ (1.5 * ca.DM.eye(3) - 0.5 * R.T @ R)
+
+
+def _kernel(name: str, arguments: list[ca.SX], result: ca.SX) -> Kernel:
+    import casadi as ca
+
+    inputs = ca.vertcat(*[ca.vec(a) for a in arguments])
+    return Kernel(name, inputs, ca.SX.sym("p", 0), ca.cse(ca.densify(result)))
 
 
 def _own(number: int, values: ca.SX) -> ca.SX:

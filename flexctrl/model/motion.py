@@ -140,13 +140,13 @@ class Motion:
         return np.append(self.place.ravel(), self.sources)
 
     @cached_property
-    def _linked(self) -> np.ndarray:
+    def linked_cells(self) -> np.ndarray:
         """Raw places of the linkage: its nodes, then source angles behind rigid shafts."""
         cells = (6 * self.nodes[:, None] + np.arange(6)).ravel()
         return np.append(cells, self.source_base + np.flatnonzero(self.rigid))
 
     @cached_property
-    def _rotary(self) -> np.ndarray:
+    def rotary(self) -> np.ndarray:
         return np.array([isinstance(d, RotaryDrive) for d in self.drives], dtype=bool)
 
     def _pose(self, x: np.ndarray, R: np.ndarray) -> np.ndarray:
@@ -196,17 +196,17 @@ class Motion:
         if not self.drives:
             return before
         driven = self.linkage.driven(self._pose(x, R))
-        return driven + 2.0 * np.pi * np.where(self._rotary, np.rint((before - driven) / (2.0 * np.pi)), 0.0)
+        return driven + 2.0 * np.pi * np.where(self.rotary, np.rint((before - driven) / (2.0 * np.pi)), 0.0)
 
     def turns(self, driven: np.ndarray) -> np.ndarray:
         """Return the whole turns in driven coordinates."""
-        return np.where(self._rotary, np.rint(driven / (2.0 * np.pi)), 0.0)
+        return np.where(self.rotary, np.rint(driven / (2.0 * np.pi)), 0.0)
 
     def rates(self, state: State, v: np.ndarray) -> np.ndarray:
         """Return the raw rates of own rates ``v``."""
         raw = np.append(v, 0.0)[self.cells]
         if not self.plain:
-            raw[self._linked] = self.linkage.rates(self._pose(state.x, state.R), v[self.linked])
+            raw[self.linked_cells] = self.linkage.rates(self._pose(state.x, state.R), v[self.linked])
         return raw
 
     def accelerations(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -214,7 +214,7 @@ class Motion:
         raw = np.append(a, 0.0)[self.cells]
         if not self.plain:
             pose = self._pose(state.x, state.R)
-            raw[self._linked] = self.linkage.accelerations(pose, v[self.linked], a[self.linked])
+            raw[self.linked_cells] = self.linkage.accelerations(pose, v[self.linked], a[self.linked])
         return raw
 
     def collect(self, state: State, raw: np.ndarray) -> np.ndarray:
@@ -222,9 +222,9 @@ class Motion:
         if self.plain:
             return np.bincount(self.cells, weights=raw, minlength=self.n + 1)[:-1]
         rest = raw.copy()
-        rest[self._linked] = 0.0
+        rest[self.linked_cells] = 0.0
         forces = np.bincount(self.cells, weights=rest, minlength=self.n + 1)[:-1]
-        forces[self.linked] += self.linkage.collect(self._pose(state.x, state.R), raw[self._linked])
+        forces[self.linked] += self.linkage.collect(self._pose(state.x, state.R), raw[self.linked_cells])
         return forces
 
     def jacobian(self, state: State) -> sp.csr_matrix:
@@ -237,14 +237,14 @@ class Motion:
     @cached_property
     def _unlinked(self) -> sp.csr_matrix:
         kept = np.ones(self.raw)
-        kept[self._linked] = 0.0
+        kept[self.linked_cells] = 0.0
         return sp.diags(kept) @ self._selection
 
     @cached_property
     def _spread(self) -> sp.csr_matrix:
         """Puts the rows of the linkage in their places of a raw vector."""
-        count = self._linked.size
-        return sp.csr_matrix((np.ones(count), (self._linked, np.arange(count))), shape=(self.raw, count))
+        count = self.linked_cells.size
+        return sp.csr_matrix((np.ones(count), (self.linked_cells, np.arange(count))), shape=(self.raw, count))
 
     @cached_property
     def _selection(self) -> sp.csr_matrix:
@@ -259,7 +259,7 @@ class Motion:
         """Return T (raw × n) as an array: quicker while it is small."""
         T = self._dense_selection.copy()
         if not self.plain:
-            T[self._linked] = self.linkage.matrix_at(self._pose(state.x, state.R)) @ self._dense_lead
+            T[self.linked_cells] = self.linkage.matrix_at(self._pose(state.x, state.R)) @ self._dense_lead
         return T
 
     @cached_property
@@ -274,7 +274,7 @@ class Motion:
         """Return ∂(Tᵀ F)/∂(own freedoms) under constant raw forces F, shape (n, n): the levers turn."""
         pose, lead = self._pose(state.x, state.R), self._lead if self.n > DENSE_UP_TO else self._dense_lead
         motion = self.linkage.matrix_at(pose)[: 6 * len(self.nodes)] @ lead
-        return lead.T @ (self.linkage.stiffening_at(pose, raw[self._linked]) @ motion)
+        return lead.T @ (self.linkage.stiffening_at(pose, raw[self.linked_cells]) @ motion)
 
     def drift(self, state: State, v: np.ndarray, a: np.ndarray) -> tuple[sp.csr_matrix | np.ndarray, ...]:
         """Return how raw rates and accelerations change as levers turn.
@@ -296,7 +296,7 @@ class Motion:
         if self.n > DENSE_UP_TO:
             return tuple(self._spread @ sp.csr_matrix(slope @ self._lead) for slope in slopes)
         spread = np.zeros((3, self.raw, self.n))
-        spread[:, self._linked] = slopes @ self._dense_lead
+        spread[:, self.linked_cells] = slopes @ self._dense_lead
         return tuple(spread)
 
     def dead_point(self, state: State) -> bool:

@@ -1,0 +1,246 @@
+"""A model on flat vectors, for compiled loops: from degrees of freedom to nodes, forces back, tangents.
+
+One workspace holds all that kernels read: the slots of nodes and drives (see `kinds`), the tangent's seeds,
+the pose at the start of a step, and the step, rates and accelerations of the degrees of freedom. These stand
+in the order of elimination, with a place at the end for what is held. Forces are added straight to the
+degrees of freedom, except those on the nodes of a linkage, which its levers carry on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from flexctrl.mechanics.eights import eight, put
+from flexctrl.mechanics.native import Reals, Runs, Wholes
+from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+
+__all__ = ["Flat", "clear", "drive", "energy", "keep", "load", "place", "pull", "push", "tangent"]
+
+_TURN = 2.0 * math.pi
+_POSE = 12
+
+
+@dataclass
+class Flat:
+    """A model on flat vectors. Vectors marked * are parts of the workspace.
+
+    Attributes
+    ----------
+    n, padded : int
+        Degrees of freedom; length of their vectors, a multiple of eight and more than n.
+    z : Reals
+        The workspace, slots first.
+    seeds, pose, step, v, rate : Reals *
+        The tangent's seeds (3), poses at the start of the step (12 a node), and the step under way: increments,
+        rates and accelerations at its end.
+    force, load : Reals *
+        Sums of forces on the degrees of freedom, then raw ones on the linkage; the same of inputs that keep
+        their directions.
+    q : Reals *
+        Sums of the degrees of freedom at the start of the step.
+    driven, found : Reals
+        Driven coordinates at the start of the step, and at its end (*).
+    moved, turned, linked : Wholes
+        Nodes that move and that turn by degrees of freedom of their own, and those of the linkage.
+    cells : Wholes
+        Degree of freedom of each of a node's six.
+    slots, sources : Wholes
+        Velocities among the slots, and the degrees of freedom they are.
+    shafts, rigid, rotary : Wholes
+        Source angles' degrees of freedom; which shafts are rigid; which joints turn.
+    ratios : Reals
+    inputs : Wholes
+        Where unit loads act, then the inputs they are of.
+    unit : Reals
+        Their values.
+    follows : Wholes
+        Of each load that turns with a node: the input, the node, and where its three components act.
+    toward : Reals
+        Their directions at rest.
+    u : Reals
+        Inputs.
+    turn, linkage, winding, forces, tangents, energies : Runs
+        Kernels; of the linkage: places, rates, accelerations, forces; of its drives: driven coordinates.
+    books : Reals
+        Kinetic energy, stored energy, dissipated power.
+    """
+
+    n: int
+    padded: int
+    moving: int
+    turning: int
+    linking: int
+    rates: int
+    drives: int
+    pieces: int
+    unit_loads: int
+    following: int
+    carried: int
+    entries: int
+    drive_base: int
+    z: Reals
+    seeds: Reals
+    pose: Reals
+    step: Reals
+    v: Reals
+    rate: Reals
+    force: Reals
+    load: Reals
+    q: Reals
+    driven: Reals
+    found: Reals
+    moved: Wholes
+    turned: Wholes
+    linked: Wholes
+    cells: Wholes
+    slots: Wholes
+    sources: Wholes
+    shafts: Wholes
+    rigid: Wholes
+    rotary: Wholes
+    ratios: Reals
+    inputs: Wholes
+    unit: Reals
+    follows: Wholes
+    toward: Reals
+    u: Reals
+    turn: Runs
+    linkage: Runs
+    winding: Runs
+    forces: Runs
+    tangents: Runs
+    energies: Runs
+    books: Reals
+
+
+def load(f: Flat) -> None:
+    """Work out the loads of the inputs."""
+    for i in range(f.padded + f.carried):
+        f.load[i] = 0.0
+    for k in range(f.unit_loads):
+        f.load[f.inputs[k]] += f.unit[k] * f.u[f.inputs[f.unit_loads + k]]
+
+
+def place(f: Flat) -> None:
+    """Put the nodes where the step takes them."""
+    for k in range(f.moving):
+        i = f.moved[k]
+        for j in range(3):
+            f.z[NODE_SLOT * i + j] = f.pose[_POSE * i + j] + f.step[f.cells[6 * i + j]]
+    for k in range(f.turning):
+        clear(9, f.z[NODE_SLOT * f.turned[k] + 3 :])
+    if f.turning > 0:
+        f.turn[0](f.z, f.z)
+    if f.linking > 0:
+        for k in range(f.linking):
+            clear(_POSE, f.z[NODE_SLOT * f.linked[k] :])
+        f.linkage[0](f.z, f.z)
+    if f.drives > 0:
+        wind(f)
+
+
+def clear(n: int, x: Reals) -> None:
+    """Set entries to zero."""
+    for i in range(n):
+        x[i] = 0.0
+
+
+def wind(f: Flat) -> None:
+    """Find the driven coordinates, with the whole turns that bring them next to those before the step."""
+    clear(f.drives, f.found)
+    f.winding[0](f.z, f.z)
+    for i in range(f.drives):
+        slot = f.z[f.drive_base + DRIVE_SLOT * i :]
+        slot[3] = 0.0
+        if f.rotary[i] == 1:
+            f.found[i] += _TURN * math.floor((f.driven[i] - f.found[i]) / _TURN + 0.5)
+            slot[3] = math.floor(f.found[i] / _TURN + 0.5)
+        if f.rigid[i] == 1:
+            slot[0] = f.ratios[i] * f.found[i]
+        else:
+            slot[0] = f.q[f.shafts[i]] + f.step[f.shafts[i]]
+
+
+def drive(f: Flat) -> None:
+    """Give nodes and drives the rates and accelerations of the step's end."""
+    for k in range(f.rates):
+        f.z[f.slots[k]] = f.v[f.sources[k]]
+        f.z[f.slots[k] + 6] = f.rate[f.sources[k]]
+    for i in range(f.drives):
+        slot = f.z[f.drive_base + DRIVE_SLOT * i :]
+        slot[1] = f.v[f.shafts[i]]
+        slot[2] = f.rate[f.shafts[i]]
+    if f.linking > 0:
+        for k in range(f.linking):
+            clear(_POSE, f.z[NODE_SLOT * f.linked[k] + _POSE :])
+        f.linkage[1](f.z, f.z)
+        f.linkage[2](f.z, f.z)
+
+
+def push(f: Flat) -> None:
+    """Sum up all forces on the degrees of freedom, inertia and inputs included."""
+    press(f)
+    for k in range(f.pieces):
+        f.forces[k](f.z, f.z)
+    if f.carried > 0:
+        f.linkage[3](f.z, f.z)
+
+
+def pull(f: Flat) -> None:
+    """Sum up the forces of the inputs alone."""
+    press(f)
+    if f.carried > 0:
+        f.linkage[3](f.z, f.z)
+
+
+def press(f: Flat) -> None:
+    """Put the inputs' forces where they act."""
+    for i in range(0, f.padded, 8):
+        put(f.force[i:], eight(f.load[i:]))
+    for i in range(f.padded, f.padded + f.carried):
+        f.force[i] = f.load[i]
+    for k in range(f.following):
+        at = f.follows[5 * k :]
+        R = f.z[NODE_SLOT * at[1] + 3 :]
+        way = f.toward[3 * k :]
+        for i in range(3):
+            along = R[3 * i] * way[0] + R[3 * i + 1] * way[1] + R[3 * i + 2] * way[2]
+            f.force[at[2 + i]] += f.u[at[0]] * along
+
+
+def tangent(f: Flat, on_place: float, on_rate: float, on_acceleration: float, entries: Reals) -> None:
+    """Fill in the slope of the forces for motions that add these times an increment."""
+    f.seeds[0] = on_place
+    f.seeds[1] = on_rate
+    f.seeds[2] = on_acceleration
+    clear(f.entries, entries)
+    for k in range(f.pieces):
+        f.tangents[k](f.z, entries)
+
+
+def energy(f: Flat) -> None:
+    """Work out the energies and the dissipated power of the slots."""
+    clear(3, f.books)
+    for k in range(f.pieces):
+        f.energies[k](f.z, f.books)
+
+
+def keep(f: Flat) -> None:
+    """Take the end of the step as the start of the next."""
+    for k in range(f.moving):
+        i = f.moved[k]
+        for j in range(3):
+            f.pose[_POSE * i + j] = f.z[NODE_SLOT * i + j]
+    for k in range(f.turning):
+        i = f.turned[k]
+        for j in range(3, _POSE):
+            f.pose[_POSE * i + j] = f.z[NODE_SLOT * i + j]
+    for k in range(f.linking):
+        i = f.linked[k]
+        for j in range(_POSE):
+            f.pose[_POSE * i + j] = f.z[NODE_SLOT * i + j]
+    for i in range(f.drives):
+        f.driven[i] = f.found[i]
+    for i in range(0, f.padded, 8):
+        put(f.q[i:], eight(f.q[i:]) + eight(f.step[i:]))

@@ -1,0 +1,290 @@
+"""Making a flat model: which entry of the workspace each kernel reads and adds to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.mechanics.kernel import Kernel, Run
+from flexctrl.mechanics.rotation import turn_kernel
+from flexctrl.model.flat import Flat
+from flexctrl.model.fronts import Plan, plan_of
+from flexctrl.model.gauges import Gauges, gauges_of
+from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Flattened", "can_be_flat", "flatten"]
+
+_ALIGNED = 64
+
+
+def can_be_flat(model: Model) -> bool:
+    """Tell whether `flatten` covers a model: large motion, no loops of rigid parts, no modal damping."""
+    return model.large and not model.motion.linkage.loops and model.viscous.nnz == 0 and model.n > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Flattened:
+    """A model on flat vectors, and how to bring states there and back.
+
+    Attributes
+    ----------
+    model : Model
+    flat : Flat
+    gauges : Gauges
+        Its outputs.
+    plan : Plan
+        How its tangents are eliminated; degrees of freedom stand in that order.
+    pattern : tuple of numpy.ndarray
+        Rows and columns of their entries (with repeats).
+    """
+
+    model: Model
+    flat: Flat
+    gauges: Gauges
+    plan: Plan
+    pattern: tuple[np.ndarray, np.ndarray]
+
+    def ordered(self, x: np.ndarray) -> np.ndarray:
+        """Return values of the degrees of freedom in the order of elimination, padded with zeros."""
+        out = np.zeros(self.flat.padded)
+        out[: self.flat.n] = x[self.plan.order]
+        return out
+
+    def own(self, x: np.ndarray) -> np.ndarray:
+        """Return values of the degrees of freedom in the model's order."""
+        out = np.empty(self.flat.n)
+        out[self.plan.order] = x[: self.flat.n]
+        return out
+
+    def enter(self, state: State) -> None:
+        """Put a state at the start of a step."""
+        f, forces = self.flat, self.model.forces
+        still = np.zeros(f.n)
+        f.z[: forces.slot_count] = forces.slots(state, state.v, still)
+        f.pose.reshape(-1, 12)[:] = np.hstack([state.x, state.R.reshape(-1, 9)])
+        f.q[:], f.driven[:] = self.ordered(state.q), state.driven
+        f.step[:], f.v[:], f.rate[:] = 0.0, self.ordered(state.v), 0.0
+
+    def state(self, v: np.ndarray, t: float) -> State:
+        """Return the state at the start of the step, with rates ``v`` in the order of elimination."""
+        return self.pose_state(self.flat.pose, self.flat.q, v, self.flat.driven, t)
+
+    def pose_state(self, pose: np.ndarray, q: np.ndarray, v: np.ndarray, driven: np.ndarray, t: float) -> State:
+        """Return the state of a pose (12 a node) and values in the order of elimination."""
+        rows = pose.reshape(-1, 12)
+        x, R = rows[:, :3].copy(), rows[:, 3:].reshape(-1, 3, 3).copy()
+        return State(x, R, self.own(q), self.own(v), driven.copy(), t)
+
+
+def flatten(model: Model) -> Flattened:
+    """Return a model on flat vectors.
+
+    Parameters
+    ----------
+    model : Model
+        One that `can_be_flat`.
+
+    Returns
+    -------
+    Flattened
+    """
+    return _Layout(model).made()
+
+
+class _Layout:
+    """The workspace of a model, part by part."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.motion, self.forces = model, model.motion, model.forces
+        m = self.motion
+        self.padded = (m.n // 8 + 1) * 8
+        self.linked = np.zeros(0, dtype=int) if m.plain else m.linked_cells
+        carried = -(-len(self.linked) // 8) * 8
+        sizes = {
+            "slots": self.forces.slot_count,
+            "seeds": 3,
+            "pose": 12 * len(m.place),
+            **dict.fromkeys(("step", "v", "rate"), self.padded),
+            **dict.fromkeys(("force", "load"), self.padded + carried),
+            "q": self.padded,
+            "found": len(m.drives),
+        }
+        self.starts, self.carried, end = {}, carried, 0
+        for name, size in sizes.items():
+            self.starts[name] = end
+            end += -(-size // 8) * 8
+        self.z = _aligned(end)
+        self.parts = {name: self.z[start : start + sizes[name]] for name, start in self.starts.items()}
+
+    @cached_property
+    def pattern(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows and columns of the tangent in degrees of freedom; which entries of the blocks they are, if plain."""
+        m = self.motion
+        raw = self.forces.pattern
+        if m.plain:
+            rows, columns = (m.cells[cells] for cells in raw)
+            kept = np.flatnonzero((rows < m.n) & (columns < m.n))
+            return rows[kept], columns[kept], kept
+        found = self._some_slope().tocoo()
+        return found.row, found.col, np.zeros(0, dtype=int)
+
+    def _some_slope(self) -> sp.csr_matrix:
+        """The slope in a state in which no entry vanishes by chance."""
+        m, rng = self.motion, np.random.default_rng(0)
+        step, v, a = rng.uniform(0.1, 0.4, (3, m.n))
+        state = m.advance(m.rest, step, v, 0.0)
+        u = rng.uniform(0.5, 1.0, len(self.model.inputs))
+        return self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)
+
+    @cached_property
+    def plan(self) -> Plan:
+        rows, columns, _ = self.pattern
+        return plan_of(rows, columns, self.motion.n)
+
+    @cached_property
+    def position(self) -> np.ndarray:
+        """Place of each degree of freedom in the order of elimination; the last entry is for none."""
+        return np.append(self.plan.position, self.motion.n)
+
+    @cached_property
+    def targets(self) -> np.ndarray:
+        """Where each raw force is added, from the start of ``force``."""
+        found = self.position[self.motion.cells]
+        found[self.linked] = self.padded + np.arange(len(self.linked))
+        return found
+
+    def made(self) -> Flattened:
+        m, part = self.motion, self.parts
+        own = np.setdiff1d(np.arange(len(m.place)), [] if m.plain else m.nodes)
+        moved = own[(m.place[own, :3] < m.n).any(axis=1)]
+        turned = own[(m.place[own, 3:] < m.n).any(axis=1)]
+        cells = self.position[m.place[own]]
+        nodes, freedoms = np.nonzero(cells < m.n)
+        loads = self.model.signals.loads.tocoo()
+        linkage = () if m.plain else self._linkage()
+        flat = Flat(
+            n=m.n,
+            padded=self.padded,
+            moving=len(moved),
+            turning=len(turned),
+            linking=0 if m.plain else len(m.nodes),
+            rates=len(nodes),
+            drives=len(m.drives),
+            pieces=len(self.forces.families),
+            unit_loads=loads.nnz,
+            following=len(self.model.signals.follows),
+            carried=self.carried,
+            entries=self.plan.length,
+            drive_base=self.forces.drive_base,
+            z=self.z,
+            seeds=part["seeds"],
+            pose=part["pose"],
+            step=part["step"],
+            v=part["v"],
+            rate=part["rate"],
+            force=part["force"],
+            load=part["load"],
+            q=part["q"],
+            driven=np.zeros(len(m.drives)),
+            found=part["found"],
+            moved=moved,
+            turned=turned,
+            linked=m.nodes if linkage else np.zeros(0, dtype=int),
+            cells=self.position[m.place].ravel(),
+            slots=NODE_SLOT * own[nodes] + 12 + freedoms,
+            sources=cells[nodes, freedoms],
+            shafts=self.position[m.sources],
+            rigid=m.rigid.astype(np.int64),
+            rotary=m.rotary.astype(np.int64),
+            ratios=m.ratios,
+            inputs=np.concatenate([self.targets[loads.row], loads.col]).astype(np.int64),
+            unit=loads.data.astype(float),
+            follows=self._follows(),
+            toward=np.array([d for f in self.model.signals.follows for d in f.direction], dtype=float),
+            u=np.zeros(len(self.model.inputs)),
+            turn=(self._turn(turned),) if len(turned) else (),
+            linkage=linkage,
+            winding=(self._winding(),) if m.drives else (),
+            forces=tuple(self._forces()),
+            tangents=tuple(self._tangents()) if m.plain else (),
+            energies=tuple(self._energies()),
+            books=np.zeros(3),
+        )
+        gauges = gauges_of(self.model, self.starts["q"], self.plan.position)
+        return Flattened(self.model, flat, gauges, self.plan, self.pattern[:2])
+
+    def _follows(self) -> np.ndarray:
+        follows = self.model.signals.follows
+        return np.array([w for f in follows for w in (f.input, f.node, *self.targets[f.cell : f.cell + 3])], dtype=int)
+
+    def _bind(self, kernel: Kernel, gather: np.ndarray, scatter: np.ndarray) -> Run:
+        """One item."""
+        return self.model.backend.bind(kernel, gather[None], np.zeros((1, 0)), scatter[None])
+
+    def _turn(self, nodes: np.ndarray) -> Run:
+        old = self.starts["pose"] + 12 * nodes[:, None] + 3 + np.arange(9)
+        theta = self.starts["step"] + self.position[self.motion.place[nodes, 3:]]
+        new = NODE_SLOT * nodes[:, None] + 3 + np.arange(9)
+        return self.model.backend.bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(nodes), 0)), new)
+
+    def _linkage(self) -> tuple[Run, ...]:
+        m, starts = self.motion, self.starts
+        place, rates, accelerations, collect, _ = m.linkage.kernels
+        rigid = self.forces.drive_base + DRIVE_SLOT * np.flatnonzero(m.rigid)
+        slot = NODE_SLOT * m.nodes[:, None]
+        pose, own = (slot + np.arange(12)).ravel(), self.position[m.linked]
+        before = (starts["pose"] + 12 * m.nodes[:, None] + np.arange(12)).ravel()
+        v, a = starts["v"] + own, starts["rate"] + own
+        speeds, changes = ((slot + k + np.arange(6)).ravel() for k in (12, 18))
+        raw = starts["force"] + self.padded + np.arange(len(self.linked))
+        return (
+            self._bind(place, np.concatenate([before, starts["step"] + own]), pose),
+            self._bind(rates, np.concatenate([pose, v]), np.concatenate([speeds, rigid + 1])),
+            self._bind(accelerations, np.concatenate([pose, v, a]), np.concatenate([changes, rigid + 2])),
+            self._bind(collect, np.concatenate([pose, raw]), starts["force"] + own),
+        )
+
+    def _winding(self) -> Run:
+        m = self.motion
+        pose = (NODE_SLOT * m.nodes[:, None] + np.arange(12)).ravel()
+        return self._bind(m.linkage.kernels[4], pose, self.starts["found"] + np.arange(len(m.drives)))
+
+    def _forces(self) -> list[Run]:
+        base, sources = self.forces.drive_base, self.motion.source_base
+        goal = self.starts["force"] + self.targets
+        bind = self.model.backend.bind
+        return [
+            bind(f.kernels.force, f.gather(base), f.parameters, goal[f.scatter(sources)]) for f in self.forces.families
+        ]
+
+    def _energies(self) -> list[Run]:
+        base, bind = self.forces.drive_base, self.model.backend.bind
+        return [
+            bind(f.kernels.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
+            for f in self.forces.families
+        ]
+
+    def _tangents(self) -> list[Run]:
+        rows, columns, kept = self.pattern
+        places = np.full(self.forces.entries, self.plan.length)
+        places[kept] = self.plan.places(rows, columns)
+        runs = []
+        for f, start in zip(self.forces.families, self.forces.block_starts, strict=True):
+            size = f.kernels.kind.width**2
+            seeds = np.tile(self.starts["seeds"] + np.arange(3), (f.count, 1))
+            gather = np.hstack([f.gather(self.forces.drive_base), seeds])
+            scatter = places[start : start + f.count * size].reshape(f.count, size)
+            runs.append(self.model.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
+        return runs
+
+
+def _aligned(size: int) -> np.ndarray:
+    """Return zeros that begin on a cache line."""
+    room = np.zeros(size + _ALIGNED // 8)
+    skip = -room.ctypes.data % _ALIGNED // 8
+    return room[skip : skip + size]

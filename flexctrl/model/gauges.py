@@ -1,0 +1,235 @@
+"""The outputs of a flat model: sums of entries of the workspace, angles of them, tensions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.effects.effect import Effect
+from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.kernel import Kernel, Run
+from flexctrl.mechanics.native import Reals, Runs, Wholes
+from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
+from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, rope_pull, spring_pull
+from flexctrl.model.model import Model
+from flexctrl.structure.elements import Rope, Spring
+from flexctrl.structure.signals import (
+    AngularVelocity,
+    DriveAngle,
+    DriveSpeed,
+    Output,
+    Position,
+    Rotation,
+    SwayAngle,
+    Tension,
+)
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["Gauges", "gauges_of", "read"]
+
+_TURN = 2.0 * math.pi
+
+
+@dataclass
+class Gauges:
+    """How outputs are read.
+
+    Attributes
+    ----------
+    outputs, rows : int
+        Number of outputs; of sums.
+    moving : int
+        Whether some output reads rates.
+    starts, cells : Wholes
+        Where each sum begins; the entries of the workspace in it.
+    weights, sums : Reals
+    plain : Wholes
+        Outputs that are a sum: output, sum.
+    angles : Wholes
+        Angles of two sums: output, opposite, adjacent.
+    turns : Wholes
+        Rotations: output, slot of the node's rotation, of the base's, and a sum that is about as large.
+    axes : Reals
+    tensions : Runs
+    """
+
+    outputs: int
+    rows: int
+    plains: int
+    angled: int
+    turning: int
+    tense: int
+    moving: int
+    starts: Wholes
+    cells: Wholes
+    weights: Reals
+    sums: Reals
+    plain: Wholes
+    angles: Wholes
+    turns: Wholes
+    axes: Reals
+    tensions: Runs
+
+
+def read(g: Gauges, z: Reals, y: Reals) -> None:
+    """Read all outputs."""
+    for i in range(g.rows):
+        total = 0.0
+        for k in range(g.starts[i], g.starts[i + 1]):
+            total += g.weights[k] * z[g.cells[k]]
+        g.sums[i] = total
+    for i in range(g.outputs):
+        y[i] = 0.0
+    for k in range(g.tense):
+        g.tensions[k](z, y)
+    for k in range(g.plains):
+        y[g.plain[2 * k]] = g.sums[g.plain[2 * k + 1]]
+    for k in range(g.angled):
+        y[g.angles[3 * k]] = math.atan2(g.sums[g.angles[3 * k + 1]], g.sums[g.angles[3 * k + 2]])
+    for k in range(g.turning):
+        at = g.turns[4 * k :]
+        y[at[0]] = turned(z[at[1] :], z[at[2] :], g.axes[3 * k :], g.sums[at[3]])
+
+
+def turned(R: Reals, base: Reals, axis: Reals, about: float) -> float:
+    """Return the angle about an axis that is left of a rotation when the tilt of the axis is undone."""
+    sine = 0.0
+    cosine = 0.0
+    for i in range(3):
+        j = i + 1 if i < 2 else 0
+        k = 3 - i - j
+        axial = across(base, R, k, j) - across(base, R, j, k)
+        sine += axis[i] * axial
+        cosine += across(base, R, i, i)
+        for m in range(3):
+            cosine -= axis[i] * axis[m] * across(base, R, i, m)
+    angle = math.atan2(sine, cosine)
+    return angle + _TURN * math.floor((about - angle) / _TURN + 0.5)
+
+
+def across(base: Reals, R: Reals, i: int, j: int) -> float:
+    """Return an entry of baseᵀ R."""
+    return base[i] * R[j] + base[3 + i] * R[3 + j] + base[6 + i] * R[6 + j]
+
+
+def gauges_of(model: Model, q_start: int, position: np.ndarray) -> Gauges:
+    """Return the gauges of a model.
+
+    Parameters
+    ----------
+    model : Model
+    q_start : int
+        Where the degrees of freedom stand in the workspace.
+    position : numpy.ndarray of int
+        Their order there.
+
+    Returns
+    -------
+    Gauges
+    """
+    builder = _Builder(model, q_start, position)
+    for i, output in enumerate(model.structure.outputs):
+        builder.add(i, output)
+    return builder.made()
+
+
+class _Builder:
+    def __init__(self, model: Model, q_start: int, position: np.ndarray) -> None:
+        self.model, self.s, self.drive_base = model, model.structure, model.forces.drive_base
+        self.q_start, self.position = q_start, position
+        self.sums: list[tuple[np.ndarray, np.ndarray]] = []
+        self.plain: list[tuple[int, int]] = []
+        self.angles: list[tuple[int, int, int]] = []
+        self.turns: list[tuple[int, int, int, int]] = []
+        self.axes: list[np.ndarray] = []
+        self.lines: dict[type, list[tuple[int, Rope | Spring]]] = {}
+        self.moving = False
+
+    def add(self, i: int, output: Output) -> None:
+        if isinstance(output, DriveAngle | DriveSpeed):
+            drive = [d.name for d in self.s.drives].index(output.drive)
+            rate = int(isinstance(output, DriveSpeed))
+            self.moving |= bool(rate)
+            self.plain.append((i, self._sum(np.array([self.drive_base + DRIVE_SLOT * drive + rate]), np.ones(1))))
+        elif isinstance(output, SwayAngle):
+            ends = (self.s.number(output.load), self.s.number(output.top))
+            across, down = (self._between(ends, 0, np.array(d)) for d in (output.direction, output.down))
+            self.angles.append((i, across, down))
+        elif isinstance(output, Tension):
+            line = self.s.part(output.line)
+            assert isinstance(line, Rope | Spring)
+            self.lines.setdefault(type(line), []).append((i, line))
+            self.moving = True
+        elif isinstance(output, Rotation):
+            self._rotation(i, output)
+        else:
+            offset = 0 if isinstance(output, Position) else 15 if isinstance(output, AngularVelocity) else 12
+            ends = (self.s.number(output.at), -1 if output.minus is None else self.s.number(output.minus))
+            self.plain.append((i, self._between(ends, offset, np.array(output.direction))))
+            self.moving |= offset > 0
+
+    def _sum(self, cells: np.ndarray, weights: np.ndarray) -> int:
+        self.sums.append((cells, weights))
+        return len(self.sums) - 1
+
+    def _between(self, ends: tuple[int, int], offset: int, direction: np.ndarray) -> int:
+        """A component of a node's vector less that of another (−1: of none)."""
+        signed = [(node, sign) for node, sign in zip(ends, (1.0, -1.0), strict=True) if node >= 0]
+        cells = np.concatenate([NODE_SLOT * node + offset + np.arange(3) for node, _ in signed])
+        return self._sum(cells, np.concatenate([sign * direction for _, sign in signed]))
+
+    def _rotation(self, i: int, output: Rotation) -> None:
+        at = self.s.number(output.at)
+        base = len(self.s.nodes) if output.minus is None else self.s.number(output.minus)
+        T, axis = self.model.motion.jacobian(self.model.motion.rest), np.array(output.direction)
+        turning = axis @ (T[6 * at + 3 : 6 * at + 6] - T[6 * base + 3 : 6 * base + 6]).toarray()
+        own = np.flatnonzero(turning)
+        about = self._sum(self.q_start + self.position[own], turning[own])
+        self.turns.append((i, NODE_SLOT * at + 3, NODE_SLOT * base + 3, about))
+        self.axes.append(axis)
+
+    def made(self) -> Gauges:
+        empty = np.zeros(0)
+        runs = tuple(self._tensions(of, lines) for of, lines in self.lines.items())
+        return Gauges(
+            outputs=len(self.s.outputs),
+            rows=len(self.sums),
+            plains=len(self.plain),
+            angled=len(self.angles),
+            turning=len(self.turns),
+            tense=len(runs),
+            moving=int(self.moving),
+            starts=np.cumsum([0, *(len(cells) for cells, _ in self.sums)]),
+            cells=np.concatenate([empty, *(cells for cells, _ in self.sums)]).astype(int),
+            weights=np.concatenate([empty, *(weights for _, weights in self.sums)]),
+            sums=np.zeros(len(self.sums)),
+            plain=np.array(self.plain, dtype=int).ravel(),
+            angles=np.array(self.angles, dtype=int).ravel(),
+            turns=np.array(self.turns, dtype=int).ravel(),
+            axes=np.concatenate([empty, *self.axes]),
+            tensions=runs,
+        )
+
+    def _tensions(self, of: type, lines: list[tuple[int, Rope | Spring]]) -> Run:
+        slots = [(NODE_SLOT * self.s.number(line.end), NODE_SLOT * self.s.number(line.start)) for _, line in lines]
+        gather = [np.concatenate([k + np.arange(3) for k in (a, b, a + 12, b + 12)]) for a, b in slots]
+        parameters = [[line.stiffness, line.length, line.damping] for _, line in lines]
+        kernel = _pull(of, self.model.effects)
+        scatter = np.array([[i] for i, _ in lines])
+        return self.model.backend.bind(kernel, np.array(gather), np.array(parameters), scatter)
+
+
+def _pull(of: type, effects: tuple[Effect, ...]) -> Kernel:
+    """Tension from places and velocities of end and start (12)."""
+    import casadi as ca
+
+    z, p, still = ca.SX.sym("z", 12), ca.SX.sym("p", len(LINE_PARAMETERS)), ca.SX(3, 1)
+    end, start = (NodeMotion(z[k : k + 3], ca.SX.eye(3), z[6 + k : 9 + k], still, still, still) for k in (0, 3))
+    m = line_motion(start, end, p)
+    tension = ca.fmax(rope_pull(effects, m), 0.0) if of is Rope else spring_pull(effects, m)
+    return Kernel("tension", z, p, tension)

@@ -1,0 +1,121 @@
+"""A model on flat vectors does what the model does, compiled or not."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.mechanics.native import Packed, Reals
+from flexctrl.model.flat import Flat, drive, energy, keep, load, place, pull, push, tangent
+from flexctrl.model.flattening import Flattened, can_be_flat, flatten
+from flexctrl.model.gauges import Gauges, read
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
+from machines import bridle, machine
+
+pytest.importorskip("llvmlite")
+
+EFFECTS = (fc.Gravity(), fc.LargeRotation(), fc.RayleighDamping(0.1, 0.02))
+
+
+@dataclass
+class Once:
+    flat: Flat
+    gauges: Gauges
+    y: Reals
+    entries: Reals
+    pulled: Reals
+
+
+def once(m: Once) -> int:
+    """A step placed, its forces, and then its end measured as the start of the next."""
+    f = m.flat
+    load(f)
+    place(f)
+    drive(f)
+    pull(f)
+    for i in range(f.n):
+        m.pulled[i] = f.force[i]
+    push(f)
+    energy(f)
+    if f.linking == 0 and f.following == 0:
+        tangent(f, 1.0, 20.0, 400.0, m.entries)
+    keep(f)
+    read(m.gauges, f.z, m.y)
+    return 0
+
+
+def driven_by_a_follower(structure: fc.Structure) -> fc.Structure:
+    (torque,) = (i for i in structure.inputs if i.name == "torque")
+    follower = fc.FollowerForce("follower", torque.at[0], (1.0, 0.5, 0.0))
+    return replace(structure, inputs=(*structure.inputs, follower))
+
+
+def crane() -> fc.Structure:
+    return fc.cranes.ceiling_crane(2)
+
+
+MACHINES = {
+    **{f"tree{seed}": (lambda seed=seed: driven_by_a_follower(machine(seed, 6))) for seed in (1, 3, 7, 8, 11)},
+    "crane": crane,
+}
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("bending", ["flexible", "rigid"])
+def test_flat_models_do_what_models_do(name, bending, compiled):
+    if name == "crane" and bending == "rigid":
+        return
+    model = fc.assemble(MACHINES[name](), [*EFFECTS, *([fc.Flexible()] if bending == "flexible" else [])])
+    rng = np.random.default_rng(4)
+    v0, v, a, step = rng.normal(size=(4, model.n))
+    start = model.displace(0.9 * rng.normal(size=model.n)).with_(v=v0, t=0.7)
+    u = rng.normal(size=len(model.inputs))
+    end = model.advance(start, 0.5 * step, v, 0.8)
+    m, flattened = evaluated(model, start, 0.5 * step, v, a, u, compiled)
+    loads = model.loads(end, u)
+    close(flattened.own(m.flat.force), model.balance(end, v, a) + loads)
+    close(flattened.own(m.pulled), loads)
+    close(m.flat.books, model.energy(end))
+    close(m.y, model.measure(end))
+    reached = flattened.state(m.flat.v, 0.8)
+    for part in ("x", "R", "q", "v", "driven"):
+        close(getattr(reached, part), getattr(end, part))
+    if model.motion.plain:
+        slope = model.slope(end, v, a, (1.0, 20.0, 400.0), u).tocoo()
+        close(m.entries[flattened.plan.places(slope.row, slope.col)], slope.data)
+
+
+def evaluated(model, start, step, v, a, u, compiled) -> tuple[Once, Flattened]:
+    flattened = flatten(model)
+    f, plan = flattened.flat, flattened.plan
+    flattened.enter(start)
+    f.step[:], f.v[:], f.rate[:] = (flattened.ordered(x) for x in (step, v, a))
+    f.u[:] = u
+    record = Once(f, flattened.gauges, np.zeros(len(model.outputs)), np.zeros(plan.length + 1), np.zeros(f.padded))
+    if compiled:
+        Packed(record).bound(once)()
+    else:
+        once(record)
+    return record, flattened
+
+
+def close(found, expected):
+    expected = np.asarray(expected)
+    assert np.abs(np.asarray(found) - expected).max(initial=0.0) < 1e-11 * max(1.0, np.abs(expected).max(initial=0.0))
+
+
+def test_what_flat_models_do_not_cover_is_told():
+    plain = crane()
+    assert can_be_flat(fc.assemble(plain, [fc.Flexible(), fc.LargeRotation()]))
+    assert not can_be_flat(fc.assemble(plain, [fc.Flexible()]))
+    assert not can_be_flat(fc.assemble(bridle(), [fc.LargeRotation()]))
+    held = [fc.Flexible(), fc.LargeRotation(), fc.Gravity(), fc.ModalDamping(0.02)]
+    arm = fc.Beam("arm", (0, 0, 0), (1, 0, 0), plain.elements[0].section)
+    assert not can_be_flat(fc.assemble(fc.Structure([arm], [fc.Support(arm.start)]), held))
