@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["CriticalGain", "RootLocus", "critical_gains", "in_s", "root_locus"]
 
 MOST_GAINS = 400
+DECADES = 1e12
 START = 50
-TURN = 0.35
-SHORT = 0.02
+TURN = 0.15
+SHORT = 0.01
 CLOSEST = 1e-4
 TREMBLE = 1e-10
 
@@ -203,12 +204,19 @@ def _checked(gains: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def _gain_range(loop: Loop) -> np.ndarray:
-    """From where the highest peak begins to move its pole to where the poles have reached the zeros."""
-    size = abs(loop_grid(loop)[1])
-    size = size[size > 0]
+    """From where the highest peak begins to move its pole to where the poles have reached the zeros.
+
+    What an integrator adds far below the slowest other pole is no peak.
+    """
+    omega, values = loop_grid(loop)
+    moving = loop.poles[~loop.at_rest(loop.poles)]
+    rates = abs(np.log(moving[moving != 0])) / loop.dt if loop.dt else abs(moving)
+    size = abs(values[omega >= 0.01 * rates.min(initial=np.inf)]) if rates.size else abs(values)
+    size = size[size > 0] if (size > 0).any() else abs(values[abs(values) > 0])
     if not size.size:
         raise StructureError("the loop's response is zero: its input does not reach its output")
-    return np.geomspace(0.01 / size.max(), 10.0 / np.quantile(size, 0.25), START)
+    least = 0.01 / size.max()
+    return np.geomspace(least, min(10.0 / np.quantile(size, 0.25), DECADES * least), START)
 
 
 def _followed(poles_at: Callable[[float], np.ndarray], gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -248,7 +256,7 @@ def _ambiguous(used: list[float], rows: list[np.ndarray], gain: float, row: np.n
     miss = abs(_predicted(used, rows, gain) - row)
     apart = abs(row[:, None] - row)
     np.fill_diagonal(apart, np.inf)
-    visible = miss > 1e-3 * abs(row)
+    visible = miss > np.maximum(1e-3 * abs(row), _rounding(row))
     return bool((visible & (miss > 0.3 * apart.min(axis=1, initial=np.inf))).any())
 
 
@@ -257,9 +265,14 @@ def _bent(rows: list[np.ndarray], row: np.ndarray) -> bool:
     if len(rows) < 2:
         return False
     before, after = rows[-1] - rows[-2], row - rows[-1]
-    size = SHORT * abs(row)
+    size = np.maximum(SHORT * abs(row), _rounding(row))
     long = (abs(before) > size) & (abs(after) > size)
     return bool((abs(np.angle(after[long] / before[long])) > TURN).any())
+
+
+def _rounding(row: np.ndarray) -> float:
+    """What eigenvalues of these sizes tremble by."""
+    return TREMBLE * float(abs(row).max(initial=0.0))
 
 
 def _depth(poles: np.ndarray, dt: float) -> np.ndarray:
@@ -299,6 +312,8 @@ def _finished(loop: Loop, rough: CriticalGain) -> CriticalGain:
 def _is_crossing(loop: Loop, found: CriticalGain) -> bool:
     """Whether L really passes −1/k there: a branch that runs along the boundary only trembles across it."""
     w, nyquist = found.omega, np.pi / loop.dt if loop.dt else np.inf
+    if w <= loop.rest_radius and loop.at_rest(loop.poles).any():
+        return False  # an integrator: L(0) is infinite, so no gain brings a pole there
     if w <= loop.rest_radius or w >= nyquist * (1 - 1e-9):
         return bool(abs(1 + found.gain * loop.at(np.array([w]))[0]) < 1e-4)
     steps = 10.0 ** np.arange(-10.0, -2.0)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from plants import cantilever, chain, plant
 
+import flexctrl as fc
+from flexctrl.cranes import bridge_crane
 from flexctrl.errors import StructureError
 from flexctrl.study.frequency import margins
 from flexctrl.study.loop import open_loop
@@ -143,3 +145,14 @@ def test_gains_are_checked():
     for bad in ([2.0, 1.0], [-1.0, 1.0], [np.nan]):
         with pytest.raises(StructureError, match="ascending"):
             root_locus(loop, bad)
+
+
+def test_an_integrators_pole_at_rest_takes_no_gains_and_crosses_nothing():
+    """Its eigenvalue trembles by rounding; L(0) is infinite, so no gain brings a pole there."""
+    effects = (fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(alpha=0.002, beta=1e-4))
+    linear = fc.linearize(fc.assemble(bridge_crane(elements=1), effects))
+    loop = open_loop(linear, ct.tf([60.0, 10.0], [0.1, 1.0]), "left_torque", "travel")
+    assert len(root_locus(loop).gains) < 250
+    (critical,) = root_locus(loop, np.geomspace(3e-14, 8e12, 50)).critical
+    assert critical.omega > 1.0
+    assert abs(1 + critical.gain * loop.at(np.array([critical.omega]))[0]) < 1e-9
