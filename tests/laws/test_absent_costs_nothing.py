@@ -1,0 +1,95 @@
+"""What an effect costs, counted: freedoms, nonzeros, instructions. Where it does not act, and where it is absent, nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+TUBE = fc.Section.tube(fc.STEEL, radius=0.05, thickness=0.004)
+
+
+def machine(drives: bool = True, ropes: bool = True, masses: bool = True) -> fc.Structure:
+    """A boom on a slewing drive; a load on a rope."""
+    boom = fc.Beam("boom", (0, 0, 0), (2, 0, 0), TUBE, elements=2)
+    parts, joints = [boom], [fc.Support(boom.start, held="u v w rx ry")]
+    if ropes:
+        rope = fc.Rope("rope", boom.end, (2, 0, -1), EA=1e5)
+        parts.append(rope)
+        joints.append(fc.Pin(boom.end, rope.start))
+        if not masses:
+            joints.append(fc.Support(rope.end, held="u v w"))
+    if masses:
+        load = fc.PointMass("load", (2, 0, -1) if ropes else (2, 0, 0), mass=5.0)
+        parts.append(load)
+        joints.append(fc.Pin(rope.end if ropes else boom.end, load.node))
+    motor = fc.RotaryDrive("motor", boom.start, axis="z", stiffness=50.0, ratio=20.0, inertia=1e-3, damping=0.1)
+    return fc.Structure(parts, joints, drives=[motor] if drives else [])
+
+
+def counted(structure: fc.Structure, effects: list) -> tuple[int, int, dict[str, int]]:
+    """Freedoms, nonzeros of the tangent, instructions by kind of piece."""
+    model = fc.assemble(structure, effects)
+    still = np.zeros(model.n)
+    slope = np.abs(model.slope(model.rest, still, still, (1.0, 1.0, 1.0), np.zeros(0)).toarray())
+    kinds: dict[str, int] = {}
+    for family in model.forces.families:
+        name = family.kernels.kind.name
+        kinds[name] = kinds.get(name, 0) + family.count * family.kernels.force.instructions
+    return model.n, int((slope > 1e-12 * slope.max()).sum()), kinds
+
+
+BARE = [fc.LargeRotation()]
+ADDED = [
+    (fc.Gravity(), 0, {"beam", "point"}),
+    (fc.BeamFlexibility(), 12, {"beam"}),
+    (fc.ShaftElasticity(), 1, {"rotary_drive"}),
+    (fc.RopeStretch(), 1, {"rope"}),
+    (fc.RayleighDamping(alpha=0.1), 0, {"beam", "point", "rotary_drive"}),
+]
+
+
+@pytest.mark.parametrize(("effect", "freedoms", "touched"), ADDED, ids=lambda v: type(v).__name__)
+def test_an_effect_adds_to_what_it_acts_on_and_to_nothing_else(effect, freedoms, touched):
+    n, _, before = counted(machine(), BARE)
+    more, _, after = counted(machine(), [*BARE, effect])
+    assert more - n == freedoms
+    grown = {kind for kind in after if after[kind] != before.get(kind, 0)}
+    assert grown == touched
+
+
+@pytest.mark.parametrize(
+    ("effect", "without"),
+    [
+        (fc.RopeStretch(), {"ropes": False}),
+        (fc.ShaftElasticity(), {"drives": False}),
+    ],
+    ids=lambda v: type(v).__name__ if not isinstance(v, dict) else "",
+)
+def test_where_there_is_nothing_to_act_on_an_effect_costs_nothing(effect, without):
+    effects = [*BARE, fc.Gravity(), fc.BeamFlexibility()]
+    assert counted(machine(**without), effects) == counted(machine(**without), [*effects, effect])
+
+
+def test_a_rigid_part_is_one_piece_with_no_elastic_force():
+    """A boom that does not bend: one element instead of two, as many instructions as without the effect."""
+    flexible = [*BARE, fc.Gravity(), fc.BeamFlexibility()]
+    other = fc.Beam("other", (0, 0, 5), (1, 0, 5), TUBE)
+    grown = machine().with_(
+        elements=[*machine().elements, other],
+        joints=[*machine().joints, fc.Support(other.start, held="u v w rx ry rz")],
+    )
+    n, nonzeros, kinds = counted(machine(), [*BARE, fc.Gravity()])
+    some = [*BARE, fc.Gravity(), fc.BeamFlexibility(of=["other"])]
+    alone = fc.Structure([other], [fc.Support(other.start, held="u v w rx ry rz")])
+    n1, nonzeros1, kinds1 = counted(alone, flexible)
+    n2, nonzeros2, kinds2 = counted(grown, some)
+    assert (n2, nonzeros2) == (n + n1, nonzeros + nonzeros1)
+    assert kinds2["beam"] == kinds["beam"] + kinds1["beam"]
+
+
+def test_zero_strength_is_absence():
+    """Not only the answer: a damping of zero leaves no instruction behind."""
+    effects = [*BARE, fc.Gravity(), fc.Flexible()]
+    assert counted(machine(), effects) == counted(machine(), [*effects, fc.RayleighDamping(0.0, 0.0)])
