@@ -1,4 +1,4 @@
-"""What an effect costs, counted: freedoms, nonzeros, instructions. Where it does not act, and where it is absent, nothing."""
+"""What an effect costs, counted: freedoms, nonzeros, instructions. Absent, or with nothing to act on: none."""
 
 from __future__ import annotations
 
