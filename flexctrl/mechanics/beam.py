@@ -8,7 +8,7 @@ matrix (Crisfield, Galvanetto & Jelenić 1997). At rest the tangents are the tex
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,10 @@ PARAMETERS = (
     *(f"{plane}_{entry}" for plane in ("z", "y") for entry in PlaneMass._fields),
 )
 """Per element: axes at rest (row by row), length, EA, GJ, bending coefficients, mass, and that in bending by plane."""
+
+
+SHEARING = ("r_y", "r_z", *(f"c{i}{j}" for i in range(6) for j in range(i, 6)))
+"""Per element that shears, after these: 1/(1 + Φ) of bending about y and z; what couplings add to the stiffness."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,8 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Bea
     """
     import casadi as ca
 
-    p = {name: parameters[i] for i, name in enumerate(PARAMETERS)}
+    names = (*PARAMETERS, *SHEARING) if parameters.numel() > len(PARAMETERS) else PARAMETERS
+    p = {name: parameters[i] for i, name in enumerate(names)}
     rest = ca.reshape(parameters[:9], 3, 3).T
     d = second.x - first.x
     chord = ca.sqrt(ca.dot(d, d))
@@ -205,26 +210,74 @@ def bowing(m: BeamMotion) -> ca.SX:
     return (2.0 * (y1 * y1 + y2 * y2 + z1 * z1 + z2 * z2) - y1 * y2 - z1 * z2) / 30.0
 
 
-def stresses(m: BeamMotion) -> ca.SX:
-    """Return what the strains call forth: axial force, torque, end moments about y (two) and z (two)."""
+def deformations(m: BeamMotion) -> ca.SX:
+    """Return what `stresses` work on: stretch, twist, and end rotations against the chord about y (two), z (two).
+
+    To second order in the end rotations. A beam that shears has its sections turned against the chord however short
+    the element is; their strains are measured in the sections' own axes (Reissner 1981), averaged over the element
+    with Timoshenko's shapes.
+    """
     import casadi as ca
 
     (x1, y1, z1), (x2, y2, z2) = (_components(t) for t in m.theta)
-    p = m.p
+    L = m.p["L"]
+    if SHEARING[0] not in m.p:
+        return ca.vertcat(m.stretch + L * bowing(m), x2 - x1, y1, y2, z1, z2)
+    twist, strain = 0.5 * (x2 - x1), m.stretch / L
+    (mean_y, half_y), (mean_z, half_z) = ((0.5 * (a + b), 0.5 * (b - a)) for a, b in ((y1, y2), (z1, z2)))
+    r_y, r_z = m.p["r_y"], m.p["r_z"]
+    drawn = sum(
+        (r - 0.5 - 0.4 * r * r) * mean * mean + half * half / 6.0
+        for r, mean, half in ((r_y, mean_y, half_y), (r_z, mean_z, half_z))
+    )
+    across_y, across_z = (1.0 - 2.0 * r_y) * mean_y, (1.0 - 2.0 * r_z) * mean_z
+    sheared_y, sheared_z = strain * (1.0 - r_y) * mean_y, strain * (1.0 - r_z) * mean_z
     return ca.vertcat(
-        p["EA"] * (m.stretch / p["L"] + bowing(m)),
-        p["GJ"] / p["L"] * (x2 - x1),
-        p["a_y"] * y1 + p["b_y"] * y2,
-        p["b_y"] * y1 + p["a_y"] * y2,
-        p["a_z"] * z1 + p["b_z"] * z2,
-        p["b_z"] * z1 + p["a_z"] * z2,
+        m.stretch + L * drawn,
+        2.0 * twist - across_y * half_z + across_z * half_y,
+        y1 + sheared_y + 0.5 * twist * across_z,
+        y2 + sheared_y - 0.5 * twist * across_z,
+        z1 + sheared_z - 0.5 * twist * across_y,
+        z2 + sheared_z + 0.5 * twist * across_y,
     )
 
 
-def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
-    """Return the force of given `stresses`: minus them times the gradients of their strains."""
+def stresses(m: BeamMotion) -> ca.SX:
+    """Return what the `deformations` call forth: axial force, torque, end moments about y (two) and z (two)."""
+    return stiffened(m, deformations(m))
+
+
+def stiffened(m: BeamMotion, d: ca.SX) -> ca.SX:
+    """Return the stiffness of the element on some deformations."""
     import casadi as ca
 
+    p = m.p
+    plain = ca.vertcat(
+        p["EA"] * (d[0] / p["L"]),
+        p["GJ"] / p["L"] * d[1],
+        p["a_y"] * d[2] + p["b_y"] * d[3],
+        p["b_y"] * d[2] + p["a_y"] * d[3],
+        p["a_z"] * d[4] + p["b_z"] * d[5],
+        p["b_z"] * d[4] + p["a_z"] * d[5],
+    )
+    if SHEARING[0] not in p:
+        return plain
+    C = ca.SX(6, 6)
+    for i in range(6):
+        for j in range(i, 6):
+            C[i, j] = C[j, i] = p[f"c{i}{j}"]
+    return plain + C @ d
+
+
+def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
+    """Return the force of given `stresses`: minus them times the gradients of their `deformations`."""
+    import casadi as ca
+
+    if SHEARING[0] in m.p:
+        seen = ca.SX.sym("seen", 7)
+        local = replace(m, stretch=seen[0], theta=(seen[1:4], seen[4:7]))
+        gradient = ca.jtimes(deformations(local), seen, stress, True)
+        return BeamForce(-ca.substitute(gradient, seen, ca.vertcat(m.stretch, *m.theta)), ca.SX(3, 1), ca.SX(12, 1))
     (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
     N, torque = stress[0], stress[1]
     s = N * m.p["L"] / 30.0
@@ -239,17 +292,11 @@ def elastic_force(m: BeamMotion) -> BeamForce:
 
 
 def strain_energy(m: BeamMotion) -> ca.SX:
-    """Return ½ EA L ε² + torsion + bending, ε the mean axial strain with bowing [J]."""
-    (x1, y1, z1), (x2, y2, z2) = (_components(t) for t in m.theta)
-    strain = m.stretch / m.p["L"] + bowing(m)
-    return 0.5 * (
-        m.p["EA"] * m.p["L"] * strain**2
-        + m.p["GJ"] / m.p["L"] * (x2 - x1) ** 2
-        + m.p["a_y"] * (y1**2 + y2**2)
-        + 2.0 * m.p["b_y"] * y1 * y2
-        + m.p["a_z"] * (z1**2 + z2**2)
-        + 2.0 * m.p["b_z"] * z1 * z2
-    )
+    """Return half of `stresses` on `deformations` [J]."""
+    import casadi as ca
+
+    d = deformations(m)
+    return 0.5 * ca.dot(d, stiffened(m, d))
 
 
 def viscous_force(m: BeamMotion) -> BeamForce:
@@ -259,11 +306,9 @@ def viscous_force(m: BeamMotion) -> BeamForce:
     relative = [m.rates[1] - m.spin, m.rates[3] - m.spin]
     # ḋ of a rotation vector is T⁻¹ times the relative spin; T⁻¹(θ) = T⁻ᵀ(−θ)
     (x1, y1, z1), (x2, y2, z2) = (_components(inverse_tangent(-t, r)) for t, r in zip(m.theta, relative, strict=True))
-    N = m.p["EA"] / m.p["L"] * (m.rates[2] - m.rates[0])[0]
-    torque = m.p["GJ"] / m.p["L"] * (x2 - x1)
-    m1 = ca.vertcat(-torque, m.p["a_y"] * y1 + m.p["b_y"] * y2, m.p["a_z"] * z1 + m.p["b_z"] * z2)
-    m2 = ca.vertcat(torque, m.p["b_y"] * y1 + m.p["a_y"] * y2, m.p["b_z"] * z1 + m.p["a_z"] * z2)
-    return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
+    d = ca.vertcat((m.rates[2] - m.rates[0])[0], x2 - x1, y1, y2, z1, z2)
+    N, torque, y1, y2, z1, z2 = ca.vertsplit(stiffened(m, d))
+    return BeamForce(-ca.vertcat(N, -torque, y1, z1, torque, y2, z2), ca.SX(3, 1), ca.SX(12, 1))
 
 
 def momentum(m: BeamMotion, rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

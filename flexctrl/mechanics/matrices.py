@@ -45,7 +45,6 @@ def beam_stiffness(section: Section, length: float) -> np.ndarray:
     Order of the freedoms: u v w θx θy θz of node 1, then of node 2.
     """
     L = length
-    y, z = bending(section.EI_y, section.GA_z, L), bending(section.EI_z, section.GA_y, L)
     # deformations from nodal freedoms: stretch, twist, end rotations against the chord
     B = np.zeros((6, 12))
     B[0, [0, 6]] = -1.0, 1.0
@@ -54,11 +53,39 @@ def beam_stiffness(section: Section, length: float) -> np.ndarray:
         B[row, [end, 2, 8]] = 1.0, -1.0 / L, 1.0 / L
     for row, end in ((4, 5), (5, 11)):
         B[row, [end, 1, 7]] = 1.0, 1.0 / L, -1.0 / L
+    return B.T @ (plain_law(section, L) + coupling(section, L)) @ B
+
+
+def plain_law(section: Section, length: float) -> np.ndarray:
+    """Return the stiffness of an element against its six deformations, couplings of the section left out.
+
+    Order: stretch, twist, end rotations against the chord about y (two) and z (two).
+    """
+    y, z = bending(section.EI_y, section.GA_z, length), bending(section.EI_z, section.GA_y, length)
     D = np.zeros((6, 6))
-    D[0, 0], D[1, 1] = section.EA / L, section.GJ / L
+    D[0, 0], D[1, 1] = section.EA / length, section.GJ / length
     D[2:4, 2:4] = [[y.a, y.b], [y.b, y.a]]
     D[4:6, 4:6] = [[z.a, z.b], [z.b, z.a]]
-    return B.T @ D @ B
+    return D
+
+
+def coupling(section: Section, length: float) -> np.ndarray:
+    """Return what the couplings of a section add to `plain_law`, exact for a prismatic element without load on it.
+
+    The inverse of the flexibility ∫ Sᵀ C⁻¹ S dx, S(x) the section forces of unit end forces: N and T are constant,
+    the moments linear, and the shears their slopes.
+    """
+    if not section.stiffness:
+        return np.zeros((6, 6))
+    flexible = np.linalg.inv(np.array(section.stiffness))
+    F = np.zeros((6, 6))
+    for at, weight in ((0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0)):
+        S = np.zeros((6, 6))
+        S[0, 0] = S[3, 1] = 1.0
+        S[4, 2:4] = S[5, 4:6] = at - 1.0, at
+        S[2, 2:4], S[1, 4:6] = 1.0 / length, -1.0 / length
+        F += weight * length * S.T @ flexible @ S
+    return np.asarray(np.linalg.inv(F) - plain_law(section, length))
 
 
 def beam_mass(section: Section, length: float) -> np.ndarray:

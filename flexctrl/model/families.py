@@ -9,7 +9,7 @@ import numpy as np
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility
-from flexctrl.mechanics.matrices import bending, plane_masses
+from flexctrl.mechanics.matrices import bending, coupling, plane_masses
 from flexctrl.model import kinds
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
@@ -60,11 +60,13 @@ def families_of(structure: Structure, effects: tuple[Effect, ...], rigid: frozen
     """Return the families of a structure under some effects; a rigid beam is one piece, a rigid rope none."""
     parts, effects = structure.elements, tuple(e.everywhere() for e in effects)
     beams = [p for p in parts if isinstance(p, Beam)]
+    bent = [b for b in beams if b.name not in rigid]
     stiff = tuple(e for e in effects if not isinstance(e, BeamFlexibility))
     lines = [p for p in parts if isinstance(p, Spring) or (isinstance(p, Rope) and p.name not in rigid)]
     made = [
-        _beams(structure, effects, [b for b in beams if b.name not in rigid], rigid),
-        _beams(structure, stiff, [b for b in beams if b.name in rigid], rigid),
+        _beams(kinds.BEAM, structure, effects, [b for b in bent if not b.section.shears], rigid),
+        _beams(kinds.SHEARING_BEAM, structure, effects, [b for b in bent if b.section.shears], rigid),
+        _beams(kinds.BEAM, structure, stiff, [b for b in beams if b.name in rigid], rigid),
         _lines(kinds.SPRING, structure, effects, [p for p in lines if isinstance(p, Spring)]),
         _lines(kinds.ROPE, structure, effects, [p for p in lines if isinstance(p, Rope)]),
         _bodies(kinds.POINT, structure, effects, [p for p in parts if isinstance(p, PointMass)]),
@@ -92,14 +94,14 @@ def _family(
     )
 
 
-def _beams(s: Structure, effects: tuple[Effect, ...], beams: list[Beam], rigid: frozenset[str]) -> Family:
+def _beams(kind: Kind, s: Structure, effects: tuple[Effect, ...], beams: list[Beam], rigid: frozenset[str]) -> Family:
     spans = []
     for b in beams:
         ends = [(0, b.elements)] if b.name in rigid else [(i, i + 1) for i in range(b.elements)]
         spans += [(b, i, j) for i, j in ends]
     nodes = [[s.number(b.start) + i, s.number(b.start) + j] for b, i, j in spans]
-    parameters = [_beam_parameters(b, b.length * (j - i) / b.elements) for b, i, j in spans]
-    return _family(kinds.BEAM, effects, [b.name for b, _, _ in spans], nodes, parameters)
+    parameters = [_beam_parameters(b, b.length * (j - i) / b.elements)[: kind.parameters] for b, i, j in spans]
+    return _family(kind, effects, [b.name for b, _, _ in spans], nodes, parameters)
 
 
 def _beam_parameters(b: Beam, length: float) -> list[float]:
@@ -107,7 +109,11 @@ def _beam_parameters(b: Beam, length: float) -> list[float]:
     y, z = bending(s.EI_y, s.GA_z, length), bending(s.EI_z, s.GA_y, length)
     about_z, about_y = plane_masses(s, length)
     axes = b.axes.ravel().tolist()
-    return [*axes, length, s.EA, s.GJ, *y, *z, s.rhoA * length, s.rhoJ * length, *about_z, *about_y]
+    plain = [*axes, length, s.EA, s.GJ, *y, *z, s.rhoA * length, s.rhoJ * length, *about_z, *about_y]
+    if not s.shears:
+        return plain
+    ratios = [1.0 / (1.0 + 12.0 * EI / (GA * length**2)) for EI, GA in ((s.EI_y, s.GA_z), (s.EI_z, s.GA_y))]
+    return [*plain, *ratios, *coupling(s, length)[np.triu_indices(6)].tolist()]
 
 
 def _lines(kind: Kind, s: Structure, effects: tuple[Effect, ...], lines: Sequence[Rope | Spring]) -> Family:

@@ -309,6 +309,7 @@ def _drive(effects: tuple[Effect, ...], m: pieces.DriveMotion) -> Shares:
 
 
 BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam, _beam_slope)
+SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(beam.PARAMETERS + beam.SHEARING), _beam, _beam_slope)
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
 ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
 POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)

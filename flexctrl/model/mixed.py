@@ -52,6 +52,7 @@ def _rope(effects: tuple[Effect, ...], nodes: list, parameters: ca.SX) -> tuple:
 
 _ELASTIC: dict[Kind, tuple[int, Elastic]] = {
     kinds.BEAM: (6, _beam),
+    kinds.SHEARING_BEAM: (6, _beam),
     kinds.SPRING: (1, _spring),
     kinds.ROPE: (1, _rope),
 }

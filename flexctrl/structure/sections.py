@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from flexctrl.errors import StructureError
 from flexctrl.structure.freedoms import check_finite, check_number
@@ -70,6 +73,8 @@ class Section:
     GA_y, GA_z : float
         Effective shear stiffness κGA along local y and z [N], > 0; infinite (the default) means no
         shear deformation.
+    stiffness : 6 × 6 floats
+        The whole law of a section whose deformations are coupled, as `coupled` makes it; empty for none.
 
     Raises
     ------
@@ -87,6 +92,7 @@ class Section:
     rhoI_z: float = 0.0
     GA_y: float = math.inf
     GA_z: float = math.inf
+    stiffness: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("EA", "EI_y", "EI_z", "GJ"):
@@ -95,6 +101,45 @@ class Section:
             object.__setattr__(self, name, check_finite(getattr(self, name), name, "Section", least=0.0))
         for name in ("GA_y", "GA_z"):
             object.__setattr__(self, name, check_number(getattr(self, name), name, "Section", above=0.0))
+
+    @property
+    def shears(self) -> bool:
+        """Whether it deforms in shear."""
+        return bool(self.stiffness) or math.isfinite(self.GA_y) or math.isfinite(self.GA_z)
+
+    @classmethod
+    def coupled(
+        cls,
+        stiffness: Sequence[Sequence[float]] | np.ndarray,
+        rhoA: float,
+        rhoJ: float,
+        rhoI_y: float = 0.0,
+        rhoI_z: float = 0.0,
+    ) -> Section:
+        """Section with a full stiffness: composites, centres off the axis, bending coupled with torsion.
+
+        Parameters
+        ----------
+        stiffness : array_like, shape (6, 6)
+            Force and moment (N, V_y, V_z, T, M_y, M_z) per strain (stretch, two shears, twist, two curvatures) in
+            the beam's local axes; symmetric, positive definite [N, N m, N m²].
+        rhoA, rhoJ, rhoI_y, rhoI_z : float
+            As of `Section`.
+
+        Returns
+        -------
+        Section
+            Its EA, GA, GJ and EI are the diagonal of the stiffness.
+
+        Raises
+        ------
+        StructureError
+            If the stiffness is not six by six, not symmetric or not positive definite.
+        """
+        C = _checked_law(stiffness)
+        EA, GA_y, GA_z, GJ, EI_y, EI_z = np.diag(C).tolist()
+        law = tuple(tuple(row) for row in C.tolist())
+        return cls(EA, EI_y, EI_z, GJ, rhoA, rhoJ, rhoI_y, rhoI_z, GA_y, GA_z, law)
 
     @classmethod
     def circular(cls, material: Material, radius: float) -> Section:
@@ -186,6 +231,22 @@ class Section:
         mid_b, mid_h = width - web, height - flange
         torsion = 4.0 * (mid_b * mid_h) ** 2 / (2.0 * mid_b / flange + 2.0 * mid_h / web)
         return _from_moments(material, width * height - b * h, around_y, around_z, torsion)
+
+
+def _checked_law(stiffness: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
+    try:
+        C = np.array(stiffness, dtype=float)
+    except (TypeError, ValueError):
+        C = np.zeros(0)
+    if C.shape != (6, 6) or not np.isfinite(C).all():
+        raise StructureError(f"Section.coupled: stiffness = {stiffness!r}; expected six rows of six finite numbers")
+    size = np.sqrt(np.abs(np.diag(C)))
+    scaled = C / np.where(size > 0.0, np.outer(size, size), 1.0)
+    if np.abs(scaled - scaled.T).max() > 1e-9:
+        raise StructureError("Section.coupled: the stiffness is not symmetric; a section's law has an energy")
+    if not (np.diag(C) > 0.0).all() or np.linalg.eigvalsh(scaled)[0] <= 0.0:
+        raise StructureError("Section.coupled: the stiffness is not positive definite: some strain costs no energy")
+    return np.asarray(0.5 * (C + C.T))
 
 
 def _from_moments(m: Material, area: float, I_y: float, I_z: float, J: float) -> Section:
