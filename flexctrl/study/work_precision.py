@@ -12,45 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
-from flexctrl.dynamics.run import Run, Status, Tolerance
+from flexctrl.dynamics.run import Run
 from flexctrl.errors import FlexctrlError, StructureError
-from flexctrl.study.answers import outputs_apart
 from flexctrl.study.held_out import load_cases
 from flexctrl.study.omissions import Subject
-from flexctrl.study.settings import Fidelity, Setting, sweep
+from flexctrl.study.reference import Reference, certified, error_of, finished
+from flexctrl.study.settings import Setting, sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Point", "Reference", "WorkPrecision", "work_precision"]
+__all__ = ["Point", "WorkPrecision", "work_precision"]
 
 _REPEATS = 2
-_REFINEMENTS = 4
-_MESH = "a coarser mesh"
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """A run that others are measured against.
-
-    Attributes
-    ----------
-    run : Run
-    setting : Setting
-    agreement : mapping of str to float
-        How far it is from a coarser mesh, from longer steps and from another integrator: largest change of an
-        output over its magnitude.
-    """
-
-    run: Run
-    setting: Setting
-    agreement: dict[str, float]
-
-    @property
-    def uncertainty(self) -> float:
-        """The largest of the disagreements."""
-        return max(self.agreement.values(), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -227,11 +201,11 @@ class _Study:
             runs, times = [], []
             for _ in range(_REPEATS):
                 unit = calibration()
-                runs.append(_finished(scene))
+                runs.append(finished(scene))
                 times.append(runs[-1].report.wall_s / min(unit, calibration()))
         except FlexctrlError as error:
             return Point(setting, np.inf, np.inf, 0, str(error).splitlines()[0])
-        return Point(setting, _error(reference.run, runs[0]), min(times), runs[0].report.steps)
+        return Point(setting, error_of(reference.run, runs[0]), min(times), runs[0].report.steps)
 
     def _choice(
         self, points: Sequence[Point], reference: Reference
@@ -242,113 +216,14 @@ class _Study:
         references: list[Run] = []
         held_out: dict[str, tuple[float, ...]] = {}
         for point in fit:
-            references = references or [_finished(reference.setting.of(case)) for case in cases]
+            references = references or [finished(reference.setting.of(case)) for case in cases]
             errors = tuple(
-                _error(r, _finished(point.setting.of(case))) for r, case in zip(references, cases, strict=True)
+                error_of(r, finished(point.setting.of(case))) for r, case in zip(references, cases, strict=True)
             )
             held_out[str(point.setting)] = errors
             if max(errors, default=0.0) <= self.tolerance:
                 return point, held_out
         return None, held_out
-
-
-def finest_of(settings: Sequence[Setting]) -> Setting:
-    """Return a setting finer than all of some: the reference's.
-
-    Parameters
-    ----------
-    settings : sequence of Setting
-
-    Returns
-    -------
-    Setting
-    """
-    mesh = 2 * max(s.mesh for s in settings)
-    steps = [s.method.step for s in settings if isinstance(s.method, GeneralizedAlpha)]
-    if steps:
-        return Setting(Fidelity.FULL, mesh, GeneralizedAlpha(0.25 * min(steps)), Tolerance())
-    least = min((s.tolerance for s in settings), key=lambda t: t.relative)
-    return Setting(Fidelity.FULL, mesh, AdaptiveAlpha(), Tolerance(0.1 * least.relative, 0.1 * least.absolute))
-
-
-def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> Reference:
-    """Return a reference whose refinements and integrators agree.
-
-    Parameters
-    ----------
-    scene : Scene
-    settings : sequence of Setting
-        What it has to be finer than.
-    tolerance : float
-        They must agree within a third of it.
-
-    Returns
-    -------
-    Reference
-
-    Raises
-    ------
-    FlexctrlError
-        If a run fails or they do not agree; says by how much.
-    """
-    finest = finest_of(settings)
-    for _ in range(_REFINEMENTS):
-        reference = _reference(scene, finest)
-        if reference.uncertainty <= tolerance / 3.0:
-            return reference
-        worst = max(reference.agreement, key=lambda name: reference.agreement[name])
-        finest = replace(finest, mesh=2 * finest.mesh) if worst == _MESH else _shorter(finest)
-    raise FlexctrlError(
-        f"{scene.name}: the reference ({reference.setting}) is {reference.uncertainty:.2g} from {worst}, more than a "
-        f"third of the tolerance {tolerance:g}; give settings with finer meshes or shorter steps, or a larger tolerance"
-    )
-
-
-def _reference(scene: Subject, finest: Setting) -> Reference:
-    run = _finished(finest.of(scene))
-    others = {
-        _MESH: replace(finest, mesh=finest.mesh // 2),
-        "longer steps": _longer(finest),
-        "another integrator": _other(finest, run),
-    }
-    return Reference(run, finest, {name: _error(run, _finished(s.of(scene))) for name, s in others.items()})
-
-
-def _shorter(setting: Setting) -> Setting:
-    method = setting.method
-    if isinstance(method, GeneralizedAlpha):
-        return replace(setting, method=replace(method, step=0.5 * method.step))
-    t = setting.tolerance
-    return replace(setting, tolerance=Tolerance(0.1 * t.relative, 0.1 * t.absolute))
-
-
-def _longer(setting: Setting) -> Setting:
-    method = setting.method
-    if isinstance(method, GeneralizedAlpha):
-        return replace(setting, method=replace(method, step=2.0 * method.step))
-    t = setting.tolerance
-    return replace(setting, tolerance=Tolerance(5.0 * t.relative, 5.0 * t.absolute))
-
-
-def _other(setting: Setting, run: Run) -> Setting:
-    """The same accuracy by other means: controlled steps for fixed ones, fixed for controlled."""
-    if isinstance(setting.method, GeneralizedAlpha):
-        return replace(setting, method=AdaptiveAlpha(rho=0.6), tolerance=Tolerance(1e-6, 1e-9))
-    mean = float(run.t[-1]) / max(run.report.steps, 1)
-    return replace(setting, method=GeneralizedAlpha(mean, rho=0.6))
-
-
-def _finished(scene: Subject) -> Run:
-    run = scene.run()
-    if run.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt
-    if run.status is not Status.FINISHED:
-        raise FlexctrlError(f"the run ended early: {run.report.message}")
-    return run
-
-
-def _error(reference: Run, run: Run) -> float:
-    return max(outputs_apart(reference, run).values(), default=0.0)
 
 
 def calibration() -> float:

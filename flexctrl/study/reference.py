@@ -1,0 +1,165 @@
+"""A reference that can be trusted: refinements and integrators that agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.run import Run, Status, Tolerance
+from flexctrl.errors import FlexctrlError
+from flexctrl.study.answers import outputs_apart
+from flexctrl.study.omissions import Subject
+from flexctrl.study.settings import Fidelity, Setting
+
+__all__ = ["Reference", "certified", "error_of", "finest_of", "finished"]
+
+_REFINEMENTS = 4
+_MESH = "a coarser mesh"
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A run that others are measured against.
+
+    Attributes
+    ----------
+    run : Run
+    setting : Setting
+    agreement : mapping of str to float
+        How far it is from a coarser mesh, from longer steps and from another integrator: largest change of an
+        output over its magnitude.
+    """
+
+    run: Run
+    setting: Setting
+    agreement: dict[str, float]
+
+    @property
+    def uncertainty(self) -> float:
+        """The largest of the disagreements."""
+        return max(self.agreement.values(), default=0.0)
+
+
+def finest_of(settings: Sequence[Setting]) -> Setting:
+    """Return a setting finer than all of some: the reference's.
+
+    Parameters
+    ----------
+    settings : sequence of Setting
+
+    Returns
+    -------
+    Setting
+    """
+    mesh = 2 * max(s.mesh for s in settings)
+    steps = [s.method.step for s in settings if isinstance(s.method, GeneralizedAlpha)]
+    if steps:
+        return Setting(Fidelity.FULL, mesh, GeneralizedAlpha(0.25 * min(steps)), Tolerance())
+    least = min((s.tolerance for s in settings), key=lambda t: t.relative)
+    return Setting(Fidelity.FULL, mesh, AdaptiveAlpha(), Tolerance(0.1 * least.relative, 0.1 * least.absolute))
+
+
+def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> Reference:
+    """Return a reference whose refinements and integrators agree.
+
+    Parameters
+    ----------
+    scene : Scene
+    settings : sequence of Setting
+        What it has to be finer than.
+    tolerance : float
+        They must agree within a third of it.
+
+    Returns
+    -------
+    Reference
+
+    Raises
+    ------
+    FlexctrlError
+        If a run fails or they do not agree; says by how much.
+    """
+    finest = finest_of(settings)
+    for _ in range(_REFINEMENTS):
+        reference = _reference(scene, finest)
+        if reference.uncertainty <= tolerance / 3.0:
+            return reference
+        worst = max(reference.agreement, key=lambda name: reference.agreement[name])
+        finest = replace(finest, mesh=2 * finest.mesh) if worst == _MESH else _shorter(finest)
+    raise FlexctrlError(
+        f"{scene.name}: the reference ({reference.setting}) is {reference.uncertainty:.2g} from {worst}, more than a "
+        f"third of the tolerance {tolerance:g}; give settings with finer meshes or shorter steps, or a larger tolerance"
+    )
+
+
+def _reference(scene: Subject, finest: Setting) -> Reference:
+    run = finished(finest.of(scene))
+    others = {
+        _MESH: replace(finest, mesh=finest.mesh // 2),
+        "longer steps": _longer(finest),
+        "another integrator": _other(finest, run),
+    }
+    return Reference(run, finest, {name: error_of(run, finished(s.of(scene))) for name, s in others.items()})
+
+
+def _shorter(setting: Setting) -> Setting:
+    method = setting.method
+    if isinstance(method, GeneralizedAlpha):
+        return replace(setting, method=replace(method, step=0.5 * method.step))
+    t = setting.tolerance
+    return replace(setting, tolerance=Tolerance(0.1 * t.relative, 0.1 * t.absolute))
+
+
+def _longer(setting: Setting) -> Setting:
+    method = setting.method
+    if isinstance(method, GeneralizedAlpha):
+        return replace(setting, method=replace(method, step=2.0 * method.step))
+    t = setting.tolerance
+    return replace(setting, tolerance=Tolerance(5.0 * t.relative, 5.0 * t.absolute))
+
+
+def _other(setting: Setting, run: Run) -> Setting:
+    """The same accuracy by other means: controlled steps for fixed ones, fixed for controlled."""
+    if isinstance(setting.method, GeneralizedAlpha):
+        return replace(setting, method=AdaptiveAlpha(rho=0.6), tolerance=Tolerance(1e-6, 1e-9))
+    mean = float(run.t[-1]) / max(run.report.steps, 1)
+    return replace(setting, method=GeneralizedAlpha(mean, rho=0.6))
+
+
+def finished(scene: Subject) -> Run:
+    """Return a scene's run, which must come to its end.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    FlexctrlError
+        If it ends early.
+    """
+    run = scene.run()
+    if run.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    if run.status is not Status.FINISHED:
+        raise FlexctrlError(f"the run ended early: {run.report.message}")
+    return run
+
+
+def error_of(reference: Run, run: Run) -> float:
+    """Return the largest error of an output over its largest magnitude in the reference.
+
+    Parameters
+    ----------
+    reference, run : Run
+
+    Returns
+    -------
+    float
+    """
+    return max(outputs_apart(reference, run).values(), default=0.0)
