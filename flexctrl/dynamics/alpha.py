@@ -14,6 +14,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError
 from flexctrl.errors import SingularMatrixError, StructureError
@@ -95,9 +96,8 @@ class Stepper:
     _plan: Plan | None = None
 
     def __post_init__(self) -> None:
-        names = self.model.coordinates
-        self._turning = np.array([not n.endswith(("_u", "_v", "_w", "_slide", "_source")) for n in names], dtype=bool)
-        self._weight = 1.0 / _yardsticks(self.model, self._turning)
+        self._turning = turning(self.model)
+        self._weight = 1.0 / yardsticks(self.model)
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
@@ -242,14 +242,6 @@ def _trend(before: AlphaPoint, rate: np.ndarray) -> np.ndarray:
     return change if guessed_well else np.zeros_like(change)
 
 
-def _yardsticks(model: Model, turning: np.ndarray) -> np.ndarray:
-    """What an error of 1 is in each coordinate; a source angle counts as the motion it drives, or a motor's many
-    turns would excuse any error of the machine."""
-    size = model.structure.size
-    gears = {f"{d.name}_source": abs(d.effective_ratio) * (1.0, size)[d.column == 0] for d in model.structure.drives}
-    return np.array([gears.get(n, 1.0 if t else size) for n, t in zip(model.coordinates, turning, strict=True)])
-
-
 @dataclass(frozen=True)
 class GeneralizedAlpha:
     """Generalised alpha with a fixed step; second order.
@@ -278,6 +270,10 @@ class GeneralizedAlpha:
     @property
     def order(self) -> int:
         return 2
+
+    @property
+    def symmetric(self) -> bool:
+        return self.rho == 1.0
 
     @property
     def damping(self) -> str:
@@ -322,6 +318,10 @@ class AdaptiveAlpha:
     @property
     def order(self) -> int:
         return 2
+
+    @property
+    def symmetric(self) -> bool:
+        return self.rho == 1.0
 
     @property
     def damping(self) -> str:

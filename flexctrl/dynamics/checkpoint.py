@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.steps import Counts, Mark, Point
 from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
@@ -148,12 +149,16 @@ class Autosave:
             raise StructureError(f"Autosave: seconds = {self.seconds}; expected > 0")
 
 
-def machine_of(model: Model) -> str:
+def machine_of(model: Model | LinearPlant) -> str:
     """Return a digest of a model: its names, its effects and its parts' numbers."""
     digest = hashlib.sha256(repr((model.coordinates, model.inputs, model.outputs, model.effects)).encode())
-    for numbers in (model.rest.x, *(f.parameters for f in model.forces.families)):
+    for numbers in model.numbers if isinstance(model, LinearPlant) else _numbers(model):
         digest.update(np.ascontiguousarray(numbers).tobytes())
     return digest.hexdigest()
+
+
+def _numbers(model: Model) -> tuple[np.ndarray, ...]:
+    return (model.rest.x, *(f.parameters for f in model.forces.families))
 
 
 def _packed(value: Any, arrays: dict[str, np.ndarray]) -> Any:

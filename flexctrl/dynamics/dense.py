@@ -12,10 +12,11 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.local import Local
-from flexctrl.dynamics.steps import Point
+from flexctrl.dynamics.steps import Point, Stepper
+from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
-__all__ = ["Curve", "Dense", "Hermite", "Track"]
+__all__ = ["Curve", "Dense", "Hermite", "Track", "curves_of"]
 
 
 class Curve(Protocol):
@@ -68,6 +69,14 @@ class Hermite:
         place = s * (first + s * (bend + s * twist))
         rate = (first + s * (2.0 * bend + s * 3.0 * twist))[: len(turning)] / h
         return self.local.place(self.start, place, rate + s * s * turning, t)
+
+
+def curves_of(model: Model, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:
+    """Return how the motion over a step of a stepper is found: its own way, or `Hermite`."""
+    if isinstance(stepper, Dense):
+        return stepper.curve
+    local = Local(model)
+    return lambda before, after: Hermite(local, before.state, after.state)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,11 @@ class Local:
         """Number of coordinates."""
         return len(self._chart.names) if self._chart is not None else self.model.n
 
+    @cached_property
+    def swirls(self) -> bool:
+        """Whether the coordinates' own turning adds to accelerations."""
+        return self._chart is not None and bool(self._chart.lines)
+
     def place(self, start: State, xi: np.ndarray, v: np.ndarray, t: float) -> State:
         """Return the state at some coordinates from a start.
 

@@ -6,31 +6,35 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
-from flexctrl.dynamics.dense import Curve, Dense, Hermite, Track
+from flexctrl.dynamics.dense import Track, curves_of
 from flexctrl.dynamics.events import Event, Watch
+from flexctrl.dynamics.exact import Exact
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.journey import Journey, Plan
-from flexctrl.dynamics.local import Local
+from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.record import InMemory, Record
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
-from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Point, Stepper
+from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.model.equilibrium import Rest
+from flexctrl.model.linear import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
+_ROWS = 1000
+
 
 def simulate(
-    model: Model,
+    model: Model | LinearModel,
     controller: Any = None,
     *,
     until: float,
@@ -48,7 +52,8 @@ def simulate(
 
     Parameters
     ----------
-    model : Model
+    model : Model or LinearModel
+        A linear model's state at rest is q = 0; its signals are deviations where it was made by `linearize`.
     controller : Controller, control.StateSpace or control.TransferFunction, optional
         Connected by signal names; sampled ones are held between their instants.
     until : float
@@ -60,7 +65,8 @@ def simulate(
     inputs : mapping of str to float, optional
         Constant inputs, applied as a step at the start; a controller's commands add to them.
     method : Integrator, optional
-        `GeneralizedAlpha`, `AdaptiveAlpha`, …. Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``.
+        Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``; for a linear model `Exact`, with a state at
+        every row.
     tolerance : Tolerance, optional
         For error-controlled methods.
     every : float, optional
@@ -94,6 +100,9 @@ def simulate(
     if every is not None and not every > 0.0:
         raise StructureError(f"simulate: every = {every}; expected seconds > 0")
     record = record or InMemory()
+    if isinstance(model, LinearModel):
+        method = method or Exact(every or until / _ROWS)
+        model = cast(Model, _plant(model, method))
     feed = feed_of(model, controller, _base(model, start, inputs))
     spacing = every if record.every is None else record.every
     tell = progress or _untold
@@ -101,7 +110,7 @@ def simulate(
         model, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, tell, autosave, time.perf_counter()
     )
     stepper = plan.method.stepper(model, feed, plan.tolerance)
-    curve = _curves(model, stepper)
+    curve = curves_of(model, stepper)
     recorder = record.start((*model.outputs, *model.inputs))
     try:
         rows = Rows(feed, spacing, until, recorder, curve)
@@ -109,6 +118,13 @@ def simulate(
         return _run(plan, stepper, start, tuple(events), rows, track)
     finally:
         recorder.close()
+
+
+def _plant(linear: LinearModel, method: Integrator) -> LinearPlant:
+    """A linear model as a machine; outputs that feel inputs at once are known to the exact method only."""
+    if linear.D.any() and not isinstance(method, Exact):
+        raise StructureError(f"simulate: an output of {linear.name} feels inputs at once (D ≠ 0); use the method Exact")
+    return LinearPlant(linear)
 
 
 def _untold(share: float) -> None:
@@ -136,14 +152,6 @@ def _run(
     journey = setting_out(plan, stepper, start, events, rows, track)  # type: ignore[arg-type]
     journey.travel()
     return _result(journey)
-
-
-def _curves(model: Model, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:
-    """How motions within steps are found."""
-    if isinstance(stepper, Dense):
-        return stepper.curve
-    local = Local(model)
-    return lambda before, after: Hermite(local, before.state, after.state)
 
 
 def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:
@@ -194,7 +202,7 @@ def _resumed(
                 f"simulate: the checkpoint is of another {what} ({before} there, {now} here); give what the run had"
             )
     stepper.recall(start.memory)
-    stepper.counts = replace(start.counts)
+    stepper.counts.take(start.counts)
     watch = _watch(plan, events)
     watch.sides, watch.sizes = start.sides.copy(), start.sizes.copy()
     books = Books(plan.feed, start.point.state, plan.method.order)

@@ -50,6 +50,10 @@ class Counts:
     factorisations: int = 0
     worst: int = 0
 
+    def take(self, other: Counts) -> None:
+        """Go on counting from others."""
+        self.newton, self.factorisations, self.worst = other.newton, other.factorisations, other.worst
+
 
 @dataclass
 class Mark:
@@ -196,6 +200,8 @@ class Integrator(Protocol):
     ----------
     order : int
         Of the global error of places and rates.
+    symmetric : bool
+        Whether the same steps lead back in time: errors then go with even powers of the step.
     damping : str
         What the method itself damps, in words for the report.
     pace : Fixed or Controlled
@@ -203,6 +209,9 @@ class Integrator(Protocol):
 
     @property
     def order(self) -> int: ...
+
+    @property
+    def symmetric(self) -> bool: ...
 
     @property
     def damping(self) -> str: ...

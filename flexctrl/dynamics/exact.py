@@ -1,0 +1,252 @@
+"""Linear equations integrated exactly: by the exponential of their modal form.
+
+Inputs that are held (constant, or from a sampled controller) and linear continuous controllers on a linear model
+leave no error but round-off. Other continuous controllers are interpolated over a step at Lobatto's four points,
+which is exact for commands that are cubic in time; a step over which that does not hold is refused, and halved by
+the run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from flexctrl.design.controller import LinearController
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.linear_plant import LinearPlant
+from flexctrl.dynamics.modal_equations import closed, opened
+from flexctrl.dynamics.propagator import NODES, Propagator
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError
+from flexctrl.errors import StructureError
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Exact"]
+
+_SWEEPS = 30
+_SETTLED = 1e-13
+_SMALL = 1e-6
+_HALF = 0.5
+_POLYNOMIAL = np.linalg.inv(np.vander(NODES, increasing=True))
+"""Powers of the share of a step from values at the nodes."""
+
+_INTEGRALS = np.array([[s ** (k + 1) / (k + 1) for k in range(4)] for s in NODES]) @ _POLYNOMIAL
+"""Integrals from the start to each node, from values at the nodes (Lobatto IIIA)."""
+
+
+@dataclass(frozen=True)
+class Exact:
+    """The exact motion of linear equations: a `LinearModel`, or a model without `LargeRotation`.
+
+    Parameters
+    ----------
+    step : float
+        Spacing of the states computed [s]; with held inputs it has no bearing on their accuracy.
+
+    Raises
+    ------
+    StructureError
+        For a step that is not positive.
+    """
+
+    step: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.step) and self.step > 0.0):
+            raise StructureError(f"Exact: step = {self.step}; expected seconds > 0")
+
+    @property
+    def order(self) -> int:
+        return 6
+
+    @property
+    def symmetric(self) -> bool:
+        return True
+
+    @property
+    def damping(self) -> str:
+        return "exact for held inputs"
+
+    @property
+    def pace(self) -> Fixed:
+        return Fixed(self.step)
+
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
+        if model.large:
+            raise StructureError(
+                "Exact: this model moves far (LargeRotation), its equations are not linear; give linearize(model), a "
+                "model without LargeRotation, or another method"
+            )
+        return _Stepper(model, feed, tolerance)
+
+
+@dataclass(frozen=True)
+class _Point(Point):
+    """A point with its modal state, and the inputs over the step that led to it: powers of the share done."""
+
+    modal: np.ndarray
+    course: np.ndarray
+
+
+@dataclass
+class _Stepper:
+    """Steps of a modal form."""
+
+    model: Model
+    feed: Feed
+    tolerance: Tolerance
+    counts: Counts = field(default_factory=Counts)
+    memory: None = None
+    _slope: np.ndarray | None = None
+    _made_for: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.yard = yardsticks(self.model)
+        self.equations, self.closed = opened(self.model), False
+        if isinstance(self.model, LinearPlant) and isinstance(self.feed.controller, LinearController):
+            self.closed = self.feed.continuous
+            self.equations = closed(self.equations, self.model, self.feed) if self.closed else self.equations
+        self.propagator = Propagator(self.equations.first)
+
+    def recall(self, memory: None) -> None:
+        """There is nothing to go on from but the point."""
+        return
+
+    def start(self, state: State, supply: Supply, step: float) -> _Point:
+        """Return the point of a state; what no mass holds goes where its forces balance."""
+        e, n, z = self.equations, self.model.n, supply.x if self.closed else np.zeros(0)
+        known = np.append(state.q, state.v) - e.first.D @ self._inputs(supply.u) - e.first.C[:, e.modes :] @ z
+        modal = np.linalg.lstsq(e.first.C[:, : e.modes], known, rcond=None)[0] if n else np.zeros(0)
+        return self._point(state, np.append(modal, z), supply, state.t)
+
+    def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
+        """Return the point under other inputs."""
+        return self._point(point.state, point.modal, supply, point.state.t)
+
+    def step(self, point: _Point, h: float) -> _Point:
+        """Return the point a step later."""
+        t = point.state.t + h
+        if self.feed.continuous and not self.closed:
+            return self._collocated(point, h)
+        course = np.zeros((4, len(self.equations.first.B[0])))
+        course[0] = self._inputs(point.supply.u)
+        return self._point(point.state, self._modal(point, course, h, h), point.supply, t, course)
+
+    def _modal(self, point: _Point, course: np.ndarray, t: float, h: float) -> np.ndarray:
+        """The modal state a time t after a point, under inputs that are a polynomial over h."""
+        transition, powers = self.propagator.over(t, h)
+        return transition @ point.modal + np.einsum("kij,kj->i", powers, course)
+
+    def _inputs(self, u: np.ndarray) -> np.ndarray:
+        return np.append(self.feed.base if self.closed else u, 1.0)
+
+    def _point(
+        self, before: State, modal: np.ndarray, supply: Supply, t: float, course: np.ndarray | None = None
+    ) -> _Point:
+        """The point of a modal state under inputs; in a closed loop these follow from it."""
+        e, w = self.equations, self._inputs(supply.u)
+        state = self._state(before, modal, w, e.gain @ modal + e.direct @ w, t)
+        if self.closed:
+            supply = replace(self.feed.evaluate(state, modal[e.modes :]), u=state.driven)
+        rate = e.first.C[self.model.n :] @ (e.first.A @ modal + e.first.B @ w)
+        return _Point(state, rate, supply, modal, np.zeros((4, len(w))) if course is None else course)
+
+    def _state(self, before: State, modal: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> State:
+        n, first = self.model.n, self.equations.first
+        both = first.C @ modal + first.D @ w
+        state = self.model.advance(before, both[:n] - before.q, both[n:], t)
+        return replace(state, driven=u) if isinstance(self.model, LinearPlant) else state
+
+    def _collocated(self, point: _Point, h: float) -> _Point:
+        """A step under a continuous controller: its commands at the nodes and the motion there are found together."""
+        t, before, m = point.state.t, point.supply, len(point.supply.u)
+        found = np.tile(np.append(before.u, before.rate), (3, 1))
+        last = np.inf
+        for sweep in range(_SWEEPS):
+            gap = self._gap(point, h, found)
+            if self._slope is None or self._made_for != h or (sweep and self._large(gap) > 0.1 * last):
+                self._slope, self._made_for = self._derivative(point, h, found, gap), h
+            found = found - np.linalg.solve(self._slope, gap.ravel()).reshape(found.shape)
+            self.counts.newton += 1
+            last = self._large(gap)
+            if last <= _SETTLED * max(1.0, float(np.abs(found).max(initial=0.0))):
+                break
+        else:
+            raise StepError(0, f"commands did not settle over a step of {h:.3g} s at t = {t:.6g} s")
+        course, f, x = self._courses(before, h, found)
+        self._check(point, h, course, f)
+        supply = Supply(found[-1, :m], x[-1], found[-1, m:])
+        return self._point(point.state, self._modal(point, course, h, h), supply, t + h, course)
+
+    def _courses(self, before: Supply, h: float, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Inputs over a step as a polynomial, rates and states of the controller at the nodes, from those found."""
+        m = len(before.u)
+        whole = np.vstack([np.append(before.u, before.rate), found])
+        polynomial = _POLYNOMIAL @ np.column_stack([whole[:, :m], np.ones(4)])
+        return polynomial, whole[:, m:], before.x + h * (_INTEGRALS @ whole[:, m:])
+
+    def _gap(self, point: _Point, h: float, found: np.ndarray) -> np.ndarray:
+        """Inputs and rates at the nodes less what the controller answers there."""
+        course, _, x = self._courses(point.supply, h, found)
+        answers = [self._answer(point, course, share, h, z) for share, z in zip(NODES[1:], x[1:], strict=True)]
+        return found - np.array([np.append(answer.u, answer.rate) for answer in answers])
+
+    def _derivative(self, point: _Point, h: float, found: np.ndarray, gap: np.ndarray) -> np.ndarray:
+        """The slope of the gap over what is found, by differences."""
+        columns = np.empty((found.size, found.size))
+        for i in range(found.size):
+            moved = found.copy()
+            moved.flat[i] += (step := _SMALL * max(1.0, abs(found.flat[i])))
+            columns[:, i] = ((self._gap(point, h, moved) - gap) / step).ravel()
+        self.counts.factorisations += 1
+        return columns
+
+    @staticmethod
+    def _large(gap: np.ndarray) -> float:
+        return float(np.abs(gap).max(initial=0.0))
+
+    def at(self, point: _Point, course: np.ndarray, share: float, h: float) -> State:
+        """Return the state at a share of a step whose inputs are a polynomial."""
+        modal, w = self._modal(point, course, share * h, h), share ** np.arange(4) @ course
+        u = self.equations.gain @ modal + self.equations.direct @ w
+        return self._state(point.state, modal, w, u, point.state.t + share * h)
+
+    def _answer(self, point: _Point, course: np.ndarray, share: float, h: float, z: np.ndarray) -> Supply:
+        """What the controller answers there."""
+        return self.feed.evaluate(self.at(point, course, share, h), z)
+
+    def _check(self, point: _Point, h: float, course: np.ndarray, f: np.ndarray) -> None:
+        """Refuse a step over which the commands are not the polynomial through the nodes."""
+        powers = _HALF ** np.arange(1, 5) / np.arange(1, 5)
+        z = point.supply.x + h * (powers @ (_POLYNOMIAL @ f))
+        answer = self._answer(point, course, _HALF, h, z)
+        off = np.append(answer.u - (_HALF ** np.arange(4) @ course)[:-1], 0.0)
+        moved = self.equations.first.C @ (self.propagator.over(h, h)[1][0] @ off)
+        worst = float(np.abs(moved[: self.model.n] / self.yard).max(initial=0.0))
+        if not worst <= self.tolerance.absolute:
+            raise StepError(0, f"commands change too fast for a step of {h:.3g} s at t = {point.state.t:.6g} s")
+
+    def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
+        """Steps are of one length; what is not exact is refused."""
+        return 0.0
+
+    def curve(self, before: _Point, after: _Point) -> _Curve:
+        """Return the motion over a step."""
+        return _Curve(self, before, after)
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """The motion from a point."""
+
+    stepper: _Stepper
+    before: _Point
+    after: _Point
+
+    def at(self, t: float) -> State:
+        """Return the state at a time of the step."""
+        h = self.after.state.t - self.before.state.t
+        return self.stepper.at(self.before, self.after.course, (t - self.before.state.t) / h, h)

@@ -1,0 +1,207 @@
+"""Richardson extrapolation on the rotation group: a method run twice side by side, with steps h and h/2.
+
+The difference δ of the two shapes is taken in the degrees of freedom, rotations by the logarithm of the relative
+rotation; the extrapolated shape is the finer one moved on by δ/(2^p − 1). Both runs go on from their own states, so
+the pair is as stable as the method itself; what each step adds to δ estimates its error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.dynamics.dense import Curve, curves_of
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.steps import Counts, Integrator, Pace, Point, Stepper
+from flexctrl.errors import StructureError
+from flexctrl.mechanics.rotation import logarithm
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+from flexctrl.model.solve import factorise
+
+__all__ = ["Richardson"]
+
+
+@dataclass(frozen=True)
+class Richardson:
+    """A method of lower order run with steps h and h/2, and extrapolated.
+
+    Two more orders for a method that is symmetric in time (`ConservingMidpoint`, ``GeneralizedAlpha(h, rho=1.0)``),
+    one more for others, at three times the cost of the coarser run. As damped and as stable as the method itself.
+    Errors of both runs grow with time, so this is for runs in which the coarser one still follows the motion.
+
+    Parameters
+    ----------
+    method : Integrator
+        Of order 2: `GeneralizedAlpha`, `AdaptiveAlpha`, `ConservingMidpoint`; its step is the longer of the two.
+
+    Raises
+    ------
+    StructureError
+        For a method of another order.
+    """
+
+    method: Integrator
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.method, Integrator) or self.method.order != 2:
+            raise StructureError(f"Richardson: {self.method!r}; give a method of order 2, as GeneralizedAlpha(1e-3)")
+
+    @property
+    def order(self) -> int:
+        return 4 if self.method.symmetric else 3
+
+    @property
+    def symmetric(self) -> bool:
+        return False
+
+    @property
+    def damping(self) -> str:
+        return self.method.damping
+
+    @property
+    def pace(self) -> Pace:
+        return self.method.pace
+
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
+        coarse, fine = (self.method.stepper(model, feed, tolerance) for _ in range(2))
+        return _Stepper(model, feed, coarse, fine, 1.0 / 3.0)
+
+
+@dataclass(frozen=True)
+class _Point(Point):
+    """A point with those of both runs, that of the finer one half a step before, and the difference of the two."""
+
+    coarse: Point
+    middle: Point
+    fine: Point
+    gap: np.ndarray
+
+
+@dataclass
+class _Stepper:
+    """Two steppers side by side."""
+
+    model: Model
+    feed: Feed
+    coarse: Stepper[Any]
+    fine: Stepper[Any]
+    weight: float
+    counts: Counts = field(default_factory=Counts)
+
+    def __post_init__(self) -> None:
+        self.yard = 1.0 / yardsticks(self.model)
+        self.between = Difference(self.model)
+        self.curves = curves_of(self.model, self.coarse)
+
+    @property
+    def memory(self) -> tuple[Any, Any]:
+        return self.coarse.memory, self.fine.memory
+
+    @memory.setter
+    def memory(self, memory: tuple[Any, Any]) -> None:
+        self.recall(memory)
+
+    def recall(self, memory: tuple[Any, Any]) -> None:
+        """Go on as the steppers whose memories these are."""
+        self.coarse.recall(memory[0])
+        self.fine.recall(memory[1])
+
+    def start(self, state: State, supply: Supply, step: float) -> _Point:
+        """Return the point of a state, both runs together."""
+        coarse, fine = self.coarse.start(state, supply, step), self.fine.start(state, supply, 0.5 * step)
+        return _Point(state, fine.rate, supply, coarse, fine, fine, np.zeros(self.model.n))
+
+    def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
+        """Return the point under other inputs; the runs stay apart."""
+        coarse = self.coarse.renew(point.coarse, replace(supply, x=point.coarse.supply.x), step)
+        fine = self.fine.renew(point.fine, replace(supply, x=point.fine.supply.x), 0.5 * step)
+        rate = fine.rate + self.weight * (fine.rate - coarse.rate)
+        return replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
+
+    def step(self, point: _Point, h: float) -> _Point:
+        """Return the point a step later."""
+        before = self._spent()
+        coarse = self.coarse.step(point.coarse, h)
+        middle = self.fine.step(point.fine, 0.5 * h)
+        fine = self.fine.step(middle, 0.5 * h)
+        spent = self._spent()
+        self.counts.newton += spent[0] - before[0]
+        self.counts.factorisations += spent[1] - before[1]
+        self.counts.worst = self.fine.counts.worst
+        gap = self.between(coarse.state, fine.state)
+        state = self.moved_on(coarse.state, fine.state, gap)
+        rate = fine.rate + self.weight * (fine.rate - coarse.rate)
+        return _Point(state, rate, self._supply(state, coarse, fine), coarse, middle, fine, gap)
+
+    def _spent(self) -> tuple[int, int]:
+        a, b = self.coarse.counts, self.fine.counts
+        return a.newton + b.newton, a.factorisations + b.factorisations
+
+    def moved_on(self, coarse: State, fine: State, gap: np.ndarray) -> State:
+        """Return the extrapolated state."""
+        v = fine.v + self.weight * (fine.v - coarse.v)
+        return self.model.advance(fine, self.weight * gap, v, fine.t)
+
+    def _supply(self, state: State, coarse: Point, fine: Point) -> Supply:
+        if not self.feed.continuous:
+            return fine.supply
+        return self.feed.evaluate(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
+
+    def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
+        """Return the error that the step added to the finer run, over what is allowed."""
+        local = self.weight * np.abs(after.gap - before.gap) * self.yard
+        allowed = tolerance.absolute + tolerance.relative * float((moved * self.yard).max(initial=0.0))
+        return float(local.max(initial=0.0)) / allowed
+
+    def curve(self, before: _Point, after: _Point) -> Curve:
+        """Return the motion over a step."""
+        return _Curve(self, before, after)
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """The motions of both runs, extrapolated at every time."""
+
+    stepper: _Stepper
+    before: _Point
+    after: _Point
+
+    def at(self, t: float) -> State:
+        """Return the state at a time of the step."""
+        s, before, after = self.stepper, self.before, self.after
+        first = t <= after.middle.state.t
+        ends = (before.fine, after.middle) if first else (after.middle, after.fine)
+        coarse, fine = s.curves(before.coarse, after.coarse).at(t), s.curves(*ends).at(t)
+        return s.moved_on(coarse, fine, s.between(coarse, fine))
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How two neighbouring shapes differ, in the degrees of freedom; right to first order in the difference.
+
+    Attributes
+    ----------
+    model : Model
+    """
+
+    model: Model
+
+    def __call__(self, one: State, other: State) -> np.ndarray:
+        """Return the step from one state to the other, shape (n,)."""
+        if not self.model.large:
+            return other.q - one.q
+        motion = self.model.motion
+        turned = logarithm(other.R @ np.swapaxes(one.R, 1, 2))
+        sources = np.append(other.q - one.q, 0.0)[motion.sources]
+        driven = np.where(motion.rigid, motion.ratios * (other.driven - one.driven), sources)
+        raw = np.append(np.hstack([other.x - one.x, turned]).ravel(), driven)
+        if motion.plain:
+            return motion.collect(other, raw) / motion.collect(other, np.ones(motion.raw))
+        T = motion.jacobian(other)
+        return factorise(sp.csr_matrix(T.T @ T))(T.T @ raw)

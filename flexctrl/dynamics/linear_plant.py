@@ -1,0 +1,168 @@
+"""A linear model where a run expects a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.motion import State
+from flexctrl.structure.freedoms import check_finite
+
+__all__ = ["LinearPlant"]
+
+
+@dataclass(frozen=True)
+class _Machine:
+    """What a run asks of a structure."""
+
+    name: str
+    size: float = 1.0
+    drives: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Flat:
+    """What a run asks of a motion: coordinates are places."""
+
+    n: int
+
+    @property
+    def raw(self) -> int:
+        return self.n
+
+    def jacobian(self, state: State) -> sp.csr_matrix:
+        """Return the identity."""
+        return sp.identity(self.n, format="csr")
+
+    def dead_point(self, state: State) -> bool:
+        """There are no loops."""
+        return False
+
+    def closure_error(self, state: State) -> float:
+        """There are no loops."""
+        return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Signals:
+    """What a run asks of signals: they are linear."""
+
+    loads: sp.csr_matrix
+    places: sp.csr_matrix
+    rates: sp.csr_matrix
+
+    def loads_at(self, state: State) -> sp.csr_matrix:
+        """Return forces of unit inputs."""
+        return self.loads
+
+    def slopes(self, state: State, rates: np.ndarray, raw: int) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """Return the output's slopes on coordinates and on rates."""
+        return self.places, self.rates
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPlant:
+    """M q̈ + C q̇ + K q = B u as a machine to be run: a state's ``q`` are the coordinates, it has no nodes.
+
+    ``driven`` of a state holds the inputs in force, for outputs that feel them at once (D).
+
+    Attributes
+    ----------
+    linear : LinearModel
+    """
+
+    linear: LinearModel
+
+    large = False
+    notes: tuple[str, ...] = ()
+    effects: tuple[Any, ...] = ()
+
+    @property
+    def n(self) -> int:
+        return len(self.linear.coordinates)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return self.linear.coordinates
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.linear.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return self.linear.outputs
+
+    @property
+    def structure(self) -> _Machine:
+        return _Machine(self.linear.name)
+
+    @cached_property
+    def motion(self) -> _Flat:
+        return _Flat(self.n)
+
+    @cached_property
+    def signals(self) -> _Signals:
+        linear = self.linear
+        return _Signals(sp.csr_matrix(linear.B), sp.csr_matrix(linear.Cq), sp.csr_matrix(linear.Cv))
+
+    @property
+    def numbers(self) -> tuple[np.ndarray, ...]:
+        """All numbers of the model, to tell it from others."""
+        m = self.linear
+        return (*(np.asarray(A.toarray()) for A in (m.M, m.C, m.K)), m.B, m.Cq, m.Cv, m.D)
+
+    @cached_property
+    def rest(self) -> State:
+        still = np.zeros(self.n)
+        return State(np.zeros((1, 3)), np.eye(3)[None], still, still, np.zeros(len(self.inputs)))
+
+    def input_vector(self, inputs: Mapping[str, float]) -> np.ndarray:
+        """Return input values in order; what is not named is zero."""
+        u = np.zeros(len(self.inputs))
+        for name, value in inputs.items():
+            if name not in self.inputs:
+                raise StructureError(f"the linear model has no input {name!r}{did_you_mean(name, self.inputs)}")
+            u[self.inputs.index(name)] = check_finite(value, f"input {name!r}", "model")
+        return u
+
+    def loads(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return B u."""
+        return self.linear.B @ u
+
+    def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return −(M a + C v + K q)."""
+        linear = self.linear
+        return -(linear.M @ a + linear.C @ v + linear.K @ state.q)
+
+    def slope(
+        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float], u: np.ndarray
+    ) -> sp.csr_matrix:
+        """Return −(s₀ K + s₁ C + s₂ M)."""
+        linear = self.linear
+        return -(seeds[0] * linear.K + seeds[1] * linear.C + seeds[2] * linear.M).tocsr()
+
+    def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
+        """Return the state a step further."""
+        return State(state.x, state.R, state.q + step, v, state.driven, t)
+
+    def rates(self, state: State) -> np.ndarray:
+        """Return the rates."""
+        return state.v
+
+    def measure(self, state: State) -> np.ndarray:
+        """Return the outputs."""
+        linear = self.linear
+        return linear.Cq @ state.q + linear.Cv @ state.v + linear.D @ state.driven
+
+    def energy(self, state: State) -> tuple[float, float, float]:
+        """Return kinetic energy, stored energy and dissipated power."""
+        q, v, linear = state.q, state.v, self.linear
+        return 0.5 * float(v @ (linear.M @ v)), 0.5 * float(q @ (linear.K @ q)), float(v @ (linear.C @ v))

@@ -1,0 +1,92 @@
+"""Linear equations of motion in modal form, open and closed by a linear controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexctrl.design.controller import LinearController
+from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.linear_plant import LinearPlant
+from flexctrl.model.linear import LinearModel
+from flexctrl.model.modal import modal_system
+from flexctrl.model.model import Model
+from flexctrl.model.statespace import FirstOrder, first_order
+
+__all__ = ["ModalEquations", "closed", "opened"]
+
+
+@dataclass(frozen=True, eq=False)
+class ModalEquations:
+    """ẋ = A x + B w, (q, v) = C x + D w with w = (inputs, 1); commands u = gain x + direct w.
+
+    Open, the inputs are the commands. Closed by a linear controller, they are what is added to its commands, and its
+    states are the last of x.
+
+    Attributes
+    ----------
+    first : FirstOrder
+    gain : numpy.ndarray, shape (inputs, states)
+    direct : numpy.ndarray, shape (inputs, inputs + 1)
+    modes : int
+        States that are not the controller's.
+    """
+
+    first: FirstOrder
+    gain: np.ndarray
+    direct: np.ndarray
+    modes: int
+
+
+def opened(model: Model) -> ModalEquations:
+    """Return the modal form of a model that does not move far; the last input carries its constant loads."""
+    n, m, rest = model.n, len(model.inputs), model.rest
+    still, none = np.zeros(n), np.zeros(m)
+    seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    K, C, M = (-model.slope(rest, still, still, seed, none) for seed in seeds)
+    loads = [model.loads(rest, unit) for unit in np.eye(m)] + [model.balance(rest, still, still)]
+    linear = LinearModel(
+        M.tocsc(),
+        C.tocsc(),
+        K.tocsc(),
+        np.array(loads).T.reshape(n, m + 1),
+        np.vstack([np.eye(n), np.zeros((n, n))]),
+        np.vstack([np.zeros((n, n)), np.eye(n)]),
+        np.zeros((2 * n, m + 1)),
+        model.coordinates,
+        (*model.inputs, "constant_loads"),
+        tuple(f"{name}_{what}" for what in ("place", "rate") for name in model.coordinates),
+    )
+    first = first_order(replace(modal_system(linear), jump=np.zeros((2 * n, m + 1))))
+    return ModalEquations(first, np.zeros((m, len(first.A))), np.eye(m, m + 1), len(first.A))
+
+
+def closed(plant: ModalEquations, model: LinearPlant, feed: Feed) -> ModalEquations:
+    """Return the equations of a linear model with a linear continuous controller in them.
+
+    With y = S x + F u read and u = w + W (C z + D y) commanded, u = (I − W D F)⁻¹ (w + W D S x + W C z).
+    """
+    law, first, n, linear = feed.controller, plant.first, model.n, model.linear
+    assert isinstance(law, LinearController)
+    m, k, d = len(model.inputs), len(law.A), len(first.A)
+    W = np.zeros((m, len(law.outputs)))
+    W[[model.inputs.index(name) for name in law.outputs], range(len(law.outputs))] = 1.0
+    reads = [model.outputs.index(name) for name in law.inputs]
+    S = (linear.Cq @ first.C[:n] + linear.Cv @ first.C[n:])[reads]
+    F = (linear.Cq @ first.D[:n, :m] + linear.D)[reads]
+    solved = np.linalg.inv(np.eye(m) - W @ law.D @ F)
+    gain = solved @ np.hstack([W @ law.D @ S, W @ law.C])
+    seen = np.hstack([S, np.zeros((len(reads), k))]) + F @ gain
+    own = np.hstack([np.zeros((k, d)), law.A]) + law.B @ seen
+    A = np.vstack([np.hstack([first.A, np.zeros((d, k))]) + first.B[:, :m] @ gain, own])
+    B = np.vstack([first.B[:, :m] @ solved, law.B @ F @ solved])
+    C = np.hstack([first.C, np.zeros((2 * n, k))]) + first.D[:, :m] @ gain
+    states = (*first.states, *(f"controller{i + 1}" for i in range(k)))
+    whole = FirstOrder(A, _unloaded(B), C, _unloaded(first.D[:, :m] @ solved), states, (slice(0, d + k),))
+    return ModalEquations(whole, gain, _unloaded(solved), d)
+
+
+def _unloaded(matrix: np.ndarray) -> np.ndarray:
+    """A column of zeros more, for the constant loads that a linear model does not have."""
+    return np.hstack([matrix, np.zeros((len(matrix), 1))])
