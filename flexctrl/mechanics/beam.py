@@ -231,14 +231,16 @@ def deformations(m: BeamMotion) -> ca.SX:
         for r, mean, half in ((r_y, mean_y, half_y), (r_z, mean_z, half_z))
     )
     across_y, across_z = (1.0 - 2.0 * r_y) * mean_y, (1.0 - 2.0 * r_z) * mean_z
-    sheared_y, sheared_z = strain * (1.0 - r_y) * mean_y, strain * (1.0 - r_z) * mean_z
+    # what shears the middle of the element: turned sections that are stretched, or twisted while they bend
+    middle_y = strain * (1.0 - r_y) * mean_y - twist * half_z / 6.0
+    middle_z = strain * (1.0 - r_z) * mean_z + twist * half_y / 6.0
     return ca.vertcat(
         m.stretch + L * drawn,
         2.0 * twist - across_y * half_z + across_z * half_y,
-        y1 + sheared_y + 0.5 * twist * across_z,
-        y2 + sheared_y - 0.5 * twist * across_z,
-        z1 + sheared_z - 0.5 * twist * across_y,
-        z2 + sheared_z + 0.5 * twist * across_y,
+        y1 + middle_y + 0.5 * twist * across_z,
+        y2 + middle_y - 0.5 * twist * across_z,
+        z1 + middle_z - 0.5 * twist * across_y,
+        z2 + middle_z + 0.5 * twist * across_y,
     )
 
 

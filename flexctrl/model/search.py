@@ -12,7 +12,7 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import State
 from flexctrl.model.pivots import holds
-from flexctrl.model.solve import factorise
+from flexctrl.model.solve import Plan, factorise, plan
 
 _TARGET, _SETTLED = 1e-12, 1e-9
 _REACH = 1.0
@@ -66,6 +66,7 @@ class Newton:
     def __init__(self, balance: Balance, tolerance: float, reach: float = _REACH) -> None:
         self.balance, self.tolerance, self.reach = balance, tolerance, reach
         self.mixed = balance.model.forces.mixed if balance.model.large else None
+        self._plan: Plan | None = None
 
     def run(self, start: State, most: int, shift: float = 0.0, watch: bool = False) -> Found:
         """Search from a start; a positive ``shift`` (1/s²) adds masses to K and fades as the forces do."""
@@ -119,7 +120,10 @@ class Newton:
         matrix = balance.among_free(K)
         if shift:
             matrix = matrix + sp.diags(shift * balance.inertia[balance.free])
-        step[balance.free] = factorise(matrix)(force)
+        matrix = matrix.tocsr()
+        if self._plan is None or not self._plan.fits(matrix):
+            self._plan = plan(matrix)
+        step[balance.free] = factorise(matrix, self._plan)(force)
         return step
 
     def _after(self, here: _Iterate, step: np.ndarray, share: float, scale: float) -> _Iterate:
