@@ -12,11 +12,12 @@ import pytest
 
 import flexctrl
 from flexctrl.design.controller import Controller
+from flexctrl.dynamics.record import Record
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.mechanics.kernel import Backend
 from flexctrl.model.reduction.selection import Selection
 
-PROTOCOLS = (Backend, Controller, Integrator, Selection)
+PROTOCOLS = (Backend, Controller, Integrator, Record, Selection)
 PUBLIC = {name: getattr(flexctrl, name) for name in flexctrl.__all__}
 SECTIONS = ("Parameters", "Attributes", "Returns", "Raises", "Yields", "Notes", "Examples", "See Also", "References")
 

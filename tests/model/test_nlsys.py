@@ -187,7 +187,7 @@ def test_sampled_controller_stops_at_its_samples():
     x = np.array([0.5, 0.0, 0.4, 0.0, 0.0, 0.0])
     found = sampled_response(model.to_nlsys(), law, until=1.5, initial_state=x, points=2, method=DOP853, rtol=1e-8)
     start = model.advance(model.rest, x[:3], np.zeros(3), 0.0)
-    run = fc.simulate(model, law, until=1.5, start=start, tolerance=FINE, every=0.025)
+    run = fc.simulate(model, law, until=1.5, start=start, tolerance=fc.Tolerance(1e-7, 1e-10), every=0.025)
     np.testing.assert_allclose(found.time, run.t, atol=1e-12)
     np.testing.assert_allclose(found.outputs.T, run.y, atol=1e-4)
     np.testing.assert_allclose(found.inputs[0, :-1], run["push"][:-1], atol=2e-2)
