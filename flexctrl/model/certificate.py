@@ -171,7 +171,7 @@ def rigid_modes(linear: LinearModel, motion: Motion, state: State) -> tuple[str,
     shapes = modes.shapes[:, modes.unstable : modes.unstable + modes.rigid]
     left = shapes
     words = []
-    for name, vector in _whole_body(linear, motion, state):
+    for name, vector in whole_body(linear.coordinates, motion, state):
         momentum = linear.M @ vector
         size = float(np.sqrt(max(vector @ momentum, 0.0)))
         share = shapes.T @ momentum / (size or 1.0)
@@ -192,9 +192,9 @@ def _without(shapes: np.ndarray, share: np.ndarray) -> np.ndarray:
     return shapes @ q[:, 1 : share.size]
 
 
-def _whole_body(linear: LinearModel, motion: Motion, state: State) -> list[tuple[str, np.ndarray]]:
-    """Displacements of the free coordinates in which the whole machine moves as one."""
-    places = [motion.names.index(name) for name in linear.coordinates]
+def whole_body(coordinates: tuple[str, ...], motion: Motion, state: State) -> list[tuple[str, np.ndarray]]:
+    """Return displacements of some coordinates in which the whole machine moves as one, with their names."""
+    places = [motion.names.index(name) for name in coordinates]
     T = motion.jacobian(state)[:, places]
     x = state.x[:-1]
     center = x.mean(axis=0)

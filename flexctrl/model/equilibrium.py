@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.balance import Balance
+from flexctrl.model.certificate import whole_body
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.pivots import holds, negative_pivots
@@ -158,8 +159,26 @@ def _gave_way(balance: Balance, found: Found, share: float) -> str:
 
 
 def _complaint(balance: Balance, found: Found) -> str:
+    loose, worst = _pushed_freely(balance, found.state), balance.worst(found.state)
+    free = "If the machine is free to move there, hold that coordinate"
+    if loose:
+        free = f"It is free in {' and '.join(loose)}, and pushed there: hold a coordinate"
     return (
-        f"no equilibrium found: relative residual {found.residual:.3g}, worst at {balance.worst(found.state)}. If the "
-        "machine is free to move there, hold that coordinate or balance its load; else try a start nearer to the shape "
-        "expected, or apply the load in parts"
+        f"no equilibrium found: relative residual {found.residual:.3g}, worst at {worst}. {free} or balance its load; "
+        "else try a start nearer to the shape expected, or apply the load in parts"
     )
+
+
+def _pushed_freely(balance: Balance, state: State) -> list[str]:
+    """The motions of the whole machine that nothing resists but a load drives."""
+    model, force, scale = balance.model, balance.force(state), balance.scale(state)
+    K = balance.among_free(balance.slope(state))
+    stiff = float(np.abs(K.data).max()) if K.nnz else 1.0
+    names = tuple(model.coordinates[i] for i in balance.free)
+    pushed = []
+    for name, motion in whole_body(names, model.motion, state):
+        size = float(np.abs(motion / balance.unit[balance.free]).max())
+        resisted = np.abs(K @ motion).max(initial=0.0) > 1e-6 * stiff * size
+        if not resisted and abs(float(force @ motion)) > 1e-6 * scale * size * balance.size:
+            pushed.append(name)
+    return pushed

@@ -1,0 +1,42 @@
+"""D5 (statics): half a turn, whole turns, ten turns: no singular rotation, and an angle that does not wrap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+
+def rolled(turns: float, elements: int) -> fc.Rest:
+    section = fc.Section(EA=1e8, EI_y=1.0, EI_z=1.0, GJ=1.0, rhoA=1.0, rhoJ=1e-3)
+    beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), section, elements=elements)
+    planar = [fc.Support(node, held="w rx ry") for node in beam.nodes[1:]]
+    outputs = [*[fc.Position(axis, beam.end, axis) for axis in "xyz"], fc.Rotation("turn", beam.end, "z")]
+    structure = fc.Structure(
+        [beam], [fc.Support(beam.start), *planar], inputs=[fc.Torque("moment", beam.end, "z")], outputs=outputs
+    )
+    model = fc.assemble(structure, [fc.Flexible(), fc.LargeRotation()])
+    return fc.equilibrium(model, inputs={"moment": 2.0 * np.pi * turns})
+
+
+@pytest.mark.parametrize("turns", [0.5, 1, 1.5, 2, 3, -1])
+def test_exact_multiples_of_half_a_turn(turns):
+    rest = rolled(turns, 16)
+    assert rest.outputs["turn"] == pytest.approx(2.0 * np.pi * turns, rel=1e-9)
+    if turns == int(turns):
+        assert np.hypot(rest.outputs["x"], rest.outputs["y"]) < 1e-9
+
+
+def test_ten_turns():
+    rest = rolled(10, 40)
+    assert rest.outputs["turn"] == pytest.approx(20.0 * np.pi, rel=1e-9)
+    assert np.hypot(rest.outputs["x"], rest.outputs["y"]) < 1e-9
+    assert all(np.isfinite(rest.state.x).ravel())
+
+
+def test_an_element_bent_by_half_a_turn_is_refused_not_invented():
+    """Two elements a turn: each would be bent by 180° against its chord's middle; no NaN leaves."""
+    rest = rolled(1, 2)
+    assert np.isfinite(list(rest.outputs.values())).all()
+    assert rest.outputs["turn"] == pytest.approx(2.0 * np.pi, rel=1e-6)
