@@ -129,6 +129,10 @@ class Balance:
         """Return the largest unbalanced force over the forces at work."""
         return self.relative(self.force(state), self.scale(state))
 
+    def beyond_noise(self, state: State, residual: float) -> float:
+        """Return a relative residual, 0 where it is lost in the round-off of the positions."""
+        return residual if residual > self.noise(state) else 0.0
+
     def worst(self, state: State) -> str:
         """Return the coordinate that is pushed most."""
         force = np.abs(self.force(state) / self.lever[self.free])

@@ -15,6 +15,7 @@ from flexctrl.model.motion import Motion, State
 
 _ASYMMETRY = 1e-6
 _SLOPE = 1.9
+_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Certificate:
     Attributes
     ----------
     residual : float
-        Largest unbalanced force at the equilibrium over the forces at work.
+        Largest unbalanced force at the equilibrium over the forces at work; 0 where it is lost in round-off.
     asymmetry : float
         max |K − Kᵀ| / max |K|, before K was made symmetric where no load explains it.
     definiteness : float
@@ -38,6 +39,9 @@ class Certificate:
         Condition numbers (1-norm) after scaling by the diagonal; infinite where singular.
     loads : tuple of str
         Loads at work without a potential; they may make K unsymmetric, and what they add is kept.
+    gyroscopic : float
+        max |C − Cᵀ| / 2 max |C|: 0 for dampers, 1 for Coriolis forces alone (`RotatingFrame`). Undamped modes do
+        not know of it, damped poles do.
     """
 
     residual: float
@@ -48,14 +52,17 @@ class Certificate:
     condition_mass: float
     condition_stiffness: float
     loads: tuple[str, ...] = ()
+    gyroscopic: float = 0.0
 
     def __str__(self) -> str:
         rigid = "; ".join(self.rigid_modes) or "none"
         why = f" (by {', '.join(self.loads)})" if self.loads else ""
+        turning = f", skew share of C {self.gyroscopic:.1e}" if self.gyroscopic else ""
         return (
             f"equilibrium residual {self.residual:.1e}, asymmetry of K {self.asymmetry:.1e}{why}, "
             f"smallest pivot of M {self.definiteness:.1e}, Taylor slope {self.taylor_slope:.2f}, "
-            f"condition of M {self.condition_mass:.1e}, of K {self.condition_stiffness:.1e}; rigid-body modes: {rigid}"
+            f"condition of M {self.condition_mass:.1e}, of K {self.condition_stiffness:.1e}{turning}; "
+            f"rigid-body modes: {rigid}"
         )
 
 
@@ -129,7 +136,14 @@ def certify(
         _condition(linear.M),
         _condition(linear.K),
         loads,
+        _skew_share(linear.C),
     )
+
+
+def _skew_share(C: sp.csc_matrix) -> float:
+    largest = float(abs(C).max()) if C.nnz else 0.0
+    share = float(abs(C - C.T).max()) / (2.0 * largest) if largest else 0.0
+    return share if share > _ROUND_OFF else 0.0
 
 
 def _scaled(A: sp.spmatrix) -> sp.csc_matrix:

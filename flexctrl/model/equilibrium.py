@@ -31,7 +31,8 @@ class Rest:
     state : State
         The equilibrium; at rest.
     residual : float
-        Largest unbalanced force relative to the forces at work (moments: over the size of the machine).
+        Largest unbalanced force relative to the forces at work (moments: over the size of the machine); 0 where
+        it is lost in the round-off of the positions.
     outputs : dict of str to float
         The model's outputs there.
     inputs : numpy.ndarray, shape (inputs,)
@@ -127,11 +128,14 @@ def rest_of(balance: Balance, found: Found) -> Rest:
     outputs = dict(zip(model.outputs, model.measure(found.state).tolist(), strict=True))
     held = tuple(model.coordinates[i] for i in balance.held)
     unstable = negative_pivots(balance.among_free(balance.slope(found.state)))
-    return Rest(found.state, found.residual, outputs, balance.u, found.iterations, model, held, unstable)
+    residual = balance.beyond_noise(found.state, found.residual)
+    return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held, unstable)
 
 
 def _found(balance: Balance, start: State, tolerance: float) -> Found:
     """The search: straight on from a shape that stands by itself, else by masses."""
+    if not np.isfinite(balance.force(start)).all():
+        raise EquilibriumError("no equilibrium found: the start's own forces are not finite; start from another shape")
     if holds(balance.among_free(balance.slope(start))):
         straight = Newton(balance, tolerance).run(start, 60, watch=True)
         if straight.done and straight.steady:

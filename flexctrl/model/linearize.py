@@ -131,7 +131,7 @@ def _check_balance(balance: Balance, state: State) -> float:
             f"linearize: not an equilibrium: {name} is pushed by {force[worst]:.4g} (forces at work: {scale:.3g}); "
             "linearise about equilibrium(model), or name the inputs that balance it"
         )
-    return residual
+    return balance.beyond_noise(state, residual)
 
 
 def _symmetric(A: sp.spmatrix) -> sp.csc_matrix:

@@ -30,6 +30,9 @@ DEFAULT_COUNT = 20
 class Modes:
     """Modes of K φ = ω² M φ, in ascending order of ω²: unstable, rigid-body, flexible.
 
+    C takes no part in them: where it is gyroscopic (`RotatingFrame`), the damped poles of the model oscillate at
+    other frequencies, and may be stable though a mode here is not.
+
     Attributes
     ----------
     omega_squared : numpy.ndarray, shape (k,)

@@ -157,3 +157,16 @@ def test_small_motion_of_a_spinning_blade_has_the_same_poles():
     )
     assert abs(small.C).max() > 1.0
     np.testing.assert_allclose(small.damped_poles().imag, large.damped_poles().imag, rtol=1e-9, atol=1e-9)
+
+
+def test_certificate_tells_coriolis_forces_from_dampers():
+    blade = fc.Beam("blade", (0.2, 0, 0), (1.2, 0, 0), E, elements=2)
+    structure = fc.Structure([blade], [fc.Support(blade.start)])
+    damping, spin = fc.RayleighDamping(0.5, 1e-3), fc.RotatingFrame((0, 0, 8.0))
+    shares = []
+    for effects in ([], [damping], [spin], [spin, damping]):
+        certificate = fc.linearize(fc.assemble(structure, [*MOVING, *effects], fc.CasadiVM())).certificate
+        shares.append(certificate.gyroscopic)
+        assert ("skew" in str(certificate)) == (spin in effects)
+    assert shares[:3] == [0.0, 0.0, pytest.approx(1.0)]
+    assert 0.0 < shares[3] < 1.0
