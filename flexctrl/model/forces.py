@@ -86,65 +86,66 @@ class Forces:
 
         ``loads`` are raw forces of the inputs; ``excess`` stresses are borne beside those of the state.
         """
-        blocks = self._blocks(state, v, a, seeds)
+        z = self.slots(state, v, a)
+        blocks = self._blocks(z, seeds)
         if excess is not None:
             blocks += excess.blocks
         if self.motion.plain:
             places, indices, indptr = self._table
             data = np.bincount(places, weights=blocks, minlength=len(indices) + 1)[:-1]
             return sp.csr_matrix((data, indices, indptr), shape=(self.motion.n, self.motion.n), copy=False)
-        small = self.motion.n <= DENSE_UP_TO
-        slope = self._dense(state, blocks) if small else self._projected(state, blocks, *self.pattern)
+        slope = self._led(state, v, a, seeds, z, blocks)
         if seeds[0] != 0.0:
             acting = self.raw(state, v, a) + (0.0 if loads is None else loads)
             acting = acting if excess is None else acting + excess.raw
             slope = slope + seeds[0] * self.motion.stiffening(state, acting)
-        slope = sp.csr_matrix(slope)
-        return slope + self._drifting(state, v, a, seeds) if v.any() or a.any() else slope
+        return sp.csr_matrix(slope)
 
-    def _drifting(self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]) -> sp.csr_matrix:
-        """What levers that turn in motion add to the slope: rates and accelerations change with the place."""
-        speed, pull, coriolis = self.motion.drift(state, v, a)
-        on_rates, on_pull = (self._raw_slope(state, v, a, seed) for seed in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-        raw = on_rates @ (seeds[0] * speed) + on_pull @ (seeds[0] * pull + seeds[1] * coriolis)
-        small = self.motion.n <= DENSE_UP_TO
-        T = self.motion.dense_jacobian(state) if small else self.motion.jacobian(state)
-        return sp.csr_matrix(T.T @ raw)
+    def _led(
+        self,
+        state: State,
+        v: np.ndarray,
+        a: np.ndarray,
+        seeds: tuple[float, float, float],
+        z: np.ndarray,
+        blocks: np.ndarray,
+    ) -> sp.csr_matrix | np.ndarray:
+        """Return the slope through the levers of followers; in motion rates and accelerations turn with these."""
+        motion = self.motion
+        T = motion.dense_jacobian(state) if motion.n <= DENSE_UP_TO else motion.jacobian(state)
+        raw = self._raw_matrix(blocks) @ T
+        if v.any() or a.any():
+            speed, pull, coriolis = motion.drift(state, v, a)
+            on_rates, on_pull = (self._raw_matrix(self._blocks(z, s)) for s in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+            raw = raw + on_rates @ (seeds[0] * speed) + on_pull @ (seeds[0] * pull + seeds[1] * coriolis)
+        return T.T @ raw
 
-    def _raw_slope(
-        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]
-    ) -> sp.csr_matrix:
-        rows, columns = self.pattern
-        blocks, size = self._blocks(state, v, a, seeds), self.motion.raw
-        return sp.csr_matrix((blocks, (rows, columns)), shape=(size, size))
+    def _raw_matrix(self, blocks: np.ndarray) -> sp.csr_matrix:
+        """Return the tangent blocks added up over the raw freedoms."""
+        places, indices, indptr = self._raw_table
+        data = np.bincount(places, weights=blocks, minlength=len(indices))
+        return sp.csr_matrix((data, indices, indptr), shape=(self.motion.raw, self.motion.raw), copy=False)
 
     @cached_property
     def mixed(self) -> Mixed:
         """The stresses of the pieces that strain."""
         return Mixed(self)
 
-    def _dense(self, state: State, blocks: np.ndarray) -> np.ndarray:
-        size, (rows, columns) = self.motion.raw, self.pattern
-        T = self.motion.dense_jacobian(state)
-        raw = np.bincount(rows * size + columns, weights=blocks, minlength=size * size).reshape(size, size)
-        return T.T @ raw @ T
-
     def slope_by_part(
         self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]
     ) -> dict[str, sp.csr_matrix]:
         """Return each part's own share of `slope`, levers of followers left out."""
-        blocks, (rows, columns) = self._blocks(state, v, a, seeds), self.pattern
+        blocks, (rows, columns) = self._blocks(self.slots(state, v, a), seeds), self.pattern
         owners = np.concatenate([np.repeat(f.parts, f.scatter(0).shape[1] ** 2) for f in self.families])
         return {
             str(name): self._projected(state, blocks[owners == name], rows[owners == name], columns[owners == name])
             for name in dict.fromkeys(owners.tolist())
         }
 
-    def _blocks(self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]) -> np.ndarray:
-        z = np.append(self.slots(state, v, a), seeds)
-        blocks = np.zeros(self.pattern[0].size)
+    def _blocks(self, z: np.ndarray, seeds: tuple[float, float, float]) -> np.ndarray:
+        seeded, blocks = np.append(z, seeds), np.zeros(self.pattern[0].size)
         for batch in self._tangent:
-            batch(z, blocks)
+            batch(seeded, blocks)
         return blocks
 
     def _projected(self, state: State, blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> sp.csr_matrix:
@@ -208,13 +209,22 @@ class Forces:
         return np.concatenate(rows), np.concatenate(columns)
 
     @cached_property
+    def _raw_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where each entry of the tangent blocks goes in the matrix over the raw freedoms (CSR)."""
+        return _table_of(*self.pattern, self.motion.raw)
+
+    @cached_property
     def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where each entry of the tangent blocks goes in the assembled matrix (CSR): the join table at work."""
-        n = self.motion.n
         rows, columns = (self.motion.cells[cells] for cells in self.pattern)
-        kept = (rows < n) & (columns < n)
-        keys, inverse = np.unique(rows[kept] * n + columns[kept], return_inverse=True)
-        places = np.full(len(rows), len(keys))
-        places[kept] = inverse
-        indptr = np.concatenate([[0], np.cumsum(np.bincount(keys // n, minlength=n))])
-        return places, (keys % n).astype(np.int32), indptr.astype(np.int32)
+        return _table_of(rows, columns, self.motion.n)
+
+
+def _table_of(rows: np.ndarray, columns: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the place of each entry among the stored ones (one past the last: left out), their columns and rows."""
+    kept = (rows < size) & (columns < size)
+    keys, inverse = np.unique(rows[kept] * size + columns[kept], return_inverse=True)
+    places = np.full(len(rows), len(keys))
+    places[kept] = inverse
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(keys // size, minlength=size))])
+    return places, (keys % size).astype(np.int32), indptr.astype(np.int32)

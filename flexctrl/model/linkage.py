@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 
 Terms = tuple[list["ca.SX"], "ca.SX"]
 """Arguments of a function and what it gives."""
+_LOST = 1e-6
+"""Reciprocal condition of a loop that may move on in several ways."""
+
+_PAST = 2e-6
+"""How far past such a position a step goes [rad or m]."""
+
 _CLOSING = 4
 """Newton corrections that close loops after a step; the contraction is the turn within the step."""
 
@@ -189,10 +195,10 @@ class Linkage:
 
     @cached_property
     def grip(self) -> Callable[..., np.ndarray]:
-        """Pose → the matrix whose inverse gives the dependent freedoms, column by column; singular at a dead point."""
+        """Pose → how fast loops open with the independent freedoms, then with the dependent ones, by columns."""
         import casadi as ca
 
-        return _callable("grip", [self._pose], ca.vec(ca.densify(self._loop_slopes(self._pose)[1])))
+        return _callable("grip", [self._pose], ca.vec(ca.densify(ca.horzcat(*self._loop_slopes(self._pose)))))
 
     @cached_property
     def gaps(self) -> Callable[..., np.ndarray]:
@@ -208,12 +214,28 @@ class Linkage:
         return ca.vertcat(*[ca.vertcat(x[:, i] + d[:3, i], ca.vec(r.T)) for i, r in enumerate(turned)])
 
     def placed(self, pose: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Return the pose after a step of any size, with loops closed as far as round-off lets them be."""
+        """Return the pose after a step of any size, with loops closed as far as round-off lets them be.
+
+        A step that ends in the very position where a loop branches goes a little further, or nothing would say
+        which way the loop moves on.
+        """
+        new, length = self._closed(pose, step), np.abs(step).max(initial=0.0)
+        if self.loops and length > 0.0 and reciprocal_condition(self.slopes_at(new)[1]) < _LOST:
+            return self._closed(pose, step * (1.0 + _PAST / length))
+        return new
+
+    def _closed(self, pose: np.ndarray, step: np.ndarray) -> np.ndarray:
         new, gap = self.place(pose, step), np.inf
         floor = 1e-14 * max(1.0, np.abs(self.rest).max(initial=0.0))
         while self.loops and floor < (now := np.abs(self.gaps(new)).max()) < 0.5 * gap:
             new, gap = self.place(new, np.zeros(self.free)), now
         return new
+
+    def slopes_at(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return how fast loops open with the independent and with the dependent freedoms, the latter scaled to 1."""
+        slopes = self.grip(pose).reshape(-1, len(self.loops)).T
+        within = slopes[:, self.free :]
+        return slopes[:, : self.free], within / np.abs(within).max(axis=0)
 
     def matrix_at(self, pose: np.ndarray) -> np.ndarray:
         """Return T at a pose."""
@@ -337,14 +359,17 @@ class Linkage:
         return ca.vertcat(*[mv[k] if k == f.freedom else v[k] for k in range(3)]), w
 
     def _closed_place(self) -> ca.SX:
-        """Return the new pose; the dependent steps are found by Newton's method with the slopes before the step."""
+        """Return the new pose; the dependent steps are found by Newton's method with the slopes after a first guess.
+
+        Not with those before the step: where a loop may branch, these would throw the parts about.
+        """
         import casadi as ca
 
         old, step = self._pose, self._rate
         if not self.loops:
             return self._open_place(old, step)
-        _, within = self._loop_slopes(old)
         dependent = self._all(old, step)[self.free :]
+        _, within = self._loop_slopes(ca.reshape(self._open_place(old, ca.vertcat(step, dependent)), 12, self.count))
         for _ in range(_CLOSING):
             dependent = dependent - ca.solve(within, self._gaps(self._open_place(old, ca.vertcat(step, dependent))))
         return self._open_place(old, ca.vertcat(step, dependent))
@@ -498,6 +523,14 @@ def _callable(name: str, arguments: list[ca.SX], result: ca.SX) -> Callable[...,
         return output.copy()
 
     return call
+
+
+def reciprocal_condition(A: np.ndarray) -> float:
+    """Return LAPACK's estimate of 1/cond(A) in the 1-norm; 0 for a singular or undefined matrix."""
+    from scipy.linalg.lapack import dgecon, dgetrf
+
+    lu, _, info = dgetrf(A)
+    return float(dgecon(lu, np.abs(A).sum(axis=0).max())[0]) if info == 0 else 0.0
 
 
 def renumbered(follow: Follow, local: dict[int, int], own: dict[int, int]) -> Follow:

@@ -16,13 +16,14 @@ import scipy.sparse as sp
 
 from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.mechanics.rotation import orthonormal, turn_kernel
-from flexctrl.model.linkage import Linkage
+from flexctrl.model.linkage import Linkage, reciprocal_condition
 from flexctrl.structure.drives import Drive, RotaryDrive
 
 DENSE_UP_TO = 60
 """Degrees of freedom up to which matrices are worked as plain arrays."""
 
 _DEAD = 200.0
+_BRANCHES = 1e-9
 
 
 @dataclass(frozen=True)
@@ -300,12 +301,18 @@ class Motion:
         return tuple(spread)
 
     def dead_point(self, state: State) -> bool:
-        """Tell whether a loop of rigid parts is near a position from which its coordinates cannot move it."""
+        """Tell whether a loop of rigid parts is near a position from which its coordinates cannot move it.
+
+        Near it small steps of the coordinates move other parts far. Where a loop may branch but moves on evenly
+        (a parallelogram all in line) it is dead only in the very position.
+        """
         if not self.linkage.loops:
             return False
-        size = len(self.linkage.loops)
-        grip = self.linkage.grip(self._pose(state.x, state.R)).reshape(size, size)
-        return bool(np.linalg.cond(grip / np.abs(grip).max(axis=0)) > _DEAD)
+        onto, within = self.linkage.slopes_at(self._pose(state.x, state.R))
+        if reciprocal_condition(within) < _BRANCHES:
+            return True
+        moved, reach = np.abs(np.linalg.solve(within, onto)).max(axis=0), np.abs(onto).max(axis=0)
+        return bool((moved > _DEAD * reach).any())
 
     def closure_error(self, state: State) -> float:
         """Return how far the conditions that close rigid loops are violated [m or rad]."""

@@ -124,7 +124,9 @@ def plot_nichols(
     turns = -180.0 + 360.0 * np.arange(np.ceil((low + 180.0) / 360.0), np.floor((high + 180.0) / 360.0) + 1.0)
     ax.plot(turns, 0.0 * turns, "+", color=INK, markersize=10, markeredgewidth=1.6)
     tidy(ax).set(xlabel="phase of L (°)", ylabel="|L| (dB)", xlim=(low, high), ylim=gain)
-    ax.xaxis.set_major_locator(MultipleLocator(90.0 if high - low <= 540.0 else 180.0 if high - low <= 1260.0 else 360.0))
+    ax.xaxis.set_major_locator(
+        MultipleLocator(90.0 if high - low <= 540.0 else 180.0 if high - low <= 1260.0 else 360.0)
+    )
     if len(loops) > 1:
         ax.legend(frameon=False)
     return ax
