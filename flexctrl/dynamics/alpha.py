@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
@@ -18,6 +19,7 @@ from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError
 from flexctrl.errors import SingularMatrixError, StructureError
+from flexctrl.model.flows import flow_rates, flowing, without_flows
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.solve import Plan, Solve, factorise, plan
@@ -112,8 +114,11 @@ class Stepper:
         SingularMatrixError
             If a freedom has neither mass nor stiffness.
         """
-        zero = np.zeros(self.model.n)
+        zero, flows = np.zeros(self.model.n), self.model.motion.flows
+        state = flowing(self.model, state, supply.u)
         force = self.model.balance(state, state.v, zero) + self.model.loads(state, supply.u)
+        if flows.size:
+            force[flows] = flow_rates(self.model, state, supply.u, step)
         rate = self._mass(state, supply, step)(force)
         return AlphaPoint(state, rate, supply, rate, zero)
 
@@ -123,12 +128,13 @@ class Stepper:
         Without the lead every jump would cost an error of first order in the step.
         """
         fresh = self.start(point.state, supply, step)
-        return replace(fresh, algorithmic=fresh.rate + point.algorithmic - point.rate)
+        lead = self.model.switches.still(point.state, point.algorithmic - point.rate)
+        return replace(fresh, algorithmic=fresh.rate + lead)
 
     def _mass(self, state: State, supply: Supply, step: float) -> Solve:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
         c, zero = self.coefficients, np.zeros(self.model.n)
-        M = -self.model.slope(state, state.v, zero, (0.0, 0.0, 1.0), supply.u)
+        M = self._massive(-self.model.slope(state, state.v, zero, (0.0, 0.0, 1.0), supply.u))
         smallest = M.diagonal().min(initial=np.inf)
         if smallest > 1e-14 * M.diagonal().max(initial=0.0):
             try:
@@ -136,7 +142,10 @@ class Stepper:
             except SingularMatrixError:
                 pass
         seeds = (c.beta * step**2, c.gamma * step, 1.0)
-        return factorise(-self.model.slope(state, state.v, zero, seeds, supply.u))
+        return factorise(self._massive(-self.model.slope(state, state.v, zero, seeds, supply.u)))
+
+    def _massive(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+        return without_flows(self.model, matrix) if self.model.motion.flows.size else matrix
 
     def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later.

@@ -62,7 +62,7 @@ class Books:
         self.feed, self.model, self.order = feed, feed.model, order
         self.first = state.q
         probe = np.linspace(1.0, 2.0, self.model.n)
-        self.dissipates = self.model.energy(state.with_(v=probe))[2] != 0.0
+        self.dissipates = bool(self.model.switches.names) or self.model.energy(state.with_(v=probe))[2] != 0.0
         kinetic, stored, power = self.model.energy(state)
         self.sums = Sums(kinetic + stored, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n))
 
@@ -78,6 +78,11 @@ class Books:
         sums.entered += 1
         if sums.entered < _OFTEN or sums.entered % _OFTEN == 0:
             self.close(after)
+
+    def jump(self, point: Point) -> None:
+        """Note that rates have jumped with the inputs: what is dissipated jumps with them."""
+        if self.dissipates and self.model.motion.flows.size:
+            self.sums.power = self.model.energy(point.state)[2]
 
     def enter_block(self, before: Point, block: Block) -> None:
         """Enter many steps."""

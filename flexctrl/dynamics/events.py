@@ -108,7 +108,8 @@ class Watch:
     feed : Feed
     events : tuple of Event
     switches : callable
-        State → values whose signs tell which law of force is in force; a run stops and starts anew where one changes.
+        (state, inputs) → how far each switching law of force is from its end, positive while it lasts; a run stops
+        and starts anew where one falls to zero.
     names : tuple of str
         Of the switches.
     sides : numpy.ndarray
@@ -117,7 +118,7 @@ class Watch:
 
     feed: Feed
     events: tuple[Event, ...]
-    switches: Callable[[State], np.ndarray]
+    switches: Callable[[State, np.ndarray], np.ndarray]
     names: tuple[str, ...]
     sides: np.ndarray = field(default_factory=lambda: np.zeros(0))
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -149,12 +150,17 @@ class Watch:
         if self.events:
             signals = self.signals(state, u)
             found = [(signals[e.of] if isinstance(e.of, str) else float(e.of(signals))) - e.at for e in self.events]
-        return np.append(found, self.switches(state)) if self.names else np.array(found)
+        return np.append(found, self.switches(state, u)) if self.names else np.array(found)
 
     def begin(self, point: Point) -> None:
         """Note the side that each gauge is on at the start."""
         values = self.values(point.state, point.supply.u)
         self.sides, self.sizes = np.sign(values), np.abs(values)
+        self.switched()
+
+    def switched(self) -> None:
+        """Note that every switching law of force holds."""
+        self.sides[len(self.events) :] = 1.0
 
     def crossings(self, curve: Curve, before: Point, after: Point) -> list[Crossing]:
         """Return where gauges cross zero over a step, in order; sides stay as they are."""

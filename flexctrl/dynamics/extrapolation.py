@@ -119,10 +119,15 @@ class _Stepper:
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs; the runs stay apart."""
-        coarse = self.coarse.renew(point.coarse, replace(supply, x=point.coarse.supply.x), step)
-        fine = self.fine.renew(point.fine, replace(supply, x=point.fine.supply.x), 0.5 * step)
+        coarse, fine = (self._switched(run, point.state) for run in (point.coarse, point.fine))
+        coarse = self.coarse.renew(coarse, replace(supply, x=coarse.supply.x), step)
+        fine = self.fine.renew(fine, replace(supply, x=fine.supply.x), 0.5 * step)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
         return replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
+
+    def _switched(self, run: Any, state: State) -> Any:
+        """A run whose dry contacts stick or slide as those of a state do."""
+        return replace(run, state=self.model.switches.like(run.state, state))
 
     def step(self, point: _Point, h: float) -> _Point:
         """Return the point a step later."""

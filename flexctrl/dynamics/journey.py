@@ -167,7 +167,9 @@ class Journey:
         if np.array_equal(fresh.u, before.u):
             self.point = replace(self.point, supply=fresh)
         else:
-            self.point = self.stepper.renew(self.point, fresh, self.mark.size)
+            held = replace(self.point, state=self.plan.model.switches.under(state, fresh.u))
+            self.point = self.stepper.renew(held, fresh, self.mark.size)
+            self.books.jump(self.point)
         if not self.watch.idle:
             self.watch.settle(self.point)
         self.rows.here(self.point, 1e-6 * self.mark.size)
@@ -258,7 +260,7 @@ class Journey:
         before = self.point
         if not self.watch.idle:
             after = self._watched(before, after)
-            if after.state is before.state:
+            if after.state.t == before.state.t:
                 self.point = after
                 return
         curve = self.track.curve(before, after)
@@ -273,6 +275,9 @@ class Journey:
         watch, curve = self.watch, self.track.curve(before, after)
         crossings = watch.crossings(curve, before, after)
         landing = next((c for c in crossings if watch.stops(c.gauge)), None)
+        if landing is not None and landing.gauge >= len(watch.events) and self.mark.stuck >= _CHATTER:
+            name = watch.names[landing.gauge - len(watch.events)]
+            raise StepError(self.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
         if landing is None or self.mark.stuck >= _CHATTER:
             self._note(crossings, curve, before)
             watch.settle(after)
@@ -288,7 +293,14 @@ class Journey:
             return after
         short = landing.t - before.state.t < 1e-6 * self.mark.size
         self.mark.stuck = self.mark.stuck + 1 if short else 0
-        return self.stepper.renew(after, self.plan.feed.restart(after.state, after.supply), self.mark.size)
+        return self._switched(after, landing.gauge - len(watch.events))
+
+    def _switched(self, at: Point, switch: int) -> Point:
+        """Start anew under the law of force that holds from now on."""
+        supply = self.plan.feed.restart(at.state, at.supply)
+        state = self.plan.model.switches.after(at.state, supply.u, switch)
+        self.watch.switched()
+        return self.stepper.renew(replace(at, state=state), supply, self.mark.size)
 
     def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:
         for c in crossings:

@@ -37,6 +37,21 @@ class _Flat:
     def raw(self) -> int:
         return self.n
 
+    @property
+    def inner(self) -> np.ndarray:
+        """There are no inner freedoms."""
+        return np.zeros(0, dtype=int)
+
+    @property
+    def flows(self) -> np.ndarray:
+        """There are no inner freedoms."""
+        return self.inner
+
+    @property
+    def scales(self) -> dict[str, float]:
+        """There are no inner freedoms."""
+        return {}
+
     def jacobian(self, state: State) -> sp.csr_matrix:
         """Return the identity."""
         return sp.identity(self.n, format="csr")
@@ -67,6 +82,37 @@ class _Signals:
         return self.places, self.rates
 
 
+@dataclass(frozen=True)
+class _Smooth:
+    """What a run asks of laws that switch: there are none."""
+
+    names: tuple[str, ...] = ()
+
+    def sticks(self, state: State) -> bool:
+        """Nothing sticks."""
+        return False
+
+    def still(self, state: State, motion: np.ndarray) -> np.ndarray:
+        """Return the motion: nothing holds it."""
+        return motion
+
+    def gaps(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros(0)
+
+    def begin(self, state: State, u: np.ndarray) -> State:
+        """Return the state."""
+        return state
+
+    def under(self, state: State, u: np.ndarray) -> State:
+        """Return the state."""
+        return state
+
+    def like(self, state: State, other: State) -> State:
+        """Return the state."""
+        return state
+
+
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
     """M q̈ + C q̇ + K q = B u as a machine to be run: a state's ``q`` are the coordinates, it has no nodes.
@@ -83,6 +129,7 @@ class LinearPlant:
     large = False
     notes: tuple[str, ...] = ()
     effects: tuple[Any, ...] = ()
+    switches = _Smooth()
 
     @property
     def n(self) -> int:

@@ -74,6 +74,10 @@ class ConservingMidpoint:
         return Fixed(self.step)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
+        if model.motion.inner.size:
+            raise StructureError(
+                "ConservingMidpoint: has no rule for dry friction and motor lag; use AdaptiveAlpha, or leave them out"
+            )
         return _Stepper(model, feed)
 
 

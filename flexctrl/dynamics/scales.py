@@ -13,15 +13,18 @@ _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
 
 def turning(model: Model) -> np.ndarray:
     """Return which degrees of freedom are rotations, shape (n,)."""
-    return np.array([not name.endswith(_SHIFTS) for name in model.coordinates], dtype=bool)
+    other = (*_SHIFTS, *model.motion.scales)
+    return np.array([not name.endswith(other) for name in model.coordinates], dtype=bool)
 
 
 def yardsticks(model: Model) -> np.ndarray:
     """Return what an error of 1 is in each degree of freedom, shape (n,): a radian, or the size of the machine.
 
-    A source angle counts as the motion it drives, or a motor's many turns would excuse any error of the machine.
+    A source angle counts as the motion it drives, or a motor's many turns would excuse any error of the machine;
+    inner freedoms of effects have scales of their own.
     """
     size = model.structure.size
     gears = {f"{d.name}_source": abs(d.effective_ratio) * (1.0, size)[d.column == 0] for d in model.structure.drives}
+    known = gears | model.motion.scales
     pairs = zip(model.coordinates, turning(model), strict=True)
-    return np.array([gears.get(name, 1.0 if turns else size) for name, turns in pairs])
+    return np.array([known.get(name, 1.0 if turns else size) for name, turns in pairs])

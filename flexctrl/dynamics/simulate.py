@@ -155,7 +155,8 @@ def _run(
 
 
 def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:
-    return Watch(plan.feed, events, lambda state: np.zeros(0), ())
+    switches = plan.model.switches
+    return Watch(plan.feed, events, switches.gaps, switches.names)
 
 
 def _begun(
@@ -170,8 +171,10 @@ def _begun(
     model, pace = plan.model, plan.method.pace
     state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
     size = pace.step if isinstance(pace, Fixed) else min(pace.first, pace.largest)
+    supply = plan.feed.first(state)
+    state = model.switches.begin(state, supply.u)
     try:
-        point = stepper.start(state, plan.feed.first(state), size)
+        point = stepper.start(state, supply, size)
     except SingularMatrixError as error:
         name = model.coordinates[error.where]
         raise MechanismError(
@@ -181,7 +184,7 @@ def _begun(
     stops, watch = Stops(plan.feed.sample_time, plan.feed.breaks), _watch(plan, events)
     stops.skip(0.0)
     watch.begin(point)
-    books = Books(plan.feed, state, plan.method.order)
+    books = Books(plan.feed, point.state, plan.method.order)
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
     rows.here(point, 0.0)
     return journey

@@ -2,16 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, no_force
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
+from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:
     import casadi as ca
+
+
+@dataclass(frozen=True)
+class Inner:
+    """A freedom of an effect that no node has: a bristle's bend, a motor's torque.
+
+    Attributes
+    ----------
+    name : str
+        Of its coordinate; empty for one that has only a phase (it sticks or slides).
+    scale : float
+        What an error of 1 is in it; infinite where the motion that it brings about is judged instead.
+    frozen : bool
+        Whether it stays as it is in equilibria and linear models.
+    """
+
+    name: str
+    scale: float = math.inf
+    frozen: bool = False
 
 
 class Effect:
@@ -19,7 +41,14 @@ class Effect:
 
     A subclass overrides only what it acts on. Each method returns casadi expressions of the motion
     it is given: forces with the sign in which they act, energies whose gradient they are minus of.
+
+    Attributes
+    ----------
+    apart : bool
+        Whether it acts through pieces of its own and leaves the kernels of parts and drives as they are.
     """
+
+    apart: ClassVar[bool] = False
 
     def beam(self, m: BeamMotion) -> BeamForce:
         """Force on a beam element."""
@@ -60,6 +89,19 @@ class Effect:
     def drive_energy(self, m: DriveMotion) -> ca.SX:
         """Energy stored in a drive."""
         return _nothing()
+
+    def check_on(self, structure: Structure) -> None:
+        """Raise StructureError if the effect names what the structure does not have."""
+        return
+
+    def inner(self, structure: Structure) -> tuple[Inner, ...]:
+        """Freedoms of its own that no node has."""
+        return ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a model under the effect leaves out, and where."""
+        return ()
 
     def bends(self, part: Part | Drive) -> bool:
         """Whether the effect gives a part freedom to deform."""

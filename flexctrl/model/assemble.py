@@ -16,6 +16,7 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.mechanics.kernel import Backend, best_backend
 from flexctrl.model.equilibrium import equilibrium
+from flexctrl.model.frictions import inner_freedoms
 from flexctrl.model.linearize import linearize
 from flexctrl.model.mobility import motion_of
 from flexctrl.model.model import Model, Small
@@ -54,6 +55,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     for effect in parts:
         effect.check_beside(parts)
         _check_names(structure, effect)
+        effect.check_on(structure)
     if any(isinstance(e, GeometricStiffness) for e in parts):
         return _prestressed(structure, parts, backend)
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
@@ -64,11 +66,11 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     if unmeasured:
         structure = structure.with_(outputs=[o for o in structure.outputs if o.name not in unmeasured])
     runs = backend or best_backend()
-    motion = motion_of(structure, structure.bodies + groups, elastic, runs)
+    motion = motion_of(structure, structure.bodies + groups, elastic, runs, inner_freedoms(structure, parts))
     left_out = tuple(
         f"output {name} is left out: a rope that does not stretch measures no tension" for name in unmeasured
     )
-    motion = replace(motion, notes=motion.notes + left_out)
+    motion = replace(motion, notes=motion.notes + left_out + tuple(note for e in parts for note in e.notes))
     empty = sp.csr_matrix((motion.n, motion.n))
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]
@@ -108,7 +110,9 @@ def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:
     ratios = np.full(len(omega), damping.ratios) if isinstance(damping.ratios, float) else np.array(damping.ratios)
     count = min(len(ratios), len(omega))
     momenta = linear.M @ shapes[:, :count]
-    return sp.csr_matrix((momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T)
+    places = [model.coordinate(name) for name in linear.coordinates]
+    spread = sp.csr_matrix((np.ones(len(places)), (places, range(len(places)))), shape=(model.n, len(places)))
+    return sp.csr_matrix(spread @ (momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T @ spread.T)
 
 
 def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, ...]:

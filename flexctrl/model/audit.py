@@ -32,7 +32,7 @@ def audit(model: Model, at: Rest | State | None = None) -> Audit:
         Names of the freedoms by label; ``mechanisms`` lists what moves in each motion that has neither mass
         nor stiffness. Never raises for one; `linearize` and `simulate` do.
     """
-    state = model.rest if at is None else at.state if isinstance(at, Rest) else at
+    state = (model.rest if at is None else at.state if isinstance(at, Rest) else at).loose
     still, n = np.zeros(model.n), model.n
     u = at.inputs if isinstance(at, Rest) else np.zeros(len(model.inputs))
     seeds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))

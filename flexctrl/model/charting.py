@@ -113,7 +113,7 @@ def _renumbered(motion: Motion, names: tuple[str, ...], place: np.ndarray) -> Mo
     """The motion with more freedoms, also in its linkage."""
     old, linkage = motion.n, motion.linkage
     wide = np.where(place < 0, len(names), place)
-    sources = np.where(motion.sources == old, len(names), motion.sources)
+    sources, inner = (np.where(k == old, len(names), k) for k in (motion.sources, motion.inner))
     rows = wide[motion.nodes]
     added = sorted({int(k) for k in rows[:, 3:].ravel() if old <= k < len(names)})
     order = {number: linkage.free + i for i, number in enumerate(added)}
@@ -127,6 +127,7 @@ def _renumbered(motion: Motion, names: tuple[str, ...], place: np.ndarray) -> Mo
         names=names,
         place=wide,
         sources=sources,
+        inner=inner,
         linkage=replace(
             linkage,
             cells=cells,

@@ -117,8 +117,10 @@ def equilibrium(
     if not isinstance(model, Model):
         raise StructureError(f"equilibrium: {model!r} is no Model; give what flexctrl.assemble returns")
     held = {model.coordinate(name): float(value) for name, value in (hold or {}).items()}
+    begin = (start or model.rest).loose
+    held |= {i: float(begin.q[i]) for i in model.motion.frozen}
     balance = Balance(model, model.input_vector(inputs or {}), held)
-    begin = (start or model.rest).with_(v=balance.still, t=0.0)
+    begin = begin.with_(v=balance.still, t=0.0)
     return rest_of(balance, _found(balance, begin, tolerance))
 
 

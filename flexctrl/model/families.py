@@ -28,7 +28,8 @@ class Family:
         The part each piece belongs to.
     nodes : numpy.ndarray of int, shape (pieces, nodes a piece)
         Node numbers; the ground is one past the last.
-    drives : numpy.ndarray of int, shape (pieces, 0 or 1)
+    drives : numpy.ndarray of int, shape (pieces, drives a piece)
+        Numbers of drives; inner freedoms count on after the last drive.
     parameters : numpy.ndarray, shape (pieces, n_par)
     """
 
@@ -45,20 +46,23 @@ class Family:
 
     def gather(self, drive_base: int) -> np.ndarray:
         """Places in z that each piece reads; drives' slots start at ``drive_base``."""
-        slots = (NODE_SLOT * self.nodes[:, :, None] + np.arange(NODE_SLOT)).reshape(self.count, -1)
-        drives = (drive_base + DRIVE_SLOT * self.drives[:, :, None] + np.arange(DRIVE_SLOT)).reshape(self.count, -1)
-        return np.hstack([slots, drives])
+        slots = NODE_SLOT * self.nodes[:, :, None] + np.arange(NODE_SLOT)
+        drives = drive_base + DRIVE_SLOT * self.drives[:, :, None] + np.arange(DRIVE_SLOT)
+        return np.hstack([_rows(slots), _rows(drives)])
 
     def scatter(self, source_base: int) -> np.ndarray:
         """Places in the raw vector that each piece pushes; source angles start at ``source_base``."""
         freedoms = np.arange(self.kernels.kind.freedoms)
-        cells = (6 * self.nodes[:, :, None] + freedoms).reshape(self.count, -1)
-        return np.hstack([cells, source_base + self.drives])
+        return np.hstack([_rows(6 * self.nodes[:, :, None] + freedoms), source_base + self.drives])
+
+
+def _rows(table: np.ndarray) -> np.ndarray:
+    return table.reshape(len(table), table.shape[1] * table.shape[2])
 
 
 def families_of(structure: Structure, effects: tuple[Effect, ...], rigid: frozenset[str]) -> tuple[Family, ...]:
     """Return the families of a structure under some effects; a rigid beam is one piece, a rigid rope none."""
-    parts, effects = structure.elements, tuple(e.everywhere() for e in effects)
+    parts, effects = structure.elements, tuple(e.everywhere() for e in effects if not e.apart)
     beams = [p for p in parts if isinstance(p, Beam)]
     bent = [b for b in beams if b.name not in rigid]
     stiff = tuple(e for e in effects if not isinstance(e, BeamFlexibility))
@@ -88,7 +92,7 @@ def _family(
     return Family(
         kernels_of(kind, effects),
         tuple(parts),
-        np.array(nodes, dtype=int).reshape(-1, kind.nodes),
+        np.array(nodes, dtype=int).reshape(len(parts), kind.nodes),
         np.array(drives, dtype=int).reshape(len(parts), kind.drives),
         np.array(parameters, dtype=float).reshape(-1, kind.parameters),
     )

@@ -23,8 +23,10 @@ _ALIGNED = 64
 
 
 def can_be_flat(model: Model) -> bool:
-    """Tell whether `flatten` covers a model: large motion, no loops of rigid parts, no modal damping."""
-    return model.large and not model.motion.linkage.loops and model.viscous.nnz == 0 and model.n > 0
+    """Tell whether `flatten` covers a model: large motion; no rigid loops, modal damping or inner freedoms."""
+    motion = model.motion
+    left_out = len(motion.linkage.loops) + model.viscous.nnz + motion.inner.size
+    return model.large and model.n > 0 and not left_out
 
 
 @dataclass(frozen=True, eq=False)

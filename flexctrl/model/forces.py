@@ -38,7 +38,7 @@ class Forces:
     @property
     def slot_count(self) -> int:
         """Length of the vector that the kernels read, seeds left out."""
-        return self.drive_base + DRIVE_SLOT * len(self.motion.drives)
+        return self.drive_base + DRIVE_SLOT * (len(self.motion.drives) + self.motion.inner.size)
 
     def slots(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the flat vector the kernels read."""
@@ -53,12 +53,18 @@ class Forces:
         slots[:, 12:18] = rates[: motion.source_base].reshape(nodes, 6)
         slots[:, 18:24] = accelerations[: motion.source_base].reshape(nodes, 6)
         if motion.drives:
-            drives = z[self.drive_base :].reshape(-1, DRIVE_SLOT)
+            drives = z[self.drive_base :].reshape(-1, DRIVE_SLOT)[: len(motion.drives)]
             own = np.append(state.q, 0.0)[motion.sources]
             drives[:, 0] = np.where(motion.rigid, motion.ratios * state.driven, own)
-            drives[:, 1] = rates[motion.source_base :]
-            drives[:, 2] = accelerations[motion.source_base :]
+            drives[:, 1] = rates[motion.source_base : motion.inner_base]
+            drives[:, 2] = accelerations[motion.source_base : motion.inner_base]
             drives[:, 3] = motion.turns(state.driven)
+        if motion.inner.size:
+            inner = z[-DRIVE_SLOT * motion.inner.size :].reshape(-1, DRIVE_SLOT)
+            inner[:, 0] = np.append(state.q, 0.0)[motion.inner]
+            inner[:, 1] = rates[motion.inner_base :]
+            inner[:, 2] = accelerations[motion.inner_base :]
+            inner[:, 3] = state.dry.phase
         return z
 
     def raw(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:

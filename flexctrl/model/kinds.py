@@ -2,7 +2,8 @@
 
 Kernels read node slots of a flat vector z and add forces to a raw vector. A node's slot holds
 x (3), R (9, row by row), velocity (6) and acceleration (6); a drive's slot θ_d, its two rates, and the
-whole turns of its joint. The tangents read three seeds more.
+whole turns of its joint; an inner freedom's slot its value, its two rates, and its phase. The tangents read
+three seeds more.
 """
 
 from __future__ import annotations
@@ -27,16 +28,20 @@ DRIVE_SLOT = 4
 
 @dataclass(frozen=True)
 class Shares:
-    """What acts on a piece: forces of inertia, all other forces, kinetic and stored energy."""
+    """What acts on a piece: forces of inertia, all other forces, kinetic and stored energy.
+
+    ``lost`` is the power it takes from the machine, for pieces where that is not what forces lose at standstill.
+    """
 
     inertia: ca.SX
     force: ca.SX
     kinetic: ca.SX
     stored: ca.SX
+    lost: ca.SX | None = None
 
 
 Physics = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX"], Shares]
-"""(effects, node motions, drive slot, parameters) → what acts on the piece."""
+"""(effects, node motions, slots of drives and inner freedoms, parameters) → what acts on the piece."""
 
 Slope = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX"], "ca.SX"]
 """(effects, node motions, parameters, seeds) → ∂force/∂(raw motion)."""
@@ -54,7 +59,7 @@ class Kind:
     freedoms : int
         Raw freedoms a node that the piece pushes (3 or 6).
     drives : int
-        Source angles a piece (0 or 1).
+        Source angles and inner freedoms a piece.
     parameters : int
     physics : callable
     slope : callable, optional
@@ -96,7 +101,7 @@ class Kernels:
         symbols, parameters, shares = self._rest
         velocities = self._velocities(symbols)
         still = ca.substitute(shares.force, velocities, ca.SX.zeros(velocities.numel()))
-        power = ca.dot(still - shares.force, self._raw_rates(symbols))
+        power = ca.dot(still - shares.force, self._raw_rates(symbols)) if shares.lost is None else shares.lost
         return _kernel(
             f"{self.kind.name}_energy", symbols, parameters, ca.vertcat(shares.kinetic, shares.stored, power)
         )
@@ -140,23 +145,27 @@ class Kernels:
         nodes = moved(self.kind, symbols, increment, seeds)
         slot = symbols[NODE_SLOT * self.kind.nodes :]
         if self.kind.drives:
-            slot = slot + ca.vertcat(seeds, 0) * increment[-1]
+            slot = slot + ca.kron(increment[self.kind.nodes * self.kind.freedoms :], ca.vertcat(seeds, 0))
         return self.kind.physics(self.effects, nodes, slot, parameters)
 
     def _velocities(self, symbols: ca.SX) -> ca.SX:
-        """All velocity symbols, the source's rate included: zeroed to find what dissipates."""
+        """All velocity symbols, rates of sources and inner freedoms included: zeroed to find what dissipates."""
         import casadi as ca
 
         count = self.kind.nodes
         found = [symbols[NODE_SLOT * i + 12 : NODE_SLOT * i + 18] for i in range(count)]
-        return ca.vertcat(*found, *([symbols[NODE_SLOT * count + 1]] if self.kind.drives else []))
+        return ca.vertcat(*found, *self._slot_rates(symbols))
 
     def _raw_rates(self, symbols: ca.SX) -> ca.SX:
         import casadi as ca
 
         count = self.kind.nodes
         found = [symbols[NODE_SLOT * i + 12 : NODE_SLOT * i + 12 + self.kind.freedoms] for i in range(count)]
-        return ca.vertcat(*found, *([symbols[NODE_SLOT * count + 1]] if self.kind.drives else []))
+        return ca.vertcat(*found, *self._slot_rates(symbols))
+
+    def _slot_rates(self, symbols: ca.SX) -> list[ca.SX]:
+        first = NODE_SLOT * self.kind.nodes + 1
+        return [symbols[first + DRIVE_SLOT * k] for k in range(self.kind.drives)]
 
 
 def symbols_of(kind: Kind) -> tuple[ca.SX, ca.SX]:

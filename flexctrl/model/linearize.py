@@ -55,7 +55,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
             "that no effect lets bend"
         )
     rest = equilibrium(model, inputs=inputs) if at is None else at
-    state = rest.state if isinstance(rest, Rest) else rest
+    state = (rest.state if isinstance(rest, Rest) else rest).loose
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
     free = _free(model, rest)
     held = set(range(model.n)) - set(free.tolist())
@@ -116,6 +116,7 @@ def _push(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarray]:
 
 def _free(model: Model, rest: Rest | State) -> np.ndarray:
     held = set(rest.held) if isinstance(rest, Rest) else set()
+    held |= {model.coordinates[i] for i in model.motion.frozen}
     return np.array([i for i, name in enumerate(model.coordinates) if name not in held], dtype=int)
 
 

@@ -8,11 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import qr
 
+from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.kernel import Backend
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.linkage import Link, Linkage, Loop, renumbered
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.motion import Dry, Motion, State
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis
@@ -21,7 +22,13 @@ from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import tie
 
 
-def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str, ...], backend: Backend) -> Motion:
+def motion_of(
+    structure: Structure,
+    rigid: tuple[Group, ...],
+    elastic: tuple[str, ...],
+    backend: Backend,
+    inner: tuple[Inner, ...] = (),
+) -> Motion:
     """Work out how the nodes of a structure move.
 
     Parameters
@@ -32,6 +39,8 @@ def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str
     elastic : tuple of str
         Drives with an elastic shaft, whose source angle is a degree of freedom.
     backend : Backend
+    inner : tuple of Inner
+        Freedoms of effects that no node has.
 
     Returns
     -------
@@ -43,10 +52,10 @@ def motion_of(structure: Structure, rigid: tuple[Group, ...], elastic: tuple[str
         If rigid parts are asked of a machine that is tied by a table of numbers.
     """
     ties = _ties(structure, rigid)
-    open_loop = _motion(structure, ties, elastic, backend, _Loops((), (), ()))
-    return (
-        _motion(structure, ties, elastic, backend, _loops(structure, open_loop, ties)) if ties.closures else open_loop
-    )
+    open_loop = _motion(structure, ties, elastic, inner, backend, _Loops((), (), ()))
+    if not ties.closures:
+        return open_loop
+    return _motion(structure, ties, elastic, inner, backend, _loops(structure, open_loop, ties))
 
 
 def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
@@ -70,8 +79,16 @@ class _Loops:
     notes: tuple[str, ...]
 
 
-def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], backend: Backend, loops: _Loops) -> Motion:
-    names = [*_names(structure, ties), *(f"{name}_source" for name in elastic)]
+def _motion(
+    structure: Structure,
+    ties: Ties,
+    elastic: tuple[str, ...],
+    inner: tuple[Inner, ...],
+    backend: Backend,
+    loops: _Loops,
+) -> Motion:
+    own = [*_names(structure, ties), *(f"{name}_source" for name in elastic)]
+    names = [*own, *(i.name for i in inner if i.name)]
     kept = [i for i in range(len(names)) if i not in loops.dependent]
     number = np.full(len(names) + 1, len(kept))
     number[kept] = np.arange(len(kept))
@@ -82,6 +99,7 @@ def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], backend:
     zero = np.zeros(len(kept))
     after = {name: ties.free + i for i, name in enumerate(elastic)}
     sources = number[np.array([after.get(d.name, len(names)) for d in structure.drives], dtype=int)]
+    last = iter(range(len(own), len(names)))
     linkage, nodes, linked = _linkage(structure, ties, elastic, x, open_place, loops)
     return Motion(
         names=tuple(names[i] for i in kept),
@@ -92,8 +110,10 @@ def _motion(structure: Structure, ties: Ties, elastic: tuple[str, ...], backend:
         linkage=linkage,
         nodes=nodes,
         linked=number[linked],
-        rest=State(x, R, zero, zero, np.zeros(len(structure.drives))),
+        rest=State(x, R, zero, zero, np.zeros(len(structure.drives)), dry=Dry.loose(len(inner))),
         notes=loops.notes,
+        inner=number[np.array([next(last) if i.name else len(names) for i in inner], dtype=int)],
+        effects=inner,
     )
 
 
@@ -101,7 +121,7 @@ def _linkage(
     s: Structure, ties: Ties, elastic: tuple[str, ...], x: np.ndarray, place: np.ndarray, loops: _Loops
 ) -> tuple[Linkage, np.ndarray, np.ndarray]:
     """Return the linkage of a structure, the numbers of its nodes and of its independent freedoms."""
-    none = ties.free + len(elastic)
+    none = int(place.max(initial=0))
     sides = [(s.number(d.node), len(s.nodes) if d.against is None else s.number(d.against)) for d in s.drives]
     used = {n for f in ties.follows for n in (f.node, f.master)} | {n for n, _ in ties.lines}
     used |= {n for pair in sides for n in pair}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,9 +19,11 @@ from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.assembly import assembled, mass_blocks, stiffness_blocks
 from flexctrl.model.families import families_of
 from flexctrl.model.forces import Forces
+from flexctrl.model.frictions import friction_families, lag_blocks
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import Motion, State
 from flexctrl.model.signals import Signals, signals_of
+from flexctrl.model.switches import Switches
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import check_finite
@@ -114,7 +117,13 @@ class Model:
     def forces(self) -> Forces:
         """All kernels of the model, bound to their tables."""
         rigid = frozenset(p.name for p in self.structure.elements if not self.bends(p))
-        return Forces(self.motion, families_of(self.structure, self.effects, rigid), self.backend)
+        families = families_of(self.structure, self.effects, rigid) + friction_families(self.structure, self.effects)
+        return Forces(self.motion, families, self.backend)
+
+    @cached_property
+    def switches(self) -> Switches:
+        """Laws of force that switch while the machine runs."""
+        return Switches(self)
 
     def bends(self, part: Part | Drive) -> bool:
         """Tell whether some effect lets a part deform.
@@ -146,7 +155,8 @@ class Model:
 
     @cached_property
     def _stiffness(self) -> sp.csc_matrix:
-        return assembled(self.motion, stiffness_blocks(self.structure, self.motion, self.bends))
+        parts = stiffness_blocks(self.structure, self.motion, self.bends)
+        return assembled(self.motion, chain(parts, lag_blocks(self.structure, self.effects, self.motion)))
 
     @cached_property
     def _small(self) -> Small:
@@ -196,7 +206,8 @@ class Model:
         numpy.ndarray, shape (n,)
         """
         place = state if self.large else self.rest
-        return self.motion.collect(place, self.signals.loads_at(place) @ u)
+        force = self.motion.collect(place, self.signals.loads_at(place) @ u)
+        return self.switches.freed(state, force) if self.switches.sticks(state) else force
 
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the sum of all forces on the degrees of freedom except the inputs; zero when they obey.
@@ -213,7 +224,8 @@ class Model:
         """
         if self.large:
             force = self.forces.balance(state, v, a)
-            return force - self.viscous @ v if self.viscous.nnz else force
+            force = force - self.viscous @ v if self.viscous.nnz else force
+            return self.switches.held(state, v, a, force) if self.switches.sticks(state) else force
         small = self._small
         return small.load - small.K @ state.q - small.C @ v - small.M @ a
 
@@ -248,7 +260,8 @@ class Model:
             if seeds[0] and self.signals.follows:
                 T = self.motion.jacobian(state)
                 slope = (slope + seeds[0] * (T.T @ self.signals.turning(state, u) @ T)).tocsr()
-            return slope - seeds[1] * self.viscous if self.viscous.nnz else slope
+            slope = slope - seeds[1] * self.viscous if self.viscous.nnz else slope
+            return self.switches.held_slope(state, slope, seeds) if self.switches.sticks(state) else slope
         small = self._small
         return -(seeds[0] * small.K + seeds[1] * small.C + seeds[2] * small.M).tocsr()
 
@@ -274,7 +287,7 @@ class Model:
         q = state.q + step
         raw = (self.motion.jacobian(self.rest) @ q)[: self.motion.source_base].reshape(-1, 6)
         x, R = self.rest.x + raw[:, :3], exponential(raw[:, 3:]) @ self.rest.R
-        return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t)
+        return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t, state.dry)
 
     def rates(self, state: State) -> np.ndarray:
         """Return the raw rates of a state: velocities and spins of all nodes, then the speeds of the motors.

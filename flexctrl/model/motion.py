@@ -3,17 +3,18 @@
 The rates of the degrees of freedom are quasi-velocities: spatial angular velocities for rotations.
 A raw vector holds six entries a node (displacement and spin in space axes), the last node being the
 ground, then the drives' source angles. `Motion` carries own freedoms out to raw ones, master to
-follower, and forces back again.
+follower, and forces back again. Inner freedoms of effects (a bristle, a motor's torque) come after them all.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.effects.effect import Inner
 from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.linkage import Linkage, reciprocal_condition
@@ -24,6 +25,27 @@ DENSE_UP_TO = 60
 
 _DEAD = 200.0
 _BRANCHES = 1e-9
+
+
+@dataclass(frozen=True)
+class Dry:
+    """What the dry contacts of a machine do.
+
+    Attributes
+    ----------
+    phase : numpy.ndarray, shape (inner,)
+        Sliding (±1), sticking (2), or taken to be without friction (0).
+    anchor : numpy.ndarray, shape (inner,)
+        Where each that sticks is held: its angle or travel.
+    """
+
+    phase: np.ndarray
+    anchor: np.ndarray
+
+    @classmethod
+    def loose(cls, count: int) -> Dry:
+        """Return contacts without friction."""
+        return cls(np.zeros(count), np.zeros(count))
 
 
 @dataclass(frozen=True)
@@ -44,6 +66,8 @@ class State:
         Driven coordinate of each drive, turns included [rad or m].
     t : float
         Time [s].
+    dry : Dry
+        What dry contacts do.
     """
 
     x: np.ndarray
@@ -52,20 +76,32 @@ class State:
     v: np.ndarray
     driven: np.ndarray
     t: float = 0.0
+    dry: Dry = field(default_factory=lambda: Dry.loose(0))
 
-    def with_(self, *, v: np.ndarray | None = None, t: float | None = None) -> State:
-        """Return a copy at another time or with other rates.
+    def with_(self, *, v: np.ndarray | None = None, t: float | None = None, dry: Dry | None = None) -> State:
+        """Return a copy at another time, with other rates or other contacts.
 
         Parameters
         ----------
         v : numpy.ndarray, optional
         t : float, optional
+        dry : Dry, optional
 
         Returns
         -------
         State
         """
-        return replace(self, v=self.v if v is None else np.asarray(v, float), t=self.t if t is None else t)
+        return replace(
+            self,
+            v=self.v if v is None else np.asarray(v, float),
+            t=self.t if t is None else t,
+            dry=self.dry if dry is None else dry,
+        )
+
+    @property
+    def loose(self) -> State:
+        """The same with all dry contacts shaken loose."""
+        return self.with_(dry=Dry.loose(self.dry.phase.size)) if self.dry.phase.any() else self
 
 
 @dataclass(frozen=True)
@@ -75,7 +111,7 @@ class Motion:
     Attributes
     ----------
     names : tuple of str
-        Names of the degrees of freedom, drives' source angles last.
+        Names of the degrees of freedom: of the nodes, drives' source angles, inner ones.
     place : numpy.ndarray, shape (nodes + 1, 6)
         Number of each cell's degree of freedom; ``n`` stands for none (held, or computed by a follower).
     sources : numpy.ndarray, shape (drives,)
@@ -92,6 +128,10 @@ class Motion:
     rest : State
     notes : tuple of str
         How loops of rigid parts are closed.
+    inner : numpy.ndarray of int
+        Number of each inner freedom's degree of freedom; ``n`` for those that have only a phase.
+    effects : tuple of Inner
+        What the inner freedoms are.
     """
 
     names: tuple[str, ...]
@@ -104,6 +144,8 @@ class Motion:
     linked: np.ndarray
     rest: State
     notes: tuple[str, ...]
+    inner: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    effects: tuple[Inner, ...] = ()
 
     @property
     def n(self) -> int:
@@ -116,9 +158,29 @@ class Motion:
         return self.place.size
 
     @property
+    def inner_base(self) -> int:
+        """Place of the first inner freedom in a raw vector, after the source angles."""
+        return self.place.size + self.sources.size
+
+    @property
     def raw(self) -> int:
         """Length of a raw vector."""
-        return self.place.size + self.sources.size
+        return self.inner_base + self.inner.size
+
+    @property
+    def scales(self) -> dict[str, float]:
+        """What an error of 1 is in each inner degree of freedom."""
+        return {i.name: i.scale for i in self.effects if i.name}
+
+    @cached_property
+    def flows(self) -> np.ndarray:
+        """Inner degrees of freedom: first-order states."""
+        return self.inner[self.inner < self.n]
+
+    @property
+    def frozen(self) -> tuple[int, ...]:
+        """Inner degrees of freedom that stay as they are in equilibria and linear models."""
+        return tuple(self.names.index(i.name) for i in self.effects if i.frozen)
 
     @cached_property
     def rigid(self) -> np.ndarray:
@@ -138,7 +200,7 @@ class Motion:
     @cached_property
     def cells(self) -> np.ndarray:
         """Number of each raw freedom's degree of freedom, ``n`` for none, shape (raw,)."""
-        return np.append(self.place.ravel(), self.sources)
+        return np.concatenate([self.place.ravel(), self.sources, self.inner])
 
     @cached_property
     def linked_cells(self) -> np.ndarray:
@@ -177,7 +239,7 @@ class Motion:
             pose = self.linkage.placed(self._pose(state.x, state.R), step[self.linked])
             x[self.nodes] = pose.reshape(-1, 12)[:, :3]
             R[self.nodes] = orthonormal(pose.reshape(-1, 4, 3)[:, 1:])
-        return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t)
+        return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t, state.dry)
 
     def _turned(self, R: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Return rotations turned by rotation vectors in space axes."""

@@ -10,8 +10,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.effects.effect import Effect
+from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import line_motion
+from flexctrl.model.frictions import lag_compliance
 from flexctrl.model.kinds import rope_pull, spring_pull
 from flexctrl.model.motion import Motion, State
 from flexctrl.structure.elements import Rope, Spring
@@ -117,16 +119,17 @@ def signals_of(structure: Structure, effects: tuple[Effect, ...], motion: Motion
     entries = [
         (cell, i, value)
         for i, signal in enumerate(structure.inputs)
-        for cell, value in _load(structure, motion, signal)
+        for cell, value in _load(structure, effects, motion, signal)
     ]
     loads = _matrix(entries, motion.raw, len(structure.inputs))
     follows = tuple(f for i, signal in enumerate(structure.inputs) for f in _follow(structure, i, signal))
     return Signals(loads, follows, tuple(_measure(structure, effects, motion, o) for o in structure.outputs))
 
 
-def _load(s: Structure, motion: Motion, signal: Input) -> list[tuple[int, float]]:
+def _load(s: Structure, effects: tuple[Effect, ...], motion: Motion, signal: Input) -> list[tuple[int, float]]:
     if isinstance(signal, MotorTorque):
-        return [(motion.source_base + _drive(s, signal.drive), 1.0)]
+        drive = _drive(s, signal.drive)
+        return [(motion.source_base + drive, 1.0), *_lagging(s, effects, motion, drive)]
     if isinstance(signal, FollowerForce | FollowerTorque):
         return []
     offset = 0 if isinstance(signal, Force) else 3
@@ -138,6 +141,17 @@ def _follow(s: Structure, number: int, signal: Input) -> list[Following]:
         return []
     offset, direction = 0 if isinstance(signal, FollowerForce) else 3, np.array(signal.direction)
     return [Following(number, s.number(n), 6 * s.number(n) + offset, direction) for n in signal.at]
+
+
+def _lagging(s: Structure, effects: tuple[Effect, ...], motion: Motion, drive: int) -> list[tuple[int, float]]:
+    """The load on the inner freedom of a motor whose torque builds up."""
+    inner, name = motion.inner_base, s.drives[drive].name
+    for effect in effects:
+        lagged = [n for n, _ in effect.time_constants] if isinstance(effect, MotorLag) else []
+        if name in lagged:
+            return [(inner + lagged.index(name), lag_compliance(s.drives[drive]))]
+        inner += len(effect.inner(s))
+    return []
 
 
 def _drive(s: Structure, name: str) -> int:

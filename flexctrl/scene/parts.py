@@ -8,7 +8,6 @@ from typing import Any
 
 from flexctrl.cranes import bridge_crane, ceiling_crane, flexible_arm
 from flexctrl.errors import did_you_mean
-from flexctrl.scene.nodes import node_of
 from flexctrl.scene.reading import (
     Kind,
     Place,
@@ -30,6 +29,7 @@ from flexctrl.scene.reading import (
 from flexctrl.structure.drives import LinearDrive, RotaryDrive
 from flexctrl.structure.elements import Beam, Node, Part, PointMass, RigidBody, Rope, Spring
 from flexctrl.structure.joints import Hinge, Pin, Slide, Support, Weld
+from flexctrl.structure.naming import node_of
 from flexctrl.structure.sections import STEEL, Material, Section
 from flexctrl.structure.signals import (
     AngularVelocity,

@@ -3,18 +3,59 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from flexctrl.effects.automatic import Automatic
+from flexctrl.effects.coulomb_friction import Coulomb, CoulombFriction
 from flexctrl.effects.damping import ModalDamping, RayleighDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Flexible, RopeStretch, ShaftElasticity
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.effects.lugre_friction import LuGre, LuGreFriction
+from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.effects.rotating_frame import RotatingFrame
+from flexctrl.effects.viscous_friction import ViscousFriction
 from flexctrl.errors import did_you_mean
-from flexctrl.scene.reading import Kind, Place, checked, number, one_or_several, positive, several, table, text, vector
+from flexctrl.scene.reading import (
+    Kind,
+    Place,
+    checked,
+    mapping,
+    number,
+    one_or_several,
+    positive,
+    several,
+    table,
+    text,
+    vector,
+)
+
+
+@dataclass(frozen=True)
+class Placed(Kind):
+    """An effect told by a table of places: the table is its only parameter."""
+
+    def required(self) -> tuple[str, ...]:
+        """It is nothing without places."""
+        return ("place",)
+
+    def read(self, value: Mapping[str, Any], place: Place, **given: Any) -> Any:
+        """Read the table of places."""
+        [(parameter, reader)] = self.readers.items()
+        found = reader(value, place)
+        return checked(lambda: self.make(**{parameter: found}), place)
+
+
+_COULOMB = Kind(Coulomb, dict.fromkeys(("kinetic", "static", "stribeck"), number))
+_LUGRE = Kind(LuGre, dict.fromkeys(("stiffness", "kinetic", "static", "stribeck", "damping", "viscous"), number))
+
+
+def _dry(value: Any, place: Place) -> Coulomb | float:
+    return _COULOMB.read(value, place) if isinstance(value, Mapping) else number(value, place)
+
 
 EFFECTS: dict[str, Kind] = {
     "automatic": Kind(Automatic, {"tolerance": positive}),
@@ -28,6 +69,10 @@ EFFECTS: dict[str, Kind] = {
     "rotating_frame": Kind(RotatingFrame, {"rate": vector, "center": vector}),
     "rayleigh_damping": Kind(RayleighDamping, {"alpha": number, "beta": number}),
     "modal_damping": Kind(ModalDamping, {"ratios": one_or_several(number)}),
+    "viscous_friction": Placed(ViscousFriction, {"coefficients": mapping(number)}),
+    "coulomb_friction": Placed(CoulombFriction, {"laws": mapping(_dry)}),
+    "lugre_friction": Placed(LuGreFriction, {"laws": mapping(_LUGRE.read)}),
+    "motor_lag": Placed(MotorLag, {"time_constants": mapping(number)}),
 }
 """Effects by the name they have in a scene file."""
 

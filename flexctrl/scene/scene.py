@@ -26,8 +26,8 @@ from flexctrl.model.linear import LinearModel
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-from flexctrl.scene.nodes import node_of
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
+from flexctrl.structure.naming import node_of
 from flexctrl.structure.structure import Structure
 from flexctrl.study.ledger import ledger
 

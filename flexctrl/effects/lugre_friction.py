@@ -1,0 +1,117 @@
+"""Dry friction through bristles that bend before they slide."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from flexctrl.effects.effect import Effect, Inner
+from flexctrl.effects.places import by_place, check_large, check_static, identifier
+from flexctrl.errors import StructureError
+from flexctrl.structure.contacts import contact_of
+from flexctrl.structure.freedoms import check_finite
+from flexctrl.structure.structure import Structure
+
+
+@dataclass(frozen=True)
+class LuGre:
+    """The LuGre law (Canudas de Wit, Olsson, Åström & Lischinsky 1995).
+
+    ż = v − σ₀ |v| z / g(v),  F = σ₀ z + σ₁ ż + σ₂ v,  g(v) = F_k + (F_s − F_k) exp(−(v/v_s)²).
+
+    Parameters
+    ----------
+    stiffness : float
+        σ₀ > 0 of the bristles [N/m, or N m/rad].
+    kinetic : float
+        F_k > 0 [N, or N m].
+    static : float, optional
+        F_s ≥ F_k; default: F_k.
+    stribeck : float
+        v_s ≥ 0 [m/s or rad/s]; 0: g = F_k.
+    damping : float
+        σ₁ ≥ 0 of the bristles [N s/m, or N m s/rad].
+    viscous : float
+        σ₂ ≥ 0 [N s/m, or N m s/rad].
+
+    Raises
+    ------
+    StructureError
+        For a value out of range.
+    """
+
+    stiffness: float
+    kinetic: float
+    static: float
+    stribeck: float
+    damping: float
+    viscous: float
+
+    def __init__(
+        self,
+        stiffness: float,
+        kinetic: float,
+        static: float | None = None,
+        stribeck: float = 0.0,
+        damping: float = 0.0,
+        viscous: float = 0.0,
+    ) -> None:
+        for name, value in (("stiffness", stiffness), ("kinetic", kinetic)):
+            object.__setattr__(self, name, check_finite(value, name, "LuGre", above=0.0))
+        for name, value in (("stribeck", stribeck), ("damping", damping), ("viscous", viscous)):
+            object.__setattr__(self, name, check_finite(value, name, "LuGre", least=0.0))
+        stick = self.kinetic if static is None else check_finite(static, "static", "LuGre", above=0.0)
+        check_static(stick, self.kinetic, "LuGre")
+        object.__setattr__(self, "static", stick)
+
+
+@dataclass(frozen=True)
+class LuGreFriction(Effect):
+    """Dry friction with presliding in drives, hinges and slides; its bristle is an inner first-order freedom.
+
+    Unlike `CoulombFriction` it creeps a little where it sticks, as real contacts do. It needs `LargeRotation`. A linear
+    model holds σ₂ of it and no more (sliding, the bristles as they are); `Model.notes` says so.
+
+    Parameters
+    ----------
+    laws : mapping of str to LuGre
+        Place (see `ViscousFriction`) → law.
+
+    Raises
+    ------
+    StructureError
+        For what is no `LuGre` law; when the model is assembled, for a place that there is not.
+    """
+
+    apart: ClassVar[bool] = True
+    laws: tuple[tuple[str, LuGre], ...]
+
+    def __init__(self, laws: Mapping[str, LuGre]) -> None:
+        object.__setattr__(self, "laws", by_place(laws, "LuGreFriction", _law))
+
+    def check_on(self, structure: Structure) -> None:
+        """Look for every place."""
+        for where, _ in self.laws:
+            contact_of(structure, where, "LuGreFriction")
+
+    def check_beside(self, others: Sequence[Effect]) -> None:
+        """A linear model has no stick."""
+        check_large(others, "LuGreFriction")
+
+    def inner(self, structure: Structure) -> tuple[Inner, ...]:
+        """A bristle each."""
+        return tuple(Inner(f"{identifier(w)}_bristle", law.static / law.stiffness, True) for w, law in self.laws)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What linear models leave out."""
+        places = ", ".join(where for where, _ in self.laws)
+        note = f"of the friction at {places}, equilibria and linear models hold the viscous part only"
+        return (note,) if places else ()
+
+
+def _law(value: object, owner: str) -> LuGre:
+    if not isinstance(value, LuGre):
+        raise StructureError(f"{owner}: {value!r} is no LuGre law; give flexctrl.LuGre(…)")
+    return value

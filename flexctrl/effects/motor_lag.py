@@ -1,0 +1,44 @@
+"""Motors whose torque takes time to build up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from flexctrl.effects.effect import Effect, Inner
+from flexctrl.effects.places import by_place, check_drives, not_negative
+from flexctrl.structure.structure import Structure
+
+
+@dataclass(frozen=True)
+class MotorLag(Effect):
+    """The torque of a motor follows its command as T τ̇ + τ = M_d, with the electrical time constant T = L/R.
+
+    τ is an inner first-order freedom ``<drive>_lag``; a linear model holds it exactly. Limits of torque belong to
+    the hardware round a controller, `Saturated`.
+
+    Parameters
+    ----------
+    time_constants : mapping of str to float
+        Drive → T ≥ 0 [s].
+
+    Raises
+    ------
+    StructureError
+        For a time below zero; when the model is assembled, for a drive that there is not.
+    """
+
+    apart: ClassVar[bool] = True
+    time_constants: tuple[tuple[str, float], ...]
+
+    def __init__(self, time_constants: Mapping[str, float]) -> None:
+        object.__setattr__(self, "time_constants", by_place(time_constants, "MotorLag", not_negative))
+
+    def check_on(self, structure: Structure) -> None:
+        """Look for every drive."""
+        check_drives(structure, tuple(name for name, _ in self.time_constants), "MotorLag")
+
+    def inner(self, structure: Structure) -> tuple[Inner, ...]:
+        """A torque each."""
+        return tuple(Inner(f"{name}_lag") for name, _ in self.time_constants)

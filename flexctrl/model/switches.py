@@ -1,0 +1,311 @@
+"""Laws of force that switch: dry friction sticks, breaks loose, slides, and stops.
+
+What sticks is held without a multiplier: the equations of motion lose their components along the slip
+directions W of the contacts that stick, and s̈ + κ ṡ + ¼ κ² (s − s₀) = 0 takes their place, with s the angle or
+travel of a contact and s₀ where it stuck. The force that holds is read off the components lost. Phases belong to
+the state; where they end is told by gaps, which are positive while they last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.effects.coulomb_friction import CoulombFriction
+from flexctrl.errors import StructureError
+from flexctrl.model.friction_kinds import STUCK
+from flexctrl.model.motion import Dry, State
+from flexctrl.model.slips import Slips
+from flexctrl.model.solve import factorise
+
+if TYPE_CHECKING:
+    from flexctrl.model.model import Model
+
+__all__ = ["Switches"]
+
+Force = TypeVar("Force", np.ndarray, sp.csr_matrix)
+T = TypeVar("T")
+
+_FADING = 1e4
+_STILL = 1e-10
+_SLACK = 1e-9
+_MASSLESS = 1e-14
+_DEPENDENT = 1e12
+
+
+@dataclass(frozen=True, eq=False)
+class Switches:
+    """The dry contacts of a model.
+
+    Attributes
+    ----------
+    model : Model
+    """
+
+    model: Model
+    _kept: dict[str, tuple[State, Any]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Places of the contacts, in the order of `gaps`."""
+        structure, effects = self.model.structure, self.model.effects
+        at = next((i for i, e in enumerate(effects) if isinstance(e, CoulombFriction)), len(effects))
+        first = sum(len(e.inner(structure)) for e in effects[:at])
+        laws = [where for e in effects[at:] if isinstance(e, CoulombFriction) for where, _ in e.laws]
+        return tuple(laws[int(i) - first] for i in self._slips.order)
+
+    @cached_property
+    def _slips(self) -> Slips:
+        forces = self.model.forces
+        return Slips(forces, tuple(f for f in forces.families if f.kernels.kind.name.startswith("dry_")))
+
+    @cached_property
+    def _static(self) -> np.ndarray:
+        """What each contact bears before it breaks loose [N or N m]."""
+        return np.concatenate([f.parameters[:, 4] for f in self._slips.families])
+
+    def phases(self, state: State) -> np.ndarray:
+        """Return the phase of each contact."""
+        return state.dry.phase[self._slips.order]
+
+    def sticks(self, state: State) -> bool:
+        """Tell whether any contact sticks."""
+        return bool((state.dry.phase == STUCK).any())
+
+    # -- equations of motion while something sticks
+
+    def held(self, state: State, v: np.ndarray, a: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return the balance of forces with the contacts that stick held.
+
+        Parameters
+        ----------
+        state : State
+        v, a : numpy.ndarray, shape (n,)
+        force : numpy.ndarray, shape (n,)
+            The balance without.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        W, back = self._hold(state)
+        speeds, rates, places = self._slips.at(state, v, a)
+        astray = places - state.dry.anchor[self._slips.order]
+        astray -= 2.0 * np.pi * np.rint(astray / (2.0 * np.pi))
+        slip = rates + _FADING * speeds + 0.25 * _FADING**2 * astray
+        return force - back @ (W @ force + self._weight * slip[self.phases(state) == STUCK])
+
+    def freed(self, state: State, force: Force) -> Force:
+        """Return forces, or their slopes, without their components along the slips that stick."""
+        W, back = self._hold(state)
+        if isinstance(force, np.ndarray):
+            return force - back @ (W @ force)
+        return sp.csr_matrix(force - sp.csr_matrix(back) @ sp.csr_matrix(W @ force))
+
+    def held_slope(self, state: State, slope: sp.csr_matrix, seeds: tuple[float, float, float]) -> sp.csr_matrix:
+        """Return the slope of `held` from that of the balance without."""
+        W, back = self._hold(state)
+        hold = seeds[2] + _FADING * seeds[1] + 0.25 * _FADING**2 * seeds[0]
+        rows = W @ slope + hold * self._weight * W
+        return sp.csr_matrix(slope - sp.csr_matrix(back) @ sp.csr_matrix(rows))
+
+    def still(self, state: State, motion: np.ndarray) -> np.ndarray:
+        """Return what is left of a motion of the degrees of freedom when what sticks does not move."""
+        if not self.sticks(state):
+            return motion
+        W, back = self._hold(state)
+        return motion - back @ (W @ motion)
+
+    def _hold(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Return W of the contacts that stick, and its pseudo-inverse."""
+        return self._once("hold", state, lambda: self._holds(state))
+
+    def _holds(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        W = self._slips.rows(state)[self.phases(state) == STUCK]
+        return W, _inverse(W)
+
+    def _once(self, what: str, state: State, make: Callable[[], T]) -> T:
+        """Return what is made of a state, once while nothing else is asked for."""
+        kept = self._kept.get(what)
+        if kept is None or kept[0] is not state:
+            self._kept[what] = kept = (state, make())
+        return kept[1]
+
+    @cached_property
+    def _weight(self) -> float:
+        """About the mass of the machine, so that equations of held contacts are of the size of the others."""
+        return float(self.model.mass().diagonal().max(initial=0.0)) or 1.0
+
+    # -- where phases end, and what comes then
+
+    def gaps(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return how far each contact is from the end of its phase: positive while it lasts.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        numpy.ndarray, shape (contacts,)
+            Sliding: the slip speed in its direction [m/s or rad/s]; sticking: the force left before it breaks
+            loose [N or N m].
+        """
+        phases = self.phases(state)
+        gaps = np.where(phases == 0.0, 1.0, phases * self._slips.speeds(state))
+        stuck = phases == STUCK
+        if stuck.any():
+            held = self._once("gaps", state, lambda: (u, self._holding(state, u)[0]))
+            if not np.array_equal(held[0], u):
+                held = (u, self._holding(state, u)[0])
+            gaps[stuck] = self._static[stuck] - np.abs(held[1])
+        return gaps
+
+    def _holding(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the forces that hold what sticks, and the accelerations of what has mass."""
+        model, dry, a = self.model, state.dry, np.zeros(self.model.n)
+        stuck = self.phases(state) == STUCK
+        loose = state.with_(dry=Dry(np.where(dry.phase == STUCK, 0.0, dry.phase), dry.anchor))
+        force = model.balance(loose, state.v, a) + model.loads(loose, u)
+        M = -model.slope(loose, state.v, a, (0.0, 0.0, 1.0), u)
+        heavy = np.flatnonzero(M.diagonal() > _MASSLESS * M.diagonal().max(initial=0.0))
+        solve = factorise(M if heavy.size == model.n else M[heavy][:, heavy])
+        W = self._hold(state)[0][:, heavy]
+        pushed, free = np.array([solve(row) for row in W]).reshape(W.shape).T, solve(force[heavy])
+        _, turning, _ = self._slips.at(state, state.v, a)
+        held = np.linalg.pinv(W @ pushed) @ -(W @ free + turning[stuck])
+        a[heavy] = free + pushed @ held
+        return held, a
+
+    def begin(self, state: State, u: np.ndarray) -> State:
+        """Return a state with the phases it must have: what stands still sticks if it can.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        StructureError
+            For a dry contact whose sides have no mass to be accelerated.
+        """
+        if not self.names:
+            return state
+        self._check_mass(state, u)
+        speeds = self._slips.speeds(state)
+        return self._settled(state, u, np.where(np.abs(speeds) <= _STILL, STUCK, np.sign(speeds)))
+
+    def under(self, state: State, u: np.ndarray) -> State:
+        """Return a state under inputs that have jumped: what they overcome breaks loose.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        State
+        """
+        return self._settled(state, u, self.phases(state).copy()) if self.sticks(state) else state
+
+    def like(self, state: State, other: State) -> State:
+        """Return a state whose contacts do what those of another, nearby state do.
+
+        Parameters
+        ----------
+        state, other : State
+
+        Returns
+        -------
+        State
+        """
+        if np.array_equal(state.dry.phase, other.dry.phase):
+            return state
+        state = self._with(state, self.phases(other))
+        return state.with_(v=self.still(state, state.v))
+
+    def after(self, state: State, u: np.ndarray, contact: int) -> State:
+        """Return the state after a contact's gap has closed: what slid may stick, what stuck slides.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+        contact : int
+
+        Returns
+        -------
+        State
+        """
+        phases = self.phases(state).copy()
+        if phases[contact] == STUCK:
+            held = self._holding(state, u)[0][np.flatnonzero(phases == STUCK).tolist().index(contact)]
+            phases[contact] = -np.sign(held)
+        else:
+            speed, W = self._slips.speeds(state), self._slips.rows(state)
+            state = state.with_(v=state.v - _inverse(W[[contact]]) @ speed[[contact]])
+            phases[contact] = STUCK
+        return self._settled(state, u, phases)
+
+    def _settled(self, state: State, u: np.ndarray, phases: np.ndarray) -> State:
+        """Break loose what cannot be held, the worst first, each once; what would then slide back is held after all."""
+        loosened: set[int] = set()
+        while True:
+            state = self._with(state, phases)
+            stuck = np.flatnonzero(phases == STUCK)
+            held, a = self._holding(state, u)
+            _, rates, _ = self._slips.at(state, state.v, a)
+            back = [i for i in loosened if phases[i] != STUCK and phases[i] * rates[i] < 0.0]
+            excess = np.abs(held) - self._static[stuck] * (1.0 - _SLACK)
+            fresh = [k for k in np.argsort(-excess) if excess[k] > 0.0 and int(stuck[k]) not in loosened]
+            if back:
+                phases[back] = STUCK
+            elif fresh:
+                i = int(stuck[fresh[0]])
+                phases[i] = -np.sign(held[fresh[0]])
+                loosened.add(i)
+            else:
+                return state
+
+    def _with(self, state: State, phases: np.ndarray) -> State:
+        """Return a state with other phases; what sticks from now on is held where it is."""
+        order, (_, _, places) = self._slips.order, self._slips.at(state, state.v, state.v)
+        phase, anchor = state.dry.phase.copy(), state.dry.anchor.copy()
+        fresh = (phases == STUCK) & (phase[order] != STUCK)
+        anchor[order] = np.where(fresh, places, anchor[order])
+        phase[order] = phases
+        return state.with_(dry=Dry(phase, anchor))
+
+    def _check_mass(self, state: State, u: np.ndarray) -> None:
+        still = np.zeros(self.model.n)
+        M = -self.model.slope(state.loose, still, still, (0.0, 0.0, 1.0), u)
+        light = M.diagonal() <= _MASSLESS * M.diagonal().max(initial=0.0)
+        W = self._slips.rows(state)
+        bad = np.flatnonzero(np.abs(W[:, ~light]).max(axis=1, initial=0.0) == 0.0)
+        if bad.size:
+            raise StructureError(
+                f"CoulombFriction: nothing with mass moves at {self.names[bad[0]]!r}; give the motor its inertia, or "
+                "the part mass"
+            )
+
+
+def _inverse(W: np.ndarray) -> np.ndarray:
+    """The pseudo-inverse; exact where rows are unit vectors."""
+    square = W @ W.T
+    if len(W) == 1 and square[0, 0] > 0.0:
+        return np.asarray(W.T / square[0, 0])
+    if len(W) and np.linalg.cond(square) < _DEPENDENT:
+        return np.asarray(np.linalg.solve(square, W).T)
+    return np.linalg.pinv(W)
