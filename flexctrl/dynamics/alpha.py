@@ -293,7 +293,7 @@ class GeneralizedAlpha:
         return Fixed(self.step)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper:
-        return Stepper(model, feed, Coefficients.of(self.rho), _NEWTON)
+        return Stepper(model, feed, Coefficients.of(self.rho), min(_NEWTON, 1e-3 * tolerance.absolute))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,9 @@ from flexctrl.model.solve import factorise
 
 __all__ = ["Richardson"]
 
+_TIGHT = 1e-10
+"""What is left open by Newton's method must not show in the difference of two runs."""
+
 
 @dataclass(frozen=True)
 class Richardson:
@@ -69,7 +72,8 @@ class Richardson:
         return self.method.pace
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
-        coarse, fine = (self.method.stepper(model, feed, tolerance) for _ in range(2))
+        tight = replace(tolerance, absolute=min(tolerance.absolute, _TIGHT))
+        coarse, fine = (self.method.stepper(model, feed, tight) for _ in range(2))
         return _Stepper(model, feed, coarse, fine, 1.0 / 3.0)
 
 
