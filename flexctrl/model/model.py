@@ -349,7 +349,7 @@ class Model:
         Raises
         ------
         StructureError
-            For an unknown coordinate, or what is no finite number.
+            For an unknown coordinate, what is no finite number, or a shape whose forces are not defined.
         """
         step = np.zeros(self.n)
         if isinstance(q, Mapping):
@@ -359,7 +359,13 @@ class Model:
             step[:] = q
         else:
             raise StructureError(f"displace: expected {self.n} finite numbers, one a coordinate, got {q!r}")
-        return self.advance(self.rest, step, np.zeros(self.n), 0.0)
+        state = self.advance(self.rest, step, np.zeros(self.n), 0.0)
+        if not np.isfinite(self.energy(state)).all():
+            raise StructureError(
+                "displace: an element has no length left or is folded by exactly half a turn: its forces are not "
+                "defined there. Displace it a little less, or use more elements"
+            )
+        return state
 
     def coordinate(self, name: str) -> int:
         """Return the place of a degree of freedom by name.

@@ -24,8 +24,8 @@ def pivots(A: sp.spmatrix) -> np.ndarray:
     numpy.ndarray, shape (n,)
         NaN throughout if the matrix cannot be factorised without exchanging rows.
     """
-    if not A.shape[0]:
-        return np.zeros(0)
+    if not A.shape[0] or not np.isfinite(A.data).all():
+        return np.full(A.shape[0], np.nan)
     size = np.sqrt(np.abs(A.diagonal()))
     scale = sp.diags(1.0 / np.where(size > 0.0, size, 1.0))
     scaled = scale @ (0.5 * (A + A.T)) @ scale + 0.1 * ZERO_PIVOT * sp.identity(A.shape[0])

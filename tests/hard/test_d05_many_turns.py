@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.errors import StructureError
 
 
 def rolled(turns: float, elements: int) -> fc.Rest:
@@ -35,8 +36,32 @@ def test_ten_turns():
     assert all(np.isfinite(rest.state.x).ravel())
 
 
-def test_an_element_bent_by_half_a_turn_is_refused_not_invented():
-    """Two elements a turn: each would be bent by 180° against its chord's middle; no NaN leaves."""
-    rest = rolled(1, 2)
-    assert np.isfinite(list(rest.outputs.values())).all()
-    assert rest.outputs["turn"] == pytest.approx(2.0 * np.pi, rel=1e-6)
+def test_three_elements_make_a_turn():
+    rest = rolled(1, 3)
+    assert rest.outputs["turn"] == pytest.approx(2.0 * np.pi, rel=1e-9)
+    assert np.hypot(rest.outputs["x"], rest.outputs["y"]) < 1e-9
+
+
+def single() -> fc.Model:
+    section = fc.Section(EA=1e8, EI_y=1.0, EI_z=1.0, GJ=2.0, rhoA=1.0, rhoJ=1e-3)
+    beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), section)
+    return fc.assemble(fc.Structure([beam], [fc.Support(beam.start)]), [fc.Flexible(), fc.LargeRotation()])
+
+
+@pytest.mark.parametrize("angle", [np.pi / 2, 3.1, np.pi])
+def test_one_element_twisted_by_half_a_turn(angle):
+    """½ GJ/L φ², at exactly 180° too."""
+    model = single()
+    assert model.energy(model.displace({"beam_1_rx": angle}))[1] == pytest.approx(angle**2, rel=1e-12)
+
+
+def test_one_element_bent_by_half_a_turn_is_refused():
+    """Its ends point against each other, and so do their second axes, which tell the element's twist."""
+    assert np.isfinite(single().energy(single().displace({"beam_1_rz": 3.1}))).all()
+    with pytest.raises(StructureError, match="half a turn"):
+        single().displace({"beam_1_rz": np.pi})
+
+
+def test_an_element_without_length_is_refused():
+    with pytest.raises(StructureError, match="no length"):
+        single().displace({"beam_1_u": -1.0})
