@@ -146,6 +146,14 @@ def test_damping_through_two_frequencies(written):
     assert load_scene(written(text)).effects[-1] == fc.RayleighDamping.through(0.02, 2.0, 30.0)
 
 
+def test_a_scene_in_a_rotating_frame(written):
+    more = "large_rotation = true\nrotating_frame = { rate = [0, 0, 0.5], center = [1, 0, 0] }"
+    scene = load_scene(written(TROLLEY.replace("large_rotation = true", more)))
+    assert fc.RotatingFrame((0, 0, 0.5), (1, 0, 0)) in scene.effects
+    with pytest.raises(SceneError, match="expected three numbers"):
+        load_scene(written(TROLLEY.replace("large_rotation = true", "rotating_frame = { rate = 0.5 }")))
+
+
 @pytest.mark.parametrize(
     ("group", "kinds"), [("effects", EFFECTS), ("moves", MOVES), ("shapers", SHAPERS), ("machines", MACHINES)]
 )
