@@ -170,3 +170,20 @@ def test_certificate_tells_coriolis_forces_from_dampers():
         assert ("skew" in str(certificate)) == (spin in effects)
     assert shares[:3] == [0.0, 0.0, pytest.approx(1.0)]
     assert 0.0 < shares[3] < 1.0
+
+
+def test_coriolis_forces_are_in_every_export():
+    """Poles, response and state space of a spinning blade against dense solutions with its M, C and K."""
+    blade = fc.Beam("blade", (0.2, 0, 0), (1.2, 0.2, 0), E, elements=3)
+    push, tip = fc.Force("push", blade.end, "y"), fc.Position("tip", blade.end, "x")
+    structure = fc.Structure([blade], [fc.Support(blade.start)], inputs=[push], outputs=[tip])
+    effects = [*MOVING, fc.RotatingFrame((0, 0, 8.0)), fc.RayleighDamping(0.0, 1e-4)]
+    linear = fc.linearize(fc.assemble(structure, effects, fc.CasadiVM()))
+    M, C, K = (A.toarray() for A in (linear.M, linear.C, linear.K))
+    A = np.block([[0 * M, np.eye(len(M))], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    np.testing.assert_allclose(np.sort(np.abs(linear.damped_poles())), np.sort(np.abs(np.linalg.eigvals(A))), rtol=1e-9)
+    omega = np.array([1.0, 40.0, 300.0])
+    exact = [(linear.Cq @ np.linalg.solve(K + 1j * w * C - w * w * M, linear.B))[0, 0] for w in omega]
+    plant = linear.to_ss()
+    np.testing.assert_allclose(linear.frequency_response(omega).values[0, 0], exact, rtol=1e-10)
+    np.testing.assert_allclose([plant(1j * w) for w in omega], exact, rtol=1e-10)
