@@ -11,7 +11,7 @@ from flexctrl.model.path_critical import Gauge, branching_between, limit_between
 
 __all__ = ["PathEnd", "Walk", "Walked"]
 
-_FIRST, _SHORTEST, _LONGEST = 0.02, 1e-7, 0.1
+_FIRST, _SHORTEST, _LONGEST = 0.02, 1e-7, 0.06
 _AIM, _BEND, _CLOSE = 5, 0.95, 1e-4
 
 

@@ -92,3 +92,12 @@ def test_bridge_crane_controllers() -> None:
     for comparison in comparisons.values():
         assert comparison.flexible["load_x"][-1] == pytest.approx(5.0, abs=0.6)
         assert np.abs(comparison.rigid["bend"]).max() < 1e-9 < np.abs(comparison.flexible["bend"]).max()
+
+
+def test_lee_frame_prints_what_its_page_shows_and_snaps_where_it_should() -> None:
+    found = _finished("lee_frame.py")
+    page = (ROOT / "docs" / "howto" / "paths.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"^```text\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+    assert found.printed == shown
+    limits = [limit.factor for limit in found.names["path"].limits]
+    assert limits == pytest.approx([18556.73, -9414.43], rel=1e-4)
