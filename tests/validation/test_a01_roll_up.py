@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from statics import cantilever, slender
 from recorder import Absolute
+from statics import cantilever, slender
 
 import flexctrl as fc
 
