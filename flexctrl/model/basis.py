@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 
 __all__ = ["canonical", "clusters"]
 
@@ -37,7 +38,7 @@ def clusters(values: np.ndarray, rigid: np.ndarray, noise: np.ndarray) -> list[s
     return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], values.size], strict=True)] if values.size else []
 
 
-def canonical(shapes: np.ndarray, weight: np.ndarray, damping: np.ndarray, groups: list[slice]) -> np.ndarray:
+def canonical(shapes: np.ndarray, weight: np.ndarray, damping: sp.csc_matrix, groups: list[slice]) -> np.ndarray:
     """Turn each cluster to the basis that its space alone defines.
 
     Within a cluster the damping is made diagonal; what is still free is fixed so that each shape after the
@@ -50,8 +51,8 @@ def canonical(shapes: np.ndarray, weight: np.ndarray, damping: np.ndarray, group
         Mass-orthonormal.
     weight : numpy.ndarray, shape (n,)
         Makes entries of different units comparable.
-    damping : numpy.ndarray, shape (k, k)
-        Φᵀ C Φ, symmetric part; only the diagonal blocks of the clusters are read.
+    damping : sparse matrix, shape (n, n)
+        C.
     groups : list of slice
 
     Returns
@@ -61,8 +62,8 @@ def canonical(shapes: np.ndarray, weight: np.ndarray, damping: np.ndarray, group
     turned = shapes.copy()
     for group in groups:
         if group.stop - group.start > 1:
-            block = damping[group, group]
-            turned[:, group] = _turn(shapes[:, group], weight, block)
+            own = shapes[:, group]
+            turned[:, group] = _turn(own, weight, own.T @ (damping @ own))
     leading = np.argmax(_nearly_largest(np.abs(turned) * weight[:, None]), axis=0)
     return turned * np.where(turned[leading, np.arange(turned.shape[1])] < 0, -1.0, 1.0) + 0.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,8 +14,9 @@ from flexctrl.errors import LinearizationError, MechanismError
 from flexctrl.model.eigen import coordinate_scales
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.massless import Massless, as_dense, massless, pivots, solved
+from flexctrl.model.pattern import congruent, symmetric
 
-__all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "static_map"]
+__all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map"]
 
 
 class Freedom(Enum):
@@ -75,7 +77,7 @@ class Scaled:
     Attributes
     ----------
     model : LinearModel
-        In scaled coordinates z; q = scales · z.
+        In scaled coordinates z; q = scales · z. It knows neither parts nor place.
     scales : numpy.ndarray, shape (n,)
     massless : Massless
     """
@@ -83,6 +85,17 @@ class Scaled:
     model: LinearModel
     scales: np.ndarray
     massless: Massless
+
+    @cached_property
+    def stiffness(self) -> tuple[sp.csc_matrix, float]:
+        """The symmetric part of K, and the largest entry of the rest relative to K's largest."""
+        even, gap = symmetric(self.model.K)
+        return even, gap / max(float(np.abs(even.data).max(initial=0.0)), np.finfo(float).tiny)
+
+    @cached_property
+    def mass(self) -> sp.csc_matrix:
+        """The symmetric part of M."""
+        return symmetric(self.model.M)[0]
 
 
 def audit(linear: LinearModel) -> Audit:
@@ -97,7 +110,7 @@ def audit(linear: LinearModel) -> Audit:
     Audit
         Never raises for a mechanism; :func:`condense` does.
     """
-    kinds = _scaled_any(linear).massless
+    kinds = linear._scaled.massless
     labels = [Freedom.DYNAMIC] * len(linear.coordinates)
     for basis, kind in (
         (kinds.static, Freedom.STATIC),
@@ -125,7 +138,7 @@ def scaled(linear: LinearModel) -> Scaled:
     MechanismError
         For a motion with neither mass nor stiffness (nor damping), by coordinate names.
     """
-    result = _scaled_any(linear)
+    result = linear._scaled
     loose = _moving(result.massless.mechanisms, linear.coordinates)
     if loose:
         motions = "; ".join(" with ".join(names) for names in loose)
@@ -223,10 +236,21 @@ def refuse_improper(model: LinearModel, direct: sp.spmatrix | np.ndarray) -> Non
         )
 
 
-def _scaled_any(linear: LinearModel) -> Scaled:
+def scaled_any(linear: LinearModel) -> Scaled:
+    """As :func:`scaled`, mechanisms included.
+
+    Parameters
+    ----------
+    linear : LinearModel
+
+    Returns
+    -------
+    Scaled
+    """
     s = coordinate_scales(linear.M, linear.C, linear.K)
-    model = linear.projected(sp.diags(s), linear.coordinates)
-    return Scaled(model, s, massless(model.M, model.C, model.K))
+    M, C, K = congruent(s, linear.M, linear.C, linear.K)
+    signals = {"B": s[:, None] * linear.B, "Cq": linear.Cq * s, "Cv": linear.Cv * s}
+    return Scaled(replace(linear, M=M, C=C, K=K, parts={}, place=None, **signals), s, massless(M, C, K))
 
 
 def _moving(basis: sp.csc_matrix, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:

@@ -1,20 +1,21 @@
 """Eigenpairs of K φ = λ M φ that are right at the low end, with exact zeros where zero is meant.
 
 A dense solver of the pencil (K, M) is wrong by eps·λ_max in every λ, which is all of the lowest ones
-of a fine mesh; a solver of the inverted pencil (M, K − σM) is wrong by eps·λ²/|σ|. Low pairs are taken
+of a fine mesh; a solver of the inverted pencil (M, K − σM) is wrong by eps·λ²/(λ₁ − σ). Low pairs are taken
 from the inverted one, high pairs from the direct one in the M-orthogonal rest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
-from flexctrl.model.pencil import EPS, HIDDEN, Pencil, ShiftedPencil, stiffness_noise
+from flexctrl.model.pencil import EPS, HIDDEN, DensePencil, Pencil, ShiftedPencil, faint_shift, stiffness_noise
 
 __all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
 
@@ -22,6 +23,9 @@ RIGID_NOISE = 30.0
 SOFT_NOISE = 1e6
 RIGID_GAP = 1e-8
 UNCLEAR = 1e5 * EPS
+SHORT_SPAN = 1e4
+WIDTH = 4
+SCOUTS = 8
 
 
 @dataclass(frozen=True)
@@ -36,11 +40,14 @@ class Eigenpairs:
         φ, with φᵀ M φ = 1.
     rigid : numpy.ndarray of bool, shape (k,)
         Which of them are rigid-body modes.
+    noise : numpy.ndarray, shape (k,)
+        Spread of λ by the rounding of K's entries.
     """
 
     values: np.ndarray
     shapes: np.ndarray
     rigid: np.ndarray
+    noise: np.ndarray
 
 
 def coordinate_scales(M: sp.spmatrix, C: sp.spmatrix, K: sp.spmatrix) -> np.ndarray:
@@ -63,13 +70,13 @@ def coordinate_scales(M: sp.spmatrix, C: sp.spmatrix, K: sp.spmatrix) -> np.ndar
 
 
 def complete_pairs(
-    K: sp.csc_matrix, M: sp.csc_matrix, origin: tuple[sp.csc_matrix, sp.csc_matrix] | None = None
+    K: np.ndarray, M: np.ndarray, origin: tuple[sp.csc_matrix, sp.csc_matrix] | None = None
 ) -> Eigenpairs:
-    """All eigenpairs, dense; M positive definite.
+    """All eigenpairs; M positive definite.
 
     Parameters
     ----------
-    K, M : sparse matrices, shape (n, n), symmetric, scaled
+    K, M : numpy.ndarray, shape (n, n), symmetric, scaled
     origin : tuple of two sparse matrices, optional
         K₀ and T where K = Tᵀ K₀ T: rounding is then judged by the entries of K₀.
 
@@ -77,23 +84,32 @@ def complete_pairs(
     -------
     Eigenpairs
     """
-    pencil = Pencil(K, M, origin=origin)
-    k, m = pencil.K.toarray(), pencil.M.toarray()
-    lam, phi = _direct(k, m)
-    top = np.abs(lam).max(initial=0.0)
-    if top == 0.0:
-        return _settled(pencil, lam, phi, 0.0)
-    sigma = pencil.below_all(-pencil.soft_scale())
+    if not K.size:
+        return Eigenpairs(np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool), np.zeros(0))
+    pencil = DensePencil(K, M, origin)
+    lam, phi = pencil.direct()
+    top = float(np.abs(lam).max())
+    if top > SHORT_SPAN * np.abs(lam).min():
+        shifted, lowest = _scouted(pencil, phi, SCOUTS)
+        low = int(np.count_nonzero(lam <= np.sqrt(top * lowest)))
+        lam[:low], phi[:, :low] = shifted.ritz(phi[:, :low])
+    else:
+        shifted = pencil.below_all(-max(top, 1.0))
+    return _settled(pencil, _found(pencil, shifted, lam, phi))
+
+
+def _scouted(pencil: DensePencil, phi: np.ndarray, count: int) -> tuple[ShiftedPencil, float]:
+    """A shift that suits the lowest pairs, given vectors near them, and its distance to the lowest."""
+    shifted, x = pencil.below_all(faint_shift(pencil.K, pencil.M)), phi[:, :count]
     for _ in range(4):
-        if top <= 1e4 * -sigma:
+        lam, x = shifted.ritz(x)
+        better = _better_shift(_found(pencil, shifted, lam, x, 0), shifted.sigma)
+        if better in (0.0, shifted.sigma):
             break
-        lam, phi = _low_and_high(pencil.at(sigma), k, m, np.sqrt(top * -sigma))
-        scale = _first_flexible(pencil, lam, phi, sigma)
-        if scale == 0.0 or 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
-            break
-        # twice: at −scale there may be an eigenvalue, the negative one that set the scale
-        sigma = pencil.below_all(-2.0 * scale)
-    return _settled(pencil, lam, phi, sigma)
+        shifted = pencil.below_all(better)
+    if better == 0.0 and count < len(phi):
+        return _scouted(pencil, phi, 4 * count)
+    return shifted, lam[0] - shifted.sigma
 
 
 def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
@@ -108,54 +124,92 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
     Returns
     -------
     Eigenpairs
-        A few more than asked, so that repeated modes are not cut in two.
+        On to the next gap, so that repeated modes are not cut in two.
 
     Raises
     ------
     LinearizationError
         If the Sturm count of K − μM never agrees with the modes found.
     """
-    n, (pencil, order) = K.shape[0], Pencil(K, M).reordered()
-    wanted, sigma = min(count + 8, n - 2), -pencil.soft_scale()
-    for seed in range(20):
-        sigma = pencil.below_all(sigma)
-        lam, phi = pencil.at(sigma).lanczos(wanted, seed)
-        scale = _first_flexible(pencil, lam, phi, sigma)
-        if scale == 0.0 and 2 * wanted < n - 2:
-            wanted *= 2
-        elif scale > 0.0 and not 0.01 * scale <= -sigma <= 10.0 * max(scale, -lam[0]):
-            sigma = -2.0 * scale
-        elif _none_missed(pencil, lam, count):
-            pairs = _settled(pencil, lam, phi, sigma)
-            return Eigenpairs(pairs.values, pairs.shapes[np.argsort(order)], pairs.rigid)
+    n, pencil = K.shape[0], Pencil(K, M)
+    wanted, width = min(count, n - 2), WIDTH
+    shifted = pencil.below_all(faint_shift(K, M))
+    start = _noise(n, width)
+    for _ in range(20):
+        found = _found(pencil, shifted, *shifted.lanczos(start, wanted))
+        better = _better_shift(found, shifted.sigma)
+        if better == 0.0 and 2 * wanted < n - 2:
+            wanted, start = 2 * wanted, np.hstack([found.phi, _noise(n, width)])
+        elif better not in (0.0, shifted.sigma):
+            shifted, start = pencil.below_all(better), np.hstack([found.phi, _noise(n, width)])
+        elif _none_missed(pencil, np.sort(found.lam), count):
+            return _settled(pencil, found.without_last())
+        else:
+            # more equal modes than the block is wide, or a start that does not hold one
+            width = min(2 * width, n // 4)
+            start = _noise(n, width)
     raise LinearizationError("the lowest modes could not be certified by a Sturm count; ask for another count")
 
 
-def _direct(k: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        return la.eigh(k, m)
-    except la.LinAlgError as error:
-        raise LinearizationError("the mass matrix is not positive definite on the freedoms kept") from error
+@dataclass(frozen=True)
+class _Found:
+    """Pairs near a shift; soft ones, whose λ may be rounding alone, are polished."""
+
+    lam: np.ndarray
+    phi: np.ndarray
+    noise: np.ndarray
+    soft: np.ndarray
+
+    @cached_property
+    def rigid(self) -> np.ndarray:
+        """Which λ are 0 as far as can be told."""
+        size = np.abs(self.lam)
+        flexible = size[~self.soft].min(initial=np.inf)
+        gap = RIGID_GAP * flexible if np.isfinite(flexible) else 0.0
+        return self.soft & (size <= np.maximum(RIGID_NOISE * self.noise, gap))
+
+    def without_last(self) -> _Found:
+        return _Found(self.lam[:-1], self.phi[:, :-1], self.noise[:-1], self.soft[:-1])
 
 
-def _low_and_high(inverted: ShiftedPencil, k: np.ndarray, m: np.ndarray, split: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs under `split` from the inverted pencil, the rest from the direct one in their complement."""
-    inverse = inverted.solve(np.eye(len(k)))
-    theta, y = la.eigh(m @ (0.5 * (inverse + inverse.T)) @ m, m)
-    low = y[:, theta > 1.0 / (split - inverted.sigma)][:, ::-1]
-    lam_low, low = inverted.ritz(low)
-    if low.shape[1] == len(k):
-        return lam_low, low
-    rest = la.qr(m @ low)[0][:, low.shape[1] :]
-    lam_high, y = _direct(rest.T @ k @ rest, rest.T @ m @ rest)
-    return np.concatenate([lam_low, lam_high]), np.hstack([low, rest @ y])
+def _found(
+    pencil: Pencil | DensePencil, shifted: ShiftedPencil, lam: np.ndarray, phi: np.ndarray, polish: int = 3
+) -> _Found:
+    noise = pencil.noise(phi)
+    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * noise, UNCLEAR * abs(shifted.sigma))
+    if soft.any():
+        phi[:, soft], lam[soft] = _polished(pencil, phi[:, soft], shifted, polish)
+        noise[soft] = pencil.noise(phi[:, soft])
+    return _Found(lam, phi, noise, soft)
 
 
-def _first_flexible(pencil: Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) -> float:
-    """Smallest |λ| that stands clear of rounding; 0 if none does."""
-    floor = np.maximum(RIGID_NOISE * pencil.noise(phi), UNCLEAR * abs(sigma))
-    clear = np.abs(lam)[np.abs(lam) > floor]
-    return float(clear.min()) if clear.size else 0.0
+def _polished(
+    pencil: Pencil | DensePencil, x: np.ndarray, shifted: ShiftedPencil, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Inverse iteration on a soft subspace, then Rayleigh–Ritz within it."""
+    x = _orthonormal(pencil.M, x)
+    for _ in range(steps):
+        x = _orthonormal(pencil.M, shifted.iterate(x))
+    ritz, y = np.linalg.eigh(x.T @ (pencil.K @ x))
+    return x @ y, ritz
+
+
+def _noise(n: int, width: int) -> np.ndarray:
+    return np.random.default_rng(width).standard_normal((n, width))
+
+
+def _better_shift(found: _Found, sigma: float) -> float:
+    """The shift if it suits the pairs found with it, another if not; 0 if all of them are without stiffness.
+
+    With rigid-body modes it has to be about as large as the first flexible λ, or these lose digits beside them.
+    """
+    clear = ~found.rigid & (np.abs(found.lam) > UNCLEAR * abs(sigma))
+    if not clear.any():
+        return 0.0
+    scale = float(np.abs(found.lam[clear]).min())
+    small_enough = -sigma <= 10.0 * max(scale, -float(found.lam.min()))
+    # twice: at -scale there may be an eigenvalue, the negative one that set the scale
+    return sigma if small_enough and (clear.all() or 0.01 * scale <= -sigma) else -2.0 * scale
 
 
 def _none_missed(pencil: Pencil, lam: np.ndarray, count: int) -> bool:
@@ -167,41 +221,20 @@ def _none_missed(pencil: Pencil, lam: np.ndarray, count: int) -> bool:
     return True
 
 
-def _settled(pencil: Pencil, lam: np.ndarray, phi: np.ndarray, sigma: float) -> Eigenpairs:
-    """Orthonormalise, polish the soft vectors, set λ of the rigid ones to 0 and sort."""
-    M = pencil.M
-    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * pencil.noise(phi), UNCLEAR * abs(sigma))
-    flexible = np.abs(lam)[~soft].min() if not soft.all() else 0.0
-    rigid = np.zeros(lam.size, dtype=bool)
-    lam = lam.copy()
-    if soft.any():
-        phi, lam[soft] = _polished(pencil, phi, soft, sigma)
-        noise = pencil.noise(phi)
-        near = (np.abs(lam) <= RIGID_GAP * flexible) & soft
-        rigid = soft & ((np.abs(lam) <= RIGID_NOISE * noise) | near)
-        lam[rigid] = 0.0
-    phi = _orthonormal(M, np.hstack([phi[:, rigid], phi[:, ~rigid]]))
-    lam = np.concatenate([lam[rigid], lam[~rigid]])
+def _settled(pencil: Pencil | DensePencil, found: _Found) -> Eigenpairs:
+    """Set λ of the rigid ones to 0, orthonormalise (these first) and sort."""
+    first = np.argsort(~found.rigid, kind="stable")
+    phi = _orthonormal(pencil.M, found.phi[:, first])
+    lam, rigid, noise = np.where(found.rigid, 0.0, found.lam)[first], found.rigid[first], found.noise[first]
     order = np.argsort(lam, kind="stable")
-    return Eigenpairs(lam[order], phi[:, order], np.sort(rigid)[::-1][order])
+    return Eigenpairs(lam[order], phi[:, order], rigid[order], noise[order])
 
 
-def _polished(pencil: Pencil, phi: np.ndarray, soft: np.ndarray, sigma: float) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse iteration on the soft subspace, then Rayleigh–Ritz within it."""
-    x = phi[:, soft]
-    if sigma != 0.0:
-        inverted = pencil.at(sigma)
-        for _ in range(3):
-            x = _orthonormal(pencil.M, inverted.iterate(x))
-    ritz, y = la.eigh(x.T @ (pencil.K @ x))
-    polished = phi.copy()
-    polished[:, soft] = x @ y
-    return polished, ritz
-
-
-def _orthonormal(M: sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
-    """M-orthonormal columns spanning the same nested spaces (Cholesky, twice)."""
+def _orthonormal(M: np.ndarray | sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
+    """M-orthonormal columns spanning the same nested spaces (Cholesky, until nothing is left to do)."""
     for _ in range(2):
         gram = phi.T @ (M @ phi)
-        phi = la.solve_triangular(la.cholesky(gram, lower=True), phi.T, lower=True).T
+        if np.abs(gram - np.eye(len(gram))).max(initial=0.0) <= 8.0 * EPS:
+            break
+        phi = lapack.dtrtrs(np.linalg.cholesky(gram), phi.T, lower=1)[0].T
     return phi

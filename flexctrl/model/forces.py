@@ -13,6 +13,7 @@ from flexctrl.model.families import Family
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.mixed import Excess, Mixed
 from flexctrl.model.motion import DENSE_UP_TO, Motion, State
+from flexctrl.model.parts import Parts, parts_of
 
 
 @dataclass(frozen=True)
@@ -137,27 +138,30 @@ class Forces:
         """The stresses of the pieces that strain."""
         return Mixed(self)
 
-    def slope_by_part(
-        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float]
-    ) -> dict[str, sp.csr_matrix]:
-        """Return each part's own share of `slope`, levers of followers left out."""
-        blocks, (rows, columns) = self._blocks(self.slots(state, v, a), seeds), self.pattern
-        owners = np.concatenate([np.repeat(f.parts, f.scatter(0).shape[1] ** 2) for f in self.families])
-        return {
-            str(name): self._projected(state, blocks[owners == name], rows[owners == name], columns[owners == name])
-            for name in dict.fromkeys(owners.tolist())
-        }
+    def parts(self, state: State, reach: sp.csr_matrix) -> Parts:
+        """Return each part's own share of K and M at rest, levers of followers left out.
+
+        Parameters
+        ----------
+        state : State
+        reach : scipy.sparse.csr_matrix, shape (raw, k)
+            Raw motion with the coordinates wanted.
+
+        Returns
+        -------
+        Parts
+        """
+        still = np.zeros(self.motion.n)
+        z = self.slots(state, still, still)
+        stiffness, mass = (-self._blocks(z, seed) for seed in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+        owners = np.concatenate([np.array(f.parts) for f in self.families])
+        return parts_of(owners, [f.scatter(self.motion.source_base) for f in self.families], stiffness, mass, reach)
 
     def _blocks(self, z: np.ndarray, seeds: tuple[float, float, float]) -> np.ndarray:
         seeded, blocks = np.append(z, seeds), np.zeros(self.pattern[0].size)
         for batch in self._tangent:
             batch(seeded, blocks)
         return blocks
-
-    def _projected(self, state: State, blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> sp.csr_matrix:
-        size = self.motion.raw
-        T = self.motion.jacobian(state)
-        return (T.T @ sp.csr_matrix((blocks, (rows, columns)), shape=(size, size)) @ T).tocsr()
 
     def energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""

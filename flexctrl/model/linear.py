@@ -12,13 +12,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, StructureError, did_you_mean
+from flexctrl.model.parts import PartMatrices, projected_parts
 
 if TYPE_CHECKING:
     import control
     from matplotlib.figure import Figure
 
     from flexctrl.model.certificate import Certificate
-    from flexctrl.model.condense import Audit
+    from flexctrl.model.condense import Audit, Scaled
     from flexctrl.model.discrete import Hold
     from flexctrl.model.modal import ModalSystem
     from flexctrl.model.model import Model
@@ -29,20 +30,6 @@ if TYPE_CHECKING:
     from flexctrl.model.statespace import Form
 
 __all__ = ["LinearModel", "PartMatrices", "Place"]
-
-
-@dataclass(frozen=True)
-class PartMatrices:
-    """What one part (a beam, a drive …) contributes to K and M: for energy shares by part.
-
-    Attributes
-    ----------
-    stiffness, mass : scipy.sparse.csc_matrix, shape (n, n)
-        The part's own share, in the model's coordinates.
-    """
-
-    stiffness: sp.csc_matrix
-    mass: sp.csc_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +155,6 @@ class LinearModel:
         def congruent(A: sp.csc_matrix) -> sp.csc_matrix:
             return sp.csc_matrix(L @ A @ T)
 
-        parts = {k: PartMatrices(congruent(v.stiffness), congruent(v.mass)) for k, v in self.parts.items()}
         return replace(
             self,
             M=congruent(self.M),
@@ -178,7 +164,7 @@ class LinearModel:
             Cq=(T.T @ self.Cq.T).T,
             Cv=(T.T @ self.Cv.T).T,
             coordinates=tuple(coordinates),
-            parts=parts,
+            parts=projected_parts(self.parts, T),
             place=self.place and replace(self.place, basis=sp.csc_matrix(self.place.basis @ T)),
         )
 
@@ -300,6 +286,12 @@ class LinearModel:
         from flexctrl.model.matfile import load_mat
 
         return load_mat(path)
+
+    @cached_property
+    def _scaled(self) -> Scaled:
+        from flexctrl.model.condense import scaled_any
+
+        return scaled_any(self)
 
     @cached_property
     def _modal(self) -> ModalSystem:

@@ -12,7 +12,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.model.balance import Balance
 from flexctrl.model.certificate import certify, taylor_slope
 from flexctrl.model.equilibrium import Rest, equilibrium
-from flexctrl.model.linear import LinearModel, PartMatrices, Place
+from flexctrl.model.linear import LinearModel, Place
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque
@@ -96,7 +96,7 @@ def _derivative(
         inputs=model.inputs,
         outputs=model.outputs,
         name=model.structure.name,
-        parts=_parts(model, state, free),
+        parts=model.forces.parts(state, T) if model.large else {},
         place=Place(model, state, sp.identity(model.n, format="csc")[:, free]),
     )
     return linear, asymmetry
@@ -137,15 +137,3 @@ def _check_balance(balance: Balance, state: State) -> float:
 
 def _symmetric(A: sp.spmatrix) -> sp.csc_matrix:
     return (0.5 * (A + A.T)).tocsc()
-
-
-def _parts(model: Model, state: State, free: np.ndarray) -> dict[str, PartMatrices]:
-    if not model.large:
-        return {}
-    zero = np.zeros(model.n)
-    stiffness = model.forces.slope_by_part(state, zero, zero, (1.0, 0.0, 0.0))
-    mass = model.forces.slope_by_part(state, zero, zero, (0.0, 0.0, 1.0))
-    return {
-        name: PartMatrices(_symmetric(-stiffness[name][free][:, free]), _symmetric(-mass[name][free][:, free]))
-        for name in stiffness
-    }

@@ -12,9 +12,12 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
+from scipy.linalg import lapack
 from scipy.sparse.csgraph import connected_components
 
 from flexctrl.errors import LinearizationError
+from flexctrl.model.banded import band_of
+from flexctrl.model.pattern import congruent
 
 __all__ = ["Massless", "as_dense", "massless", "null_split", "pivots", "solved"]
 
@@ -47,6 +50,8 @@ class Massless:
     @property
     def every(self) -> sp.csc_matrix:
         """Static and relaxing together, shape (n, r + d)."""
+        if not self.relaxing.shape[1]:
+            return self.static
         return sp.csc_matrix(sp.hstack([self.static, self.relaxing]))
 
 
@@ -68,6 +73,9 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
         If M is not positive semidefinite, or a massless freedom without damping of its own is pushed by
         velocities of others (gyroscopic), which would need the derivative of the inputs.
     """
+    if _heavy(M):
+        none = sp.csc_matrix((M.shape[0], 0))
+        return Massless(none, none, none)
     null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
     if not null.shape[1]:
         return Massless(null, null, null)
@@ -165,6 +173,14 @@ def _without_dust(M: sp.csc_matrix) -> sp.csc_matrix:
     return sp.csc_matrix(keep @ M @ keep)
 
 
+def _heavy(M: sp.csc_matrix) -> bool:
+    """Whether M is plainly positive definite."""
+    diagonal = M.diagonal()
+    if not diagonal.size or diagonal.min() <= MASS_DUST * diagonal.max():
+        return False
+    return _definite(congruent(1.0 / np.sqrt(diagonal), M)[0])
+
+
 def _restricted(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
     """Nᵀ A N without the entries that are only rounding."""
     full = sp.csc_matrix(N.T @ A @ N)
@@ -178,6 +194,12 @@ def _peak(A: sp.spmatrix) -> float:
 
 def _definite(block: sp.csc_matrix) -> bool:
     """Whether all pivots of the unit-diagonal matrix stand clear of zero."""
+    if block.shape[0] <= DENSE_BLOCK:
+        root, info = lapack.dpotrf(block.toarray(), lower=1)
+        return bool(info == 0 and np.square(root.diagonal()).min() > SMALL_PIVOT)
+    if (band := band_of(block)) is not None:
+        factor = band.factorise(block.data)
+        return factor is not None and bool(factor.pivots.min() > SMALL_PIVOT)
     try:
         lu = _symmetric_lu(block)
     except RuntimeError:
@@ -241,4 +263,4 @@ def _split_sparse(block: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
 
 def _symmetric_lu(A: sp.csc_matrix) -> sla.SuperLU:
     options = {"SymmetricMode": True}
-    return sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options=options)

@@ -12,7 +12,8 @@ from flexctrl.errors import LinearizationError
 from flexctrl.model.condense import Scaled, refuse_improper, scaled
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.massless import solved
-from flexctrl.model.modes import COMPLETE, Modes, modes_of, refuse_unsymmetric
+from flexctrl.model.modes import COMPLETE, ROUND_OFF, Modes, modes_of, refuse_unsymmetric
+from flexctrl.model.pattern import aligned, symmetric
 
 __all__ = ["ModalSystem", "Relaxation", "modal_damping", "modal_system", "proper", "rayleigh"]
 
@@ -95,9 +96,9 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
             f"a complete modal form of {len(linear.coordinates)} freedoms is too much; give modes(count) or "
             "reduce the model first"
         )
-    symmetric, skew = _split_stiffness(linear)
-    base = scaled(symmetric)
-    chosen = modes_of(symmetric, base, None) if modes is None else modes
+    even = _with_even_stiffness(linear)
+    base = scaled(even)
+    chosen = modes_of(even, base, None) if modes is None else modes
     direct = _static_response(base)
     feedthrough, jump = base.model.D + base.model.Cq @ direct, base.model.Cv @ direct
     fit = rayleigh(base.model)
@@ -107,7 +108,7 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
     else:
         damping = modal_damping(linear.C, chosen.shapes)
         relaxation = _relaxation(base, chosen, 0.0)
-    circulatory = chosen.shapes.T @ (skew @ chosen.shapes)
+    circulatory = _circulatory(linear, chosen.shapes)
     coupled = circulatory.any() or relaxation.drag.any() or relaxation.reaction.any()
     classical = not coupled and not np.any(damping - np.diag(np.diag(damping)))
     return ModalSystem(chosen, damping, circulatory, relaxation, feedthrough, jump, classical)
@@ -125,12 +126,9 @@ def rayleigh(model: LinearModel) -> tuple[float, float] | None:
     -------
     tuple of two floats, or None
     """
-    M, C, K = (sp.csc_matrix(A) for A in (model.M, model.C, model.K))
-    if not C.nnz or abs(C).max() == 0.0:
+    if not np.any(model.C.data):
         return 0.0, 0.0
-    union = sp.csc_matrix((abs(M) + abs(K) + abs(C)) != 0)
-    rows, cols = union.nonzero()
-    m, k, c = (np.asarray(A[rows, cols]).ravel() for A in (M, K, C))
+    m, c, k = (A.data for A in aligned(model.M, model.C, model.K))
     size = np.array([np.abs(m).max(initial=0.0) or 1.0, np.abs(k).max(initial=0.0) or 1.0])
     fit = np.linalg.lstsq(np.stack([m, k], axis=1) / size, c, rcond=None)[0] / size
     miss = np.abs(c - fit[0] * m - fit[1] * k)
@@ -160,19 +158,19 @@ def modal_damping(C: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
     return np.where(small, 0.0, full)
 
 
-def _split_stiffness(linear: LinearModel) -> tuple[LinearModel, sp.csc_matrix]:
-    """The model with K made symmetric, and the rest of K."""
-    skew = sp.csc_matrix(0.5 * (linear.K - linear.K.T))
-    if not skew.nnz or abs(skew).max() == 0.0:
-        return linear, sp.csc_matrix(skew.shape)
-    symmetric = replace(linear, K=sp.csc_matrix(0.5 * (linear.K + linear.K.T)))
-    base = scaled(symmetric)
-    s = sp.diags(base.scales)
-    if abs(s @ skew @ s).max() <= 1e-13 * abs(base.model.K).max():
-        return symmetric, sp.csc_matrix(skew.shape)
-    if base.massless.every.shape[1]:
-        refuse_unsymmetric(s @ linear.K @ s)
-    return symmetric, skew
+def _with_even_stiffness(linear: LinearModel) -> LinearModel:
+    """The model with K made symmetric."""
+    base = linear._scaled
+    if base.stiffness[1] > ROUND_OFF and base.massless.every.shape[1]:
+        refuse_unsymmetric(base)
+    return linear if base.stiffness[1] == 0.0 else replace(linear, K=symmetric(linear.K)[0])
+
+
+def _circulatory(linear: LinearModel, shapes: np.ndarray) -> np.ndarray:
+    """Φᵀ (K − Kᵀ) Φ / 2 where K is not symmetric."""
+    if linear._scaled.stiffness[1] <= ROUND_OFF:
+        return np.zeros((shapes.shape[1],) * 2)
+    return np.asarray(0.5 * shapes.T @ ((linear.K - linear.K.T) @ shapes))
 
 
 def _static_response(base: Scaled) -> np.ndarray:

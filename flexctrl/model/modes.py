@@ -12,9 +12,10 @@ import scipy.sparse as sp
 from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.model.basis import canonical, clusters
 from flexctrl.model.condense import Scaled, scaled, static_map
-from flexctrl.model.eigen import EPS, Eigenpairs, complete_pairs, lowest_pairs, stiffness_noise
+from flexctrl.model.eigen import EPS, Eigenpairs, complete_pairs, lowest_pairs
 from flexctrl.model.linear import LinearModel, Place
 from flexctrl.model.massless import STIFFNESS_RANK, null_split
+from flexctrl.model.parts import energies_by_part
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,6 +25,7 @@ __all__ = ["Modes", "modes"]
 DENSE = 300
 COMPLETE = 1000
 DEFAULT_COUNT = 20
+ROUND_OFF = 2e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +231,7 @@ def modes(linear: LinearModel, count: int | None = None) -> Modes:
     """
     base = scaled(linear)
     if linear.certificate is not None and linear.certificate.loads:
-        refuse_unsymmetric(base.model.K, 1e-13)
+        refuse_unsymmetric(base, ROUND_OFF)
     return modes_of(linear, base, count)
 
 
@@ -249,34 +251,36 @@ def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
     """
     n = len(linear.coordinates)
     _check_count(count)
-    refuse_unsymmetric(base.model.K)
+    refuse_unsymmetric(base)
+    K, M = base.stiffness[0], base.mass
     null = base.massless.every
     finite = n - null.shape[1]
     wanted = min(finite, count or (finite if n <= COMPLETE else DEFAULT_COUNT))
-    K, M = _symmetric(base.model.K) + _grounded(base), _symmetric(base.model.M)
+    if base.massless.relaxing.shape[1]:
+        K = sp.csc_matrix(K + _grounded(base))
     dense = n <= DENSE or wanted + 30 > finite // 2
     pairs = _complete(K, M, null) if dense else lowest_pairs(K, M, wanted)
-    return _described(linear, base, _settled_basis(base, K, pairs), wanted)
+    return _described(linear, base, _settled_basis(base, pairs), wanted)
 
 
 def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenpairs:
     """All pairs, the massless freedoms eliminated first."""
     if not null.shape[1]:
-        return complete_pairs(K, M)
+        return complete_pairs(K.toarray(), M.toarray())
     T, _ = static_map(K, null)
-    pairs = complete_pairs(sp.csc_matrix(T.T @ K @ T), sp.csc_matrix(T.T @ M @ T), origin=(K, T))
-    return Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid)
+    pairs = complete_pairs((T.T @ K @ T).toarray(), (T.T @ M @ T).toarray(), origin=(K, T))
+    return Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid, pairs.noise)
 
 
-def refuse_unsymmetric(K: sp.spmatrix, limit: float = 1e-9) -> None:
-    """Raise LinearizationError if K is not symmetric to a share of its largest entry (scaled).
+def refuse_unsymmetric(base: Scaled, limit: float = 1e-9) -> None:
+    """Raise LinearizationError if K is not symmetric to a share of its largest entry.
 
     Parameters
     ----------
-    K : sparse matrix, shape (n, n)
+    base : Scaled
     limit : float
     """
-    skew = abs(K - K.T).max() / max(abs(K).max(), np.finfo(float).tiny) if K.nnz else 0.0
+    skew = base.stiffness[1]
     if skew > limit:
         raise LinearizationError(
             f"K is not symmetric (relative difference {skew:.1e}; follower loads?): undamped modes do not "
@@ -289,37 +293,32 @@ def _check_count(count: int | None) -> None:
         raise StructureError(f"count = {count}: ask for at least one mode")
 
 
-def _symmetric(A: sp.csc_matrix) -> sp.csc_matrix:
-    return sp.csc_matrix(0.5 * (A + A.T))
-
-
 def _grounded(base: Scaled) -> sp.csc_matrix:
     """Unit stiffness on massless motions that only a damper holds; no mode moves them."""
     relaxing, K = base.massless.relaxing, base.model.K
-    if not relaxing.shape[1]:
-        return sp.csc_matrix(K.shape)
     creeping = relaxing @ null_split(relaxing.T @ K @ relaxing, STIFFNESS_RANK)[0]
     return sp.csc_matrix(creeping @ creeping.T)
 
 
-def _settled_basis(base: Scaled, K: sp.csc_matrix, pairs: Eigenpairs) -> Eigenpairs:
+def _settled_basis(base: Scaled, pairs: Eigenpairs) -> Eigenpairs:
     """Equal eigenvalues made equal, their vectors turned to the canonical basis."""
-    groups = clusters(pairs.values, pairs.rigid, 30.0 * stiffness_noise(K, pairs.shapes))
+    groups = clusters(pairs.values, pairs.rigid, 30.0 * pairs.noise)
     values = pairs.values.copy()
     for group in groups:
-        values[group] = values[group].mean()
-    damping = pairs.shapes.T @ (base.model.C @ pairs.shapes)
+        if group.stop - group.start > 1:
+            values[group] = values[group].mean()
     weight = np.sqrt(np.abs(base.model.M.diagonal()))
-    shapes = canonical(pairs.shapes, weight, damping, groups)
-    dust = np.abs(shapes) < 8.0 * EPS * np.abs(shapes).max(axis=0, initial=0.0)
-    return Eigenpairs(values, np.where(dust & pairs.rigid, 0.0, shapes), pairs.rigid)
+    shapes = canonical(pairs.shapes, weight, base.model.C, groups)
+    rigid = shapes[:, pairs.rigid]
+    rigid[np.abs(rigid) < 8.0 * EPS * np.abs(rigid).max(axis=0, initial=0.0)] = 0.0
+    shapes[:, pairs.rigid] = rigid
+    return replace(pairs, values=values, shapes=shapes)
 
 
 def _described(linear: LinearModel, base: Scaled, pairs: Eigenpairs, count: int) -> Modes:
     values, rigid = pairs.values[:count], pairs.rigid[:count]
     shapes = base.scales[:, None] * pairs.shapes[:, :count]
-    strain = {name: _energy(part.stiffness, shapes) for name, part in linear.parts.items()}
-    kinetic = {name: _energy(part.mass, shapes) for name, part in linear.parts.items()}
+    strain, kinetic = energies_by_part(linear.parts, shapes)
     return Modes(
         omega_squared=values,
         shapes=shapes,
@@ -333,21 +332,14 @@ def _described(linear: LinearModel, base: Scaled, pairs: Eigenpairs, count: int)
         coordinates=linear.coordinates,
         inputs=linear.inputs,
         outputs=linear.outputs,
-        strain_shares=_by_part({name: np.where(rigid, 0.0, e) for name, e in strain.items()}),
-        kinetic_shares=_by_part(kinetic),
+        strain_shares=dict(zip(linear.parts, _shares(np.where(rigid, 0.0, strain), axis=0), strict=True)),
+        kinetic_shares=dict(zip(linear.parts, _shares(kinetic, axis=0), strict=True)),
         place=linear.place,
     )
 
 
 def _energy(A: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
     return np.einsum("ij,ij->j", shapes, A @ shapes)
-
-
-def _by_part(energy: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    if not energy:
-        return {}
-    shares = _shares(np.array(list(energy.values())), axis=0)
-    return dict(zip(energy, shares, strict=True))
 
 
 def _shares(values: np.ndarray, axis: int) -> np.ndarray:

@@ -294,8 +294,8 @@ class Motion:
         """Return T (raw × n): raw rates from own rates."""
         if self.plain:
             return self._selection
-        linked = self.linkage.matrix_at(self._pose(state.x, state.R)) @ self._lead
-        return self._unlinked + self._spread @ sp.csr_matrix(linked)
+        linked = sp.csr_matrix(self.linkage.matrix_at(self._pose(state.x, state.R)))
+        return self._unlinked + self._spread @ linked @ self._lead
 
     @cached_property
     def _unlinked(self) -> sp.csr_matrix:
@@ -335,9 +335,12 @@ class Motion:
 
     def stiffening(self, state: State, raw: np.ndarray) -> np.ndarray:
         """Return ∂(Tᵀ F)/∂(own freedoms) under constant raw forces F, shape (n, n): the levers turn."""
-        pose, lead = self._pose(state.x, state.R), self._lead if self.n > DENSE_UP_TO else self._dense_lead
-        motion = self.linkage.matrix_at(pose)[: 6 * len(self.nodes)] @ lead
-        return lead.T @ (self.linkage.stiffening_at(pose, raw[self.linked_cells]) @ motion)
+        pose = self._pose(state.x, state.R)
+        motion = self.linkage.matrix_at(pose)[: 6 * len(self.nodes)]
+        own = self.linkage.stiffening_at(pose, raw[self.linked_cells]) @ motion
+        if self.n > DENSE_UP_TO:
+            return self._lead.T @ sp.csr_matrix(own) @ self._lead
+        return self._dense_lead.T @ own @ self._dense_lead
 
     def drift(self, state: State, v: np.ndarray, a: np.ndarray) -> tuple[sp.csr_matrix | np.ndarray, ...]:
         """Return how raw rates and accelerations change as levers turn.

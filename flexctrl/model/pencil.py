@@ -1,36 +1,62 @@
-"""K − σM, sparse, for many shifts σ: factors, Sylvester counts, inverse iteration, Lanczos."""
+"""K − σM for many shifts σ: factors, Sylvester counts, inverse iteration, block Lanczos."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
+from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
+from flexctrl.model.banded import Band, band_of
+from flexctrl.model.krylov import krylov
+from flexctrl.model.pattern import aligned
 
-__all__ = ["EPS", "HIDDEN", "SINGULAR", "Pencil", "ShiftedPencil", "stiffness_noise"]
+__all__ = [
+    "EPS",
+    "HIDDEN",
+    "SINGULAR",
+    "DensePencil",
+    "Pencil",
+    "ShiftedPencil",
+    "faint_shift",
+    "stiffness_noise",
+]
 
 EPS = float(np.finfo(float).eps)
 HIDDEN, SINGULAR = -1, -2
+TINY = 1e-12
+
+Matrix: TypeAlias = "np.ndarray | sp.csc_matrix"
 
 
-def stiffness_noise(K: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
+def stiffness_noise(K: Matrix, shapes: np.ndarray) -> np.ndarray:
     """Spread of φᵀ K φ when every entry of K carries its own rounding error.
 
     Parameters
     ----------
-    K : sparse matrix, shape (n, n)
+    K : array or sparse matrix, shape (n, n)
     shapes : numpy.ndarray, shape (n, k)
 
     Returns
     -------
     numpy.ndarray, shape (k,)
     """
+    return _noise(_squared(K), shapes)
+
+
+def _squared(K: Matrix) -> Matrix:
+    return K * K if isinstance(K, np.ndarray) else sp.csc_matrix((K.data**2, K.indices, K.indptr), K.shape)
+
+
+def _noise(squared: Matrix, shapes: np.ndarray) -> np.ndarray:
     squares = shapes * shapes
-    return EPS * np.sqrt(np.einsum("ij,ij->j", squares, abs(K).power(2) @ squares))
+    return EPS * np.sqrt(np.einsum("ij,ij->j", squares, squared @ squares))
 
 
 @dataclass(frozen=True)
@@ -39,24 +65,25 @@ class ShiftedPencil:
 
     Attributes
     ----------
-    K, M : scipy.sparse.csc_matrix, shape (n, n)
+    K, M : array or sparse matrix, shape (n, n)
     sigma : float
         (rad/s)².
-    lu : scipy.sparse.linalg.SuperLU
+    inverse : callable
+        rhs ↦ (K − σM)⁻¹ rhs.
     below : int
         How many λ lie under σ (Sylvester); HIDDEN if the pivoting does not tell.
     """
 
-    K: sp.csc_matrix
-    M: sp.csc_matrix
+    K: Matrix
+    M: Matrix
     sigma: float
-    lu: sla.SuperLU
+    inverse: Callable[[np.ndarray], np.ndarray]
     below: int
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """(K − σM)⁻¹ rhs with one step of refinement."""
-        x = self.lu.solve(rhs)
-        return x + self.lu.solve(rhs - self.K @ x + self.sigma * (self.M @ x))
+        x = self.inverse(rhs)
+        return x + self.inverse(rhs - self.K @ x + self.sigma * (self.M @ x))
 
     def iterate(self, x: np.ndarray) -> np.ndarray:
         """One step of inverse iteration."""
@@ -64,67 +91,34 @@ class ShiftedPencil:
 
     def ritz(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """One refined step of subspace iteration, and the pairs within the space; ascending when λ > σ."""
-        after = self.iterate(x)
-        theta, z = la.eigh(x.T @ (self.M @ after), x.T @ (self.M @ x))
+        image = self.M @ x
+        after = self.solve(image)
+        theta, z, _ = lapack.dsygvd(image.T @ after, x.T @ image)
         return self.sigma + 1.0 / theta[::-1], (after @ z / theta)[:, ::-1]
 
-    def lanczos(self, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        """The `count` pairs nearest to σ, which must lie under all of them; ascending."""
-        n = self.K.shape[0]
-        inverse = sla.LinearOperator((n, n), matvec=self.lu.solve, dtype=float)
-        start = self.iterate(np.random.default_rng(seed).standard_normal(n))
-        _, phi = sla.eigsh(
-            self.K, count, M=self.M, sigma=self.sigma, OPinv=inverse, v0=start, ncv=min(n, 2 * count + 20)
-        )
-        return self.ritz(phi)
+    def lanczos(self, start: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The `count` pairs nearest to σ, which must lie under all of them, and on to the next gap; ascending."""
+        return self.ritz(krylov(self.inverse, self.M, start, count))
 
 
 class Pencil:
-    """K − σM for many σ: both matrices on one sparsity pattern, so that shifting costs one addition.
+    """K − σM, sparse, for many σ: both matrices on one pattern, so that shifting costs one addition.
 
     Parameters
     ----------
-    K, M : sparse matrices, shape (n, n), symmetric
-    ordered : bool
-        The order of the coordinates is already one of little fill.
-    origin : tuple of two sparse matrices, optional
-        K₀ and T where K = Tᵀ K₀ T.
+    K, M : scipy.sparse.csc_matrix, shape (n, n), symmetric
     """
 
-    def __init__(
-        self,
-        K: sp.spmatrix,
-        M: sp.spmatrix,
-        ordered: bool = False,
-        origin: tuple[sp.csc_matrix, sp.csc_matrix] | None = None,
-    ) -> None:
-        k, m = sp.coo_matrix(K), sp.coo_matrix(M)
-        at = (np.concatenate([k.row, m.row]), np.concatenate([k.col, m.col]))
-        none_k, none_m = np.zeros_like(k.data, dtype=float), np.zeros_like(m.data, dtype=float)
-        self.K = sp.csc_matrix((np.concatenate([k.data, none_m]), at), shape=K.shape)
-        self.M = sp.csc_matrix((np.concatenate([none_k, m.data]), at), shape=K.shape)
-        self.spec = "NATURAL" if ordered else "MMD_AT_PLUS_A"
-        self.origin = origin
+    def __init__(self, K: sp.csc_matrix, M: sp.csc_matrix) -> None:
+        self.K, self.M = aligned(K, M)
+
+    @cached_property
+    def _squares(self) -> Matrix:
+        return _squared(self.K)
 
     def noise(self, shapes: np.ndarray) -> np.ndarray:
-        """Spread of φᵀ K φ by the rounding of the entries that K was made from."""
-        if self.origin is None:
-            return stiffness_noise(self.K, shapes)
-        K, T = self.origin
-        return stiffness_noise(K, T @ shapes)
-
-    def reordered(self) -> tuple[Pencil, np.ndarray]:
-        """The same in an order of little fill, found once; row i of it is row order[i] here."""
-        n = self.K.shape[0]
-        pattern = sp.csc_matrix((np.ones_like(self.K.data), self.K.indices, self.K.indptr), self.K.shape)
-        lu = sla.splu(
-            sp.csc_matrix(pattern + 2.0 * n * sp.identity(n, format="csc")),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-        order = np.argsort(lu.perm_c)
-        return Pencil(self.K[order][:, order], self.M[order][:, order], ordered=True), order
+        """Spread of φᵀ K φ by the rounding of the entries of K."""
+        return _noise(self._squares, shapes)
 
     def at(self, sigma: float) -> ShiftedPencil:
         """Factorise K − σM.
@@ -137,14 +131,27 @@ class Pencil:
         A = sp.csc_matrix((self.K.data - sigma * self.M.data, self.K.indices, self.K.indptr), self.K.shape)
         options = {"SymmetricMode": True}
         try:
-            lu = sla.splu(A, permc_spec=self.spec, diag_pivot_thresh=0.0, panel_size=1, options=options)
+            lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options=options)
         except RuntimeError as error:
             raise LinearizationError(
                 f"K - ({sigma:.3g}) M is singular: a freedom has neither mass nor stiffness; see audit()"
             ) from error
         hidden = (lu.perm_r != lu.perm_c).any()
         below = HIDDEN if hidden else int(np.count_nonzero(lu.U.diagonal() < 0))
-        return ShiftedPencil(self.K, self.M, sigma, lu, below)
+        return ShiftedPencil(self.K, self.M, sigma, lu.solve, below)
+
+    @cached_property
+    def _band(self) -> Band | None:
+        return band_of(self.K)
+
+    def _under(self, sigma: float) -> ShiftedPencil:
+        """As `at` for σ under all λ, in a band where that is narrow."""
+        if self._band is None:
+            return self.at(sigma)
+        factor = self._band.factorise(self.K.data - sigma * self.M.data)
+        if factor is None:
+            raise LinearizationError(f"K - ({sigma:.3g}) M is not positive definite")
+        return ShiftedPencil(self.K, self.M, sigma, factor.solve, 0)
 
     def below(self, sigma: float) -> int:
         """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell."""
@@ -153,22 +160,86 @@ class Pencil:
         except LinearizationError:
             return SINGULAR
 
-    def below_all(self, sigma: float) -> float:
-        """A shift at or under σ with no λ under it, and far enough from 0 to be seen beside K."""
-        for _ in range(60):
-            if self.below(sigma) in (0, HIDDEN):
-                return sigma
-            sigma *= 4.0
-        raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
+    def below_all(self, sigma: float) -> ShiftedPencil:
+        """Factors at or under σ with no λ under it, and far enough from 0 to be seen beside K."""
+        return _below_all(self._under, sigma)
 
-    def soft_scale(self) -> float:
-        """The first positive λ within a factor of 10, by Sturm counts; rigid ones look like the lowest decade."""
-        k, m = self.K.diagonal(), self.M.diagonal()
-        both = (k > 0) & (m > 0)
-        high = float((k[both] / m[both]).min()) if both.any() else 1.0
-        decades = [0, 15]
-        none = self.below(1e-15 * high)
-        while decades[1] - decades[0] > 1:
-            middle = sum(decades) // 2
-            decades[int(self.below(10.0**-middle * high) <= none)] = middle
-        return 10.0 ** -decades[0] * high
+
+class DensePencil:
+    """K − σM, dense, for many σ.
+
+    Parameters
+    ----------
+    K, M : numpy.ndarray, shape (n, n), symmetric
+    origin : tuple of two sparse matrices, optional
+        K₀ and T where K = Tᵀ K₀ T: rounding is judged by the entries of K₀.
+    """
+
+    def __init__(self, K: np.ndarray, M: np.ndarray, origin: tuple[Matrix, Matrix] | None = None) -> None:
+        self.K, self.M, self.origin = K, M, origin
+
+    def noise(self, shapes: np.ndarray) -> np.ndarray:
+        """Spread of φᵀ K φ by the rounding of the entries that K was made from."""
+        return _noise(self._squares, shapes if self.origin is None else self.origin[1] @ shapes)
+
+    @cached_property
+    def _squares(self) -> Matrix:
+        return _squared(self.K if self.origin is None else self.origin[0])
+
+    def at(self, sigma: float) -> ShiftedPencil:
+        """Factorise K − σM.
+
+        Raises
+        ------
+        LinearizationError
+            If it is not positive definite: σ is not under all λ.
+        """
+        factor, info = lapack.dpotrf(self.K - sigma * self.M, lower=1)
+        if info:
+            raise LinearizationError(f"K - ({sigma:.3g}) M is not positive definite")
+        return ShiftedPencil(self.K, self.M, sigma, lambda rhs: lapack.dpotrs(factor, rhs, lower=1)[0], 0)
+
+    def below_all(self, sigma: float) -> ShiftedPencil:
+        """Factors at or under σ with no λ under it."""
+        return _below_all(self.at, sigma)
+
+    def direct(self) -> tuple[np.ndarray, np.ndarray]:
+        """All λ and φ by the pencil (K, M), ascending: right at the high end.
+
+        Raises
+        ------
+        LinearizationError
+            If M is not positive definite.
+        """
+        values, shapes, info = lapack.dsygvd(self.K, self.M)
+        if info:
+            raise LinearizationError("the mass matrix is not positive definite on the freedoms kept")
+        return values, shapes
+
+
+def _below_all(at: Callable[[float], ShiftedPencil], sigma: float) -> ShiftedPencil:
+    for _ in range(60):
+        try:
+            shifted = at(sigma)
+        except LinearizationError:
+            shifted = None
+        if shifted is not None and shifted.below in (0, HIDDEN):
+            return shifted
+        sigma *= 4.0
+    raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
+
+
+def faint_shift(K: Matrix, M: Matrix) -> float:
+    """A negative σ so small that it is seen only where K has no stiffness at all.
+
+    Parameters
+    ----------
+    K, M : array or sparse matrix, shape (n, n)
+
+    Returns
+    -------
+    float
+    """
+    k, m = K.diagonal(), M.diagonal()
+    both = (k > 0) & (m > 0)
+    return -TINY * (float((k[both] / m[both]).min()) if both.any() else 1.0)

@@ -199,33 +199,43 @@ class _ModalSum:
         self.growth_squared = modes.growth**2
         self.still = _outer(modes.output_gain, modes.input_gain)
         self.moving = _outer(modes.output_rate_gain, modes.input_gain)
+        self.moves = bool(self.moving.any())
+        self.still_damped, self.moving_damped = damping[:, None] * self.still, damping[:, None] * self.moving
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Shape (N, n_outputs · n_inputs)."""
         if s.real.any():
             turning = s[:, None] ** 2 + self.values + self.damping * s[:, None]
             return _divided(self.still, self.moving, s, turning, "a mode")
+        result = np.empty((s.size, self.still.shape[1]), dtype=complex)
         # pieces that stay in the cache: three times faster than all at once
-        step = max(1, CACHED // max(1, self.values.size))
-        pieces = [self._on_the_axis(s.imag[i : i + step, None]) for i in range(0, s.size, step)]
-        return np.concatenate(pieces) if pieces else np.zeros((0, self.still.shape[1]), dtype=complex)
-
-    def _on_the_axis(self, omega: np.ndarray) -> np.ndarray:
-        # (ω_i - ω)(ω_i + ω) keeps the difference to a near pole that ω_i² - ω² would lose
-        real = self.omega - omega
-        real *= self.omega + omega
-        real -= self.growth_squared
-        imag = self.damping * omega
-        size = real * real
-        size += imag * imag
-        if not size.all():
-            return _divided(self.still, self.moving, 1j * omega[:, 0], real + 1j * imag, "a mode")
-        real /= size
-        imag /= size
-        result = real @ self.still - 1j * (imag @ self.still)
-        if self.moving.any():
-            result += omega * (imag @ self.moving + 1j * (real @ self.moving))
+        step = max(1, min(s.size, CACHED // max(1, self.values.size)))
+        room = np.empty((2, step, self.values.size))
+        for i in range(0, s.size, step):
+            piece = s.imag[i : i + step, None]
+            self._on_the_axis(piece, result[i : i + step], room[:, : len(piece)])
         return result
+
+    def _on_the_axis(self, omega: np.ndarray, result: np.ndarray, room: np.ndarray) -> None:
+        """With 1/(g + i d ω) = (g - i d ω)/(g² + d² ω²); g = (ω_i - ω)(ω_i + ω) keeps the difference to a near pole."""
+        gap, size = room
+        np.add(self.omega, omega, out=size)
+        np.subtract(self.omega, omega, out=gap)
+        gap *= size
+        gap -= self.growth_squared
+        np.multiply(self.damping, omega, out=size)
+        size *= size
+        size += gap * gap
+        if not size.all():
+            below = gap + 1j * self.damping * omega
+            result[:] = _divided(self.still, self.moving, 1j * omega[:, 0], below, "a mode")
+            return
+        np.reciprocal(size, out=size)
+        gap *= size
+        result.real, result.imag = gap @ self.still, -omega * (size @ self.still_damped)
+        if self.moves:
+            result.real += omega**2 * (size @ self.moving_damped)
+            result.imag += omega * (gap @ self.moving)
 
 
 def _divided(still: np.ndarray, moving: np.ndarray, s: np.ndarray, below: np.ndarray, who: str) -> np.ndarray:

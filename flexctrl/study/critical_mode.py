@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from flexctrl.design.controller import LinearController
 from flexctrl.model.linear import LinearModel
+from flexctrl.model.parts import energies_by_part
 from flexctrl.study.gain_family import Crossing, GainFamily
 
 __all__ = ["CriticalMode", "Origin", "critical_mode"]
@@ -117,6 +117,8 @@ def critical_mode(
     s, own = (_unfolded(value, modes.omega[best], dt) for value in (family.continuous(pole), own))
     shape, rate = _moved(linear, states)
     along = [(shape, rate)] if not dt else _within_sample(linear, law, dt, states, commands)
+    strain = energies_by_part(linear.parts, np.column_stack([q for q, _ in along]))[0].sum(axis=1)
+    kinetic = energies_by_part(linear.parts, np.column_stack([v for _, v in along]))[1].sum(axis=1)
     return CriticalMode(
         pole=s,
         frequency_hz=_frequency(s),
@@ -126,8 +128,8 @@ def critical_mode(
         shape=shape,
         rate=rate,
         controller_state=crossing.spectrum.shapes[len(family.states) :, crossing.pole],
-        strain_shares=_shares({k: sum(_energy(p.stiffness, q) for q, _ in along) for k, p in linear.parts.items()}),
-        kinetic_shares=_shares({k: sum(_energy(p.mass, v) for _, v in along) for k, p in linear.parts.items()}),
+        strain_shares=_shares(dict(zip(linear.parts, strain.tolist(), strict=True))),
+        kinetic_shares=_shares(dict(zip(linear.parts, kinetic.tolist(), strict=True))),
         origin=origin,
     )
 
@@ -164,10 +166,6 @@ def _unfolded(s: complex, near: float, dt: float) -> complex:
     folds = [sign * s.imag + k * turn for k in range(int(near / turn) + 2) for sign in (1.0, -1.0)]
     best = min(folds, key=lambda w: abs(w - near))
     return complex(s.real, best)
-
-
-def _energy(A: Any, x: np.ndarray) -> float:
-    return float((x.conj() @ (A @ x)).real)
 
 
 def _shares(energy: dict[str, float]) -> dict[str, float]:

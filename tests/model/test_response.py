@@ -38,7 +38,8 @@ def chain_response(n: int, beta: float, omega: np.ndarray) -> np.ndarray:
 def test_six_mass_chain_against_its_sine_sum():
     omega = np.geomspace(0.01, 3, 400)
     ours = s.six_mass_chain().frequency_response(omega).values[0, 0]
-    np.testing.assert_allclose(ours, chain_response(6, 0.02, omega), rtol=1e-11)
+    # beyond the last pole the terms of the sum cancel to 1e-5 of their size
+    np.testing.assert_allclose(ours, chain_response(6, 0.02, omega), rtol=3e-11)
 
 
 @pytest.mark.parametrize("omega", [0.05, 1.0, 4.0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +12,7 @@ from scipy.sparse.linalg import splu
 from flexctrl.errors import LinearizationError, ReductionError, did_you_mean
 from flexctrl.model.eigen import Eigenpairs, complete_pairs, coordinate_scales, lowest_pairs
 from flexctrl.model.linear import LinearModel
+from flexctrl.model.pattern import congruent
 from flexctrl.model.reduction.low_frequency import rigid_basis
 from flexctrl.model.reduction.result import ReducedModel, galerkin
 from flexctrl.model.reduction.selection import BelowFrequency
@@ -123,11 +124,11 @@ def _chosen(pairs: Eigenpairs, choice: int | BelowFrequency) -> int:
 
 def _piece_modes(K: sp.csr_matrix, M: sp.csr_matrix, choice: int | BelowFrequency) -> Eigenpairs:
     """Enough of the lowest pairs of one piece, in its own coordinates; at least one, to see rigid motion."""
-    S = sp.diags(coordinate_scales(M, 0 * M, K))
-    k, m = sp.csc_matrix(S @ K @ S), sp.csc_matrix(S @ M @ S)
+    s = coordinate_scales(M, 0 * M, K)
+    k, m = congruent(s, K, M)
     n = k.shape[0]
     if n <= DENSE:
-        pairs = complete_pairs(k, m)
+        pairs = complete_pairs(k.toarray(), m.toarray())
     else:
         wanted = choice if isinstance(choice, int) else 20
         pairs = lowest_pairs(k, m, max(wanted, 1))
@@ -136,4 +137,4 @@ def _piece_modes(K: sp.csr_matrix, M: sp.csr_matrix, choice: int | BelowFrequenc
         ):
             wanted *= 2
             pairs = lowest_pairs(k, m, wanted)
-    return Eigenpairs(pairs.values, S @ pairs.shapes, pairs.rigid)
+    return replace(pairs, shapes=s[:, None] * pairs.shapes)

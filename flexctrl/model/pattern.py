@@ -1,0 +1,108 @@
+"""Sparse matrices on one common pattern, so that sums of them are sums of their entries."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+__all__ = ["aligned", "congruent", "symmetric"]
+
+
+def aligned(*matrices: sp.spmatrix) -> tuple[sp.csc_matrix, ...]:
+    """The same matrices, each with explicit zeros wherever another has an entry.
+
+    Parameters
+    ----------
+    *matrices : sparse matrices, shape (n, m)
+
+    Returns
+    -------
+    tuple of scipy.sparse.csc_matrix
+        Their entries stand in the same order.
+    """
+    given = tuple(_canonical(A) for A in matrices)
+    widest = max(given, key=lambda A: A.nnz)
+    spread = [_spread(A, widest) for A in given]
+    if all(A is not None for A in spread):
+        return tuple(A for A in spread if A is not None)
+    union = _union(given)
+    return tuple(A for A in (_spread(A, union) for A in given) if A is not None)
+
+
+def congruent(scale: np.ndarray, *matrices: sp.spmatrix) -> tuple[sp.csc_matrix, ...]:
+    """S A S for diagonal S and each A, all on one pattern.
+
+    Parameters
+    ----------
+    scale : numpy.ndarray, shape (n,)
+    *matrices : sparse matrices, shape (n, n)
+
+    Returns
+    -------
+    tuple of scipy.sparse.csc_matrix
+    """
+    given = aligned(*matrices)
+    pattern = given[0]
+    factor = scale[pattern.indices] * np.repeat(scale, np.diff(pattern.indptr))
+    return tuple(sp.csc_matrix((A.data * factor, pattern.indices, pattern.indptr), A.shape) for A in given)
+
+
+def symmetric(A: sp.csc_matrix) -> tuple[sp.csc_matrix, float]:
+    """½ (A + Aᵀ), and the largest entry of A − Aᵀ.
+
+    Parameters
+    ----------
+    A : scipy.sparse.csc_matrix, shape (n, n)
+
+    Returns
+    -------
+    scipy.sparse.csc_matrix, shape (n, n)
+    float
+    """
+    A, T = aligned(A, A.T)
+    gap = float(np.abs(A.data - T.data).max(initial=0.0))
+    if gap == 0.0:
+        return A, gap
+    return sp.csc_matrix((0.5 * (A.data + T.data), A.indices, A.indptr), A.shape), gap
+
+
+def _columns(A: sp.spmatrix) -> sp.csc_matrix:
+    return A if isinstance(A, sp.csc_matrix) else sp.csc_matrix(A)
+
+
+def _canonical(A: sp.spmatrix) -> sp.csc_matrix:
+    A = _columns(A)
+    if not A.has_canonical_format:
+        A = A.copy()
+        A.sum_duplicates()
+    return A
+
+
+def _same_pattern(A: sp.csc_matrix, B: sp.csc_matrix) -> bool:
+    return A.nnz == B.nnz and np.array_equal(A.indptr, B.indptr) and np.array_equal(A.indices, B.indices)
+
+
+def _keys(A: sp.csc_matrix) -> np.ndarray:
+    columns = np.repeat(np.arange(A.shape[1], dtype=np.int64), np.diff(A.indptr))
+    return columns * A.shape[0] + A.indices
+
+
+def _union(given: tuple[sp.csc_matrix, ...]) -> sp.csc_matrix:
+    """A matrix with an entry wherever one of them has one."""
+    rows, columns = given[0].shape
+    keys = np.unique(np.concatenate([_keys(A) for A in given]))
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(keys // rows, minlength=columns))]).astype(np.int32)
+    return sp.csc_matrix((np.zeros(keys.size), (keys % rows).astype(np.int32), indptr), given[0].shape)
+
+
+def _spread(A: sp.csc_matrix, pattern: sp.csc_matrix) -> sp.csc_matrix | None:
+    """A with the entries of a wider pattern; None if it has others."""
+    if _same_pattern(A, pattern):
+        return A
+    keys, wide = _keys(A), _keys(pattern)
+    places = np.searchsorted(wide, keys)
+    if not np.array_equal(wide[np.minimum(places, wide.size - 1)], keys):
+        return None
+    data = np.zeros(wide.size, dtype=A.dtype)
+    data[places] = A.data
+    return sp.csc_matrix((data, pattern.indices, pattern.indptr), A.shape)
