@@ -6,14 +6,14 @@ For each: the critical gain, and where the mode lives that gives way. The second
 nonlinear simulation just below and above its critical gain. The crane's data are assumed (see
 ``flexctrl.cranes.bridge_crane``).
 
-    python examples/spillover.py results
+    python examples/spillover.py --out results
 
-prints the certificates and draws ``results/spillover.png``.
+prints the certificates and draws ``spillover.png``.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import flexctrl as fc
@@ -70,9 +70,11 @@ def main(out: Path | None = None) -> dict[str, fc.Spillover]:
     # [/certificates]
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        found["PD on the trolley"].plot(confirmation).savefig(out / "spillover.png", dpi=130)
+        found["PD on the trolley"].plot(confirmation).savefig(out / "spillover.png", dpi=90)
     return found
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    parser = argparse.ArgumentParser(description="Spillover certificates of three regulators on a bridge crane.")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="directory for the picture")
+    main(parser.parse_args().out)

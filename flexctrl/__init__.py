@@ -109,6 +109,7 @@ _HOMES = {
     "flexctrl.plots.loops": ("plot_nichols", "plot_nyquist", "plot_sensitivities"),
     "flexctrl.plots.root_locus": ("plot_root_locus",),
     "flexctrl.plots.reduction": ("plot_reduction",),
+    "flexctrl.plots.envelope": ("plot_envelope",),
     "flexctrl.scene": ("Scene", "Simulation", "Start", "load_scene"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

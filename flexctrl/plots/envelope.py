@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
 from flexctrl.study.envelope import Envelope
 
-__all__ = ["compared_curves", "envelope_figure", "error_curve"]
+__all__ = ["compared_curves", "envelope_figure", "plot_envelope"]
 
 
 def envelope_figure(envelope: Envelope) -> Figure:
@@ -26,25 +26,27 @@ def envelope_figure(envelope: Envelope) -> Figure:
     panels = 2 if envelope.last.t.size else 1
     figure = new_figure(5.0 * panels, 3.6)
     axes = np.atleast_1d(figure.subplots(1, panels))
-    error_curve(axes[0], envelope)
+    plot_envelope(envelope, axes[0])
     if panels > 1:
         compared_curves(axes[1], envelope)
     figure.suptitle(str(envelope), fontsize=9, color=INK, wrap=True)
     return figure
 
 
-def error_curve(ax: Axes, envelope: Envelope) -> Axes:
+def plot_envelope(envelope: Envelope, ax: Axes | None = None) -> Axes:
     """Draw the error of the linear prediction over the amplitude.
 
     Parameters
     ----------
-    ax : matplotlib.axes.Axes
     envelope : Envelope
+    ax : matplotlib.axes.Axes, optional
+        Drawn into; a new figure if left out.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = new_figure(6.0, 4.0).subplots() if ax is None else ax
     finite = [tried for tried in envelope.trials if np.isfinite(tried.error) and tried.error > 0.0]
     ax.loglog([x.amplitude for x in finite], [100.0 * x.error for x in finite], "o-", color=FLEXIBLE, markersize=3)
     ax.axhline(100.0 * envelope.error, color=RIGID, linewidth=1.0)

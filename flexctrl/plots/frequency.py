@@ -171,4 +171,8 @@ def _phase_ticks(ax: Axes) -> MultipleLocator:
 
 
 def line_style(number: int) -> dict[str, Any]:
-    return {"color": CYCLE[number % len(CYCLE)], "linewidth": 1.4}
+    return {
+        "color": CYCLE[number % len(CYCLE)],
+        "linewidth": 1.4,
+        "linestyle": ("-", "--", ":")[number // len(CYCLE) % 3],
+    }

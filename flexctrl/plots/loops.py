@@ -161,7 +161,8 @@ def plot_sensitivities(loops: Mapping[str, Loop], ax: Axes | None = None, *, mar
         omega, L = loop_grid(loop)
         prefix = f"{label}: " if len(loops) > 1 else ""
         ax.plot(omega / HZ, _decibel(1 / (1 + L)), label=f"{prefix}|S|", **line_style(number))
-        ax.plot(omega / HZ, _decibel(L / (1 + L)), "--", label=f"{prefix}|T|", **line_style(number))
+        dashed = line_style(number) | {"linestyle": "--"}
+        ax.plot(omega / HZ, _decibel(L / (1 + L)), label=f"{prefix}|T|", **dashed)
     for name, peak in (("Ms", margins.sensitivity), ("Mt", margins.complementary)) if margins else ():
         if np.isfinite(peak.value):
             at = peak.omega / HZ, 20 * np.log10(peak.value)

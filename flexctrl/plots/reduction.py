@@ -40,7 +40,7 @@ def plot_reduction(
     full = next(iter(several.values())).full
     response = full.frequency_response()
     exact, hertz = channel_values(response, channel), response.omega / HZ
-    ax.loglog(hertz, abs(exact), label=f"full, {len(full.coordinates)} coordinates", **line_style(7))
+    ax.loglog(hertz, abs(exact), label=f"full, {len(full.coordinates)} coordinates", color=INK, linewidth=2.2)
     least = _FLOOR * abs(exact).max()
     bottom = float(abs(exact).min())
     for number, (label, one) in enumerate(several.items()):
@@ -48,7 +48,7 @@ def plot_reduction(
         if isinstance(reduced, Reduced):
             ax.loglog(hertz, abs(mine), label=f"reduced, order {one.order}", **line_style(0))
         gap = np.maximum(abs(exact - mine), least)
-        ax.loglog(hertz, gap, label=label, **line_style(number + 1))
+        ax.loglog(hertz, gap, label=label, **line_style(number + isinstance(reduced, Reduced)))
         bottom = min(bottom, float(np.quantile(gap, 0.02)))
     ax.set_ylim(bottom=max(least, 0.3 * bottom))
     tidy(ax).set(xlabel="frequency (Hz)", ylabel="magnitude")

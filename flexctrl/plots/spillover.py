@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed
+from flexctrl.plots.modes import mode_pose
 from flexctrl.plots.style import FLEXIBLE, INK, PALE, RIGID, new_figure, tidy
 from flexctrl.study.confirm import Confirmation
 from flexctrl.study.critical_mode import CriticalMode
@@ -30,15 +33,24 @@ def spillover_figure(certificate: Spillover, confirmation: Confirmation | None =
     -------
     matplotlib.figure.Figure
     """
-    panels = 1 + (certificate.mode is not None) + (confirmation is not None)
-    figure = new_figure(4.4 * panels, 3.8)
-    axes = list(np.atleast_1d(figure.subplots(1, panels)))
-    gain_curve(axes.pop(0), certificate)
-    if certificate.mode is not None:
-        energy_bars(axes.pop(0), certificate.mode)
+    place, mode = certificate.linear.place, certificate.mode
+    panels = 1 + (mode is not None) + (confirmation is not None) + (mode is not None and place is not None)
+    rows, columns = {1: (1, 1), 2: (1, 2), 3: (1, 3), 4: (2, 2)}[panels]
+    figure = new_figure(5.4 * columns, 3.9 * rows + 0.4)
+    figure.set_layout_engine(None)  # the one that aligns axes gives up on those in space
+    figure.subplots_adjust(0.09, 0.16 / rows, 0.97, 1.0 - 0.18 / rows, wspace=0.36, hspace=0.3)
+    gain_curve(figure.add_subplot(rows, columns, 1), certificate)
+    if mode is not None:
+        energy_bars(figure.add_subplot(rows, columns, 2), mode)
     if confirmation is not None:
-        growth_curves(axes.pop(0), confirmation)
-    figure.suptitle(str(certificate).splitlines()[0], fontsize=10, color=INK, wrap=True)
+        growth_curves(figure.add_subplot(rows, columns, 3), confirmation)
+    if mode is not None and place is not None:
+        pose = mode_pose(place, _largest_moment(mode.shape))
+        ax = add_machine_axes(figure, place.model.structure, (pose,), (rows, columns, panels))
+        plane = best_plane(place.model.structure, (pose,))
+        draw_deformed(ax, place.model.structure, pose, FLEXIBLE, label="the critical mode", plane=plane)
+    title = textwrap.fill(str(certificate).splitlines()[0], 62 * columns)
+    figure.suptitle(title, fontsize=10, color=INK)
     return figure
 
 
@@ -57,6 +69,12 @@ def confirmation_figure(confirmation: Confirmation) -> Figure:
     growth_curves(figure.subplots(), confirmation)
     figure.suptitle(str(confirmation).splitlines()[0], fontsize=9, color=INK, wrap=True)
     return figure
+
+
+def _largest_moment(shape: np.ndarray) -> np.ndarray:
+    """A complex shape at the instant at which it is most displaced."""
+    turn = np.exp(-0.5j * np.angle(np.sum(shape**2)))
+    return np.asarray((turn * shape).real)
 
 
 def gain_curve(ax: Axes, certificate: Spillover) -> Axes:

@@ -293,7 +293,8 @@ def test_nonlinear_runs_confirm_the_gain_of_a_sampled_controller():
 
 def test_picture(certificate):
     found, confirmed = certificate
-    curve, bars, growth = found.plot(confirmed).axes
+    curve, bars, growth, shape = found.plot(confirmed).axes
+    assert shape.get_title() == "the critical mode"
     assert curve.get_xlabel() == "gain over the controller's own"
     assert next(label.get_text() for label in bars.get_yticklabels()) == "mast"
     assert len(growth.lines) == 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import block_diag, eigvals, schur, solve_sylvester
@@ -10,7 +11,7 @@ from scipy.linalg import block_diag, eigvals, schur, solve_sylvester
 from flexctrl.errors import ReductionError
 from flexctrl.model.linear import LinearModel
 from flexctrl.model.modes import COMPLETE, Modes
-from flexctrl.model.reduction.gramian import balance
+from flexctrl.model.reduction.gramian import Balanced, balance
 from flexctrl.model.reduction.low_frequency import low_frequency, undamped
 from flexctrl.model.reduction.modal import modal_model
 from flexctrl.model.reduction.states import ReducedStates, Triple
@@ -62,7 +63,7 @@ class BalancedTruncation:
         ReductionError
             If the order does not even hold the states that cannot be balanced.
         """
-        exact, stable, feedthrough = _split(full, POOL * self.order)
+        exact, stable, feedthrough, bases = _balanced(full, 0 if _complete(full) else POOL * self.order)
         kept = len(exact.A)
         if self.order < max(kept, 1):
             raise ReductionError(
@@ -70,10 +71,10 @@ class BalancedTruncation:
                 f"cannot be balanced and are kept: ask for at least {kept}, or add damping"
             )
         room = self.order - kept
-        small, hankel, direct = _truncated(stable, room, self.match_dc)
-        tail = 2.0 * hankel[len(small.A) :].sum() if len(full.coordinates) <= COMPLETE else np.inf
+        small, direct = _truncated(stable, bases, room, self.match_dc)
+        tail = 2.0 * bases.hankel[len(small.A) :].sum() if _complete(full) else np.inf
         bound = np.full(full.D.shape, tail)
-        return ReducedStates(full, self, _joined(exact, small), feedthrough + direct, kept, hankel, bound)
+        return ReducedStates(full, self, _joined(exact, small), feedthrough + direct, kept, bases.hankel, bound)
 
 
 def hankel_singular_values(linear: LinearModel) -> np.ndarray:
@@ -88,25 +89,36 @@ def hankel_singular_values(linear: LinearModel) -> np.ndarray:
     numpy.ndarray
         Their units mix those of the signals: scale inputs and outputs before comparing channels.
     """
-    stable = _split(linear.condense(), COMPLETE)[1]
-    return balance(stable.A, stable.B, stable.C, 0).hankel
+    full = linear.condense()
+    return _balanced(full, 0 if _complete(full) else COMPLETE)[3].hankel
 
 
-def _truncated(stable: Triple, room: int, match_dc: bool) -> tuple[Triple, np.ndarray, np.ndarray]:
-    """The leading ``room`` balanced states, all Hankel values, and the feedthrough of the rest."""
-    n = len(stable.A) if match_dc else room
-    bases = balance(stable.A, stable.B, stable.C, n)
-    A, B, C = bases.left.T @ stable.A @ bases.right, bases.left.T @ stable.B, stable.C @ bases.right
+def _complete(full: LinearModel) -> bool:
+    return len(full.coordinates) <= COMPLETE
+
+
+@lru_cache(maxsize=1)
+def _balanced(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray, Balanced]:
+    """The model split and its stable part balanced: the same for every order that a search tries."""
+    exact, stable, feedthrough = _split(full, pool)
+    return exact, stable, feedthrough, balance(stable.A, stable.B, stable.C, len(stable.A))
+
+
+def _truncated(stable: Triple, bases: Balanced, room: int, match_dc: bool) -> tuple[Triple, np.ndarray]:
+    """The leading ``room`` balanced states, and the feedthrough of the rest."""
+    n = None if match_dc else room
+    left, right = bases.left[:, :n], bases.right[:, :n]
+    A, B, C = left.T @ stable.A @ right, left.T @ stable.B, stable.C @ right
     none = np.zeros((len(stable.C), stable.B.shape[1]))
     if len(A) <= room:
-        return Triple(A, B, C), bases.hankel, none
+        return Triple(A, B, C), none
     fast = np.linalg.inv(A[room:, room:])
     slow = Triple(
         A[:room, :room] - A[:room, room:] @ fast @ A[room:, :room],
         B[:room] - A[:room, room:] @ fast @ B[room:],
         C[:, :room] - C[:, room:] @ fast @ A[room:, :room],
     )
-    return slow, bases.hankel, -C[:, room:] @ fast @ B[room:]
+    return slow, -C[:, room:] @ fast @ B[room:]
 
 
 def _split(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray]:
