@@ -15,9 +15,8 @@ from flexctrl.model.solve import Plan, Solve, factorise, plan
 
 __all__ = ["Masses"]
 
-_EXACT = 1e-13
+_EXACT = 1e-12
 _MASSLESS = 1e-14
-_GOOD = 0.2
 _SWEEPS = 12
 
 
@@ -66,27 +65,36 @@ class Masses:
         self.made_at = state
 
     def accelerations(self, state: State, u: np.ndarray, guess: np.ndarray) -> np.ndarray:
-        """Return the accelerations of a state under its inputs.
-
-        The equations are checked with the factors in use; where those are no longer good they are made anew.
-        """
+        """Return the accelerations of a state under its inputs."""
         loads = self.model.loads(state, u)
         return self.solve(lambda a: -self.model.balance(state, state.v, a) - loads, state, guess)
 
     def solve(self, gap: Callable[[np.ndarray], np.ndarray], state: State, guess: np.ndarray) -> np.ndarray:
-        """Return the root of what has the mass matrix of a state as its slope."""
-        value, last = guess, np.inf
+        """Return the root of what is linear with the mass matrix of a state as its slope.
+
+        Conjugate gradients with the factors in use; where these are far from the masses here, new ones are made.
+        """
         if self._solve is None:
             self.make(state)
-        for _ in range(_SWEEPS):
-            assert self._solve is not None
-            change = self._solve(gap(value))
-            value = value + change
-            size = float(np.abs(change).max(initial=0.0))
-            if size <= _EXACT * float(np.abs(value).max(initial=0.0)):
-                return value
-            if size > _GOOD * last:
-                self.make(state)
-                size = np.inf
-            last = size
-        return value
+        value, done = self._conjugate(gap, guess, _SWEEPS)
+        if done:
+            return value
+        self.make(state)
+        return self._conjugate(gap, value, _SWEEPS)[0]
+
+    def _conjugate(
+        self, gap: Callable[[np.ndarray], np.ndarray], guess: np.ndarray, sweeps: int
+    ) -> tuple[np.ndarray, bool]:
+        assert self._solve is not None
+        value, start = guess, gap(guess)
+        residual, direction, power = -start, np.zeros_like(guess), np.inf
+        for _ in range(sweeps):
+            change = -self._solve(residual)
+            if float(np.abs(change).max(initial=0.0)) <= _EXACT * float(np.abs(value + change).max(initial=0.0)):
+                return value + change, True
+            before, power = power, float(residual @ change)
+            direction = change + (power / before) * direction
+            pushed = gap(guess + direction) - start
+            share = power / float(direction @ pushed)
+            value, residual = value + share * direction, residual - share * pushed
+        return value, False
