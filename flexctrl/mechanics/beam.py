@@ -301,14 +301,21 @@ def strain_energy(m: BeamMotion) -> ca.SX:
     return 0.5 * ca.dot(d, stiffened(m, d))
 
 
+def deformation_rates(m: BeamMotion) -> ca.SX:
+    """Return the rates of stretch, θ₁ and θ₂."""
+    import casadi as ca
+
+    # the rate of a rotation vector is T⁻¹ times the relative spin; T⁻¹(θ) = T⁻ᵀ(−θ)
+    turning = [inverse_tangent(-t, m.rates[k] - m.spin) for t, k in zip(m.theta, (1, 3), strict=True)]
+    return ca.vertcat((m.rates[2] - m.rates[0])[0], *turning)
+
+
 def viscous_force(m: BeamMotion) -> BeamForce:
     """Return −K_e ḋ, the force of a damping equal to the stiffness on the rates of deformation."""
     import casadi as ca
 
-    relative = [m.rates[1] - m.spin, m.rates[3] - m.spin]
-    # ḋ of a rotation vector is T⁻¹ times the relative spin; T⁻¹(θ) = T⁻ᵀ(−θ)
-    (x1, y1, z1), (x2, y2, z2) = (_components(inverse_tangent(-t, r)) for t, r in zip(m.theta, relative, strict=True))
-    d = ca.vertcat((m.rates[2] - m.rates[0])[0], x2 - x1, y1, y2, z1, z2)
+    stretching, x1, y1, z1, x2, y2, z2 = ca.vertsplit(deformation_rates(m))
+    d = ca.vertcat(stretching, x2 - x1, y1, y2, z1, z2)
     N, torque, y1, y2, z1, z2 = ca.vertsplit(stiffened(m, d))
     return BeamForce(-ca.vertcat(N, -torque, y1, z1, torque, y2, z2), ca.SX(3, 1), ca.SX(12, 1))
 

@@ -9,7 +9,7 @@ Newton method (Magisano, Leonetti & Garcea 2017). The equations and their soluti
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,8 @@ import numpy as np
 
 from flexctrl.effects.effect import Effect
 from flexctrl.mechanics import beam, pieces
-from flexctrl.mechanics.kernel import Kernel, Run
+from flexctrl.mechanics.beam_tangent import beam_slope
+from flexctrl.mechanics.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.model import kinds
 from flexctrl.model.kinds import Kind
 from flexctrl.model.motion import State
@@ -28,72 +29,99 @@ if TYPE_CHECKING:
     from flexctrl.model.families import Family
     from flexctrl.model.forces import Forces
 
-Elastic = Callable[..., tuple["ca.SX", Callable[["ca.SX"], "ca.SX"]]]
-"""(effects, node motions, parameters) → stresses, and the raw force of given stresses."""
+_FEW = 64
+"""Pieces up to which the virtual machine runs a kernel sooner than it could be compiled."""
 
 
-def _beam(effects: tuple[Effect, ...], nodes: list, parameters: ca.SX) -> tuple:
+@dataclass(frozen=True)
+class _Elastic:
+    """How a kind of piece strains: how many stresses it has, and its two kernels' outputs.
+
+    ``stress`` gives the stresses, then what the increment in the velocity slots adds to them in first order;
+    ``geometric`` the slope of the raw force of given stresses, and that force.
+    """
+
+    count: int
+    stress: Callable[[Kind, tuple[Effect, ...], ca.SX, ca.SX], ca.SX]
+    geometric: Callable[[Kind, tuple[Effect, ...], ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]]
+
+
+def _beam_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX) -> ca.SX:
     import casadi as ca
 
-    m = beam.beam_motion(nodes[0], nodes[1], parameters)
-    stress = sum((e.beam_stress(m) for e in effects), ca.SX(6, 1))
-    return stress, lambda s: beam.nodal_force(m, beam.stress_force(m, s))
+    first, second = kinds.moved(kind, symbols, ca.SX(kind.width, 1), ca.SX(3, 1))
+    m = beam.beam_motion(first, second, parameters)
+    seen, now = ca.SX.sym("seen", 7), ca.vertcat(m.stretch, *m.theta)
+    local = replace(m, stretch=seen[0], theta=(seen[1:4], seen[4:7]))
+    stress = sum((e.beam_stress(local) for e in effects), ca.SX(6, 1))
+    change = ca.jtimes(stress, seen, beam.deformation_rates(m))
+    return ca.substitute(ca.vertcat(stress, change), seen, now)
 
 
-def _spring(effects: tuple[Effect, ...], nodes: list, parameters: ca.SX) -> tuple:
-    m = pieces.line_motion(nodes[0], nodes[1], parameters)
-    return kinds.spring_pull(effects, m), lambda s: pieces.line_force(m, s)
+def _beam_geometric(
+    kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX, stress: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    import casadi as ca
+
+    first, second = _still(kind, symbols, ca.SX(kind.width, 1))
+    slope = beam_slope(first, second, parameters, ca.SX([1, 0, 0]), lambda m: beam.stress_force(m, stress))
+    m = beam.beam_motion(first, second, parameters)
+    return slope, beam.nodal_force(m, beam.stress_force(m, stress))
 
 
-def _rope(effects: tuple[Effect, ...], nodes: list, parameters: ca.SX) -> tuple:
-    m = pieces.line_motion(nodes[0], nodes[1], parameters)
-    return kinds.rope_pull(effects, m), lambda s: pieces.line_force(m, s)
+def _line_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX) -> ca.SX:
+    import casadi as ca
+
+    pull = kinds.spring_pull if kind is kinds.SPRING else kinds.rope_pull
+    increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
+    first, second = _still(kind, symbols, increment)
+    stress = pull(effects, pieces.line_motion(first, second, parameters))
+    step = ca.vertcat(*[_rates(symbols, i)[: kind.freedoms] for i in range(kind.nodes)])
+    return ca.substitute(ca.vertcat(stress, ca.jtimes(stress, increment, step)), increment, zero)
 
 
-_ELASTIC: dict[Kind, tuple[int, Elastic]] = {
-    kinds.BEAM: (6, _beam),
-    kinds.SHEARING_BEAM: (6, _beam),
-    kinds.SPRING: (1, _spring),
-    kinds.ROPE: (1, _rope),
-}
-"""Kinds that strain, with the number of their stresses."""
+def _line_geometric(
+    kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX, stress: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    import casadi as ca
+
+    increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
+    first, second = _still(kind, symbols, increment)
+    force = pieces.line_force(pieces.line_motion(first, second, parameters), stress)
+    return ca.substitute(ca.jacobian(force, increment), increment, zero), ca.substitute(force, increment, zero)
+
+
+_BEAM, _LINE = _Elastic(6, _beam_stress, _beam_geometric), _Elastic(1, _line_stress, _line_geometric)
+_ELASTIC = {kinds.BEAM: _BEAM, kinds.SHEARING_BEAM: _BEAM, kinds.SPRING: _LINE, kinds.ROPE: _LINE}
+"""The kinds that strain."""
 
 
 @cache
 def _stress_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
-    """Stresses, then what they become to first order under the increment in the velocity slots."""
     import casadi as ca
 
     symbols, parameters = kinds.symbols_of(kind)
-    increment = ca.SX.sym("increment", kind.width)
-    stress, _ = _ELASTIC[kind][1](effects, _nodes(kind, symbols, increment), parameters)
-    step = ca.vertcat(*[_rates(symbols, i)[: kind.freedoms] for i in range(kind.nodes)])
-    zero = ca.SX.zeros(kind.width)
-    change = ca.substitute(ca.jtimes(stress, increment, step), increment, zero)
-    outputs = ca.vertcat(ca.substitute(stress, increment, zero), change)
+    outputs = _ELASTIC[kind].stress(kind, effects, symbols, parameters)
     return Kernel(f"{kind.name}_stress", symbols, parameters, ca.cse(ca.densify(outputs)))
 
 
 @cache
 def _geometric_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
-    """The slope of the force of given stresses, column by column, then that force."""
+    """The slope column by column, then the force."""
     import casadi as ca
 
-    count, elastic = _ELASTIC[kind]
     symbols, parameters = kinds.symbols_of(kind)
-    increment, stress = ca.SX.sym("increment", kind.width), ca.SX.sym("stress", count)
-    _, push = elastic(effects, _nodes(kind, symbols, increment), parameters)
-    force = ca.cse(push(stress))
-    both = ca.vertcat(ca.vec(ca.densify(ca.jacobian(force, increment))), force)
-    both = ca.substitute(both, increment, ca.SX.zeros(kind.width))
-    return Kernel(f"{kind.name}_geometric", ca.vertcat(symbols, stress), parameters, ca.cse(ca.densify(both)))
+    stress = ca.SX.sym("stress", _ELASTIC[kind].count)
+    slope, force = _ELASTIC[kind].geometric(kind, effects, symbols, parameters, stress)
+    outputs = ca.cse(ca.vertcat(ca.vec(ca.densify(slope)), ca.densify(force)))
+    return Kernel(f"{kind.name}_geometric", ca.vertcat(symbols, stress), parameters, outputs)
 
 
 def _rates(symbols: ca.SX, node: int) -> ca.SX:
     return symbols[kinds.NODE_SLOT * node + 12 : kinds.NODE_SLOT * node + 18]
 
 
-def _nodes(kind: Kind, symbols: ca.SX, increment: ca.SX) -> list:
+def _still(kind: Kind, symbols: ca.SX, increment: ca.SX) -> list:
     """The nodes displaced, without rates: the velocity slots hold a step here."""
     import casadi as ca
 
@@ -172,18 +200,22 @@ class Mixed:
         """Where the stresses of each family stand."""
         found, start = [], 0
         for f in self._families:
-            size = _ELASTIC[f.kernels.kind][0]
+            size = _ELASTIC[f.kernels.kind].count
             found.append(start + np.arange(f.count * size).reshape(f.count, size))
             start += f.count * size
         return found
 
+    def _backend(self, family: Family) -> Backend:
+        return CasadiVM() if family.count <= _FEW else self.forces.backend
+
     @cached_property
     def _stress_runs(self) -> tuple[Run, ...]:
-        base, bind = self.forces.drive_base, self.forces.backend.bind
+        base = self.forces.drive_base
         runs = []
         for f, places in zip(self._families, self._places, strict=True):
             kernel = _stress_kernel(f.kernels.kind, f.kernels.effects)
-            runs.append(bind(kernel, f.gather(base), f.parameters, np.hstack([places, self.count + places])))
+            scatter = np.hstack([places, self.count + places])
+            runs.append(self._backend(f).bind(kernel, f.gather(base), f.parameters, scatter))
         return tuple(runs)
 
     @cached_property
@@ -197,5 +229,5 @@ class Mixed:
             scatter = np.hstack([cells, forces.entries + f.scatter(forces.motion.source_base)])
             gather = np.hstack([f.gather(forces.drive_base), forces.slot_count + places])
             kernel = _geometric_kernel(f.kernels.kind, f.kernels.effects)
-            runs.append(forces.backend.bind(kernel, gather, f.parameters, scatter))
+            runs.append(self._backend(f).bind(kernel, gather, f.parameters, scatter))
         return tuple(runs)

@@ -69,7 +69,10 @@ class Newton:
         self._plan: Plan | None = None
 
     def run(self, start: State, most: int, shift: float = 0.0, watch: bool = False) -> Found:
-        """Search from a start; a positive ``shift`` (1/s²) adds masses to K and fades as the forces do."""
+        """Search from a start; a positive ``shift`` (1/s²) adds masses to K and fades as the forces do.
+
+        ``watch`` ends it at the first tangent that does not resist every displacement.
+        """
         balance = self.balance
         scale = balance.scale(start)
         here = _Iterate(start, None, balance.force(start), 0.0)
@@ -80,7 +83,9 @@ class Newton:
         while not small and iteration < most:
             iteration += 1
             K = balance.slope(here.state, here.excess)
-            steady = steady and (not watch or holds(balance.among_free(K)))
+            if watch and not holds(balance.among_free(K)):
+                steady = False
+                break
             try:
                 step = self._step(K, here, shift)
             except SingularMatrixError:
