@@ -143,9 +143,18 @@ class Balance:
         return float(np.abs(step / self.unit).max(initial=0.0))
 
     def part(self, start: State, holding: np.ndarray, done: float) -> Balance:
-        """Return the way to this balance from a start that its unbalanced forces ``holding`` hold: 0 there, 1 here."""
+        """Return the way to this balance from a start that forces ``holding`` hold: 0 there, 1 here.
+
+        Loads that turn with the machine come on in proportion: held back by fixed forces they would turn against them.
+        """
         held = {i: (1.0 - done) * float(start.q[i]) + done * value for i, value in self.held.items()}
-        return self._again(replace(self, held=held, kept=(1.0 - done) * holding))
+        u = np.where(self._following, done * self.u, self.u)
+        return self._again(replace(self, u=u, held=held, kept=(1.0 - done) * holding))
+
+    @cached_property
+    def _following(self) -> np.ndarray:
+        turning = {f.input for f in self.model.signals.follows}
+        return np.array([i in turning for i in range(len(self.u))], dtype=bool)
 
     def under(self, u: np.ndarray) -> Balance:
         """Return the same balance under other inputs."""
