@@ -8,11 +8,12 @@ stable, with the high frequencies damped down to the spectral radius ρ.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.dynamics import steps
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import turning, yardsticks
@@ -28,7 +29,6 @@ _TURNED = 0.02
 _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
-_NEWTON = 1e-10
 
 
 @dataclass(frozen=True)
@@ -98,8 +98,8 @@ class Stepper:
     _plan: Plan | None = None
 
     def __post_init__(self) -> None:
-        self._turning = turning(self.model)
-        self._weight = 1.0 / yardsticks(self.model)
+        self.turning = turning(self.model)
+        self.weight = 1.0 / yardsticks(self.model)
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
@@ -204,13 +204,13 @@ class Stepper:
 
     def _astray(self, unforeseen: np.ndarray) -> bool:
         """Tell whether Newton's method heads for a turn that the motion did not announce: another root."""
-        return bool(np.abs(unforeseen[self._turning]).max(initial=0.0) > _ASTRAY)
+        return bool(np.abs(unforeseen[self.turning]).max(initial=0.0) > _ASTRAY)
 
     def _stale(self, state: State, h: float) -> bool:
         made = self.memory
         if made is None or abs(h - made.h) > 1e-6 * h:
             return True
-        turned = np.abs(state.q - made.state.q)[self._turning]
+        turned = np.abs(state.q - made.state.q)[self.turning]
         return bool(turned.size) and float(turned.max()) > _TURNED
 
     def _factor(self, at: Tangent) -> None:
@@ -230,7 +230,7 @@ class Stepper:
     def _size(self, correction: np.ndarray) -> tuple[float, int]:
         if not correction.size:
             return 0.0, 0
-        sizes = np.abs(correction) * self._weight
+        sizes = np.abs(correction) * self.weight
         worst = int(np.argmax(sizes)) if np.isfinite(sizes).all() else int(np.argmax(~np.isfinite(sizes)))
         return float(sizes[worst]), worst
 
@@ -238,8 +238,8 @@ class Stepper:
         """Return the local error of a step over what is allowed: |β − 1/6| h² |Δa| (Zienkiewicz & Xie 1991)."""
         h = after.state.t - before.state.t
         c = self.coefficients
-        local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self._weight
-        allowed = tolerance.absolute + tolerance.relative * float((moved * self._weight).max(initial=0.0))
+        local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self.weight
+        allowed = tolerance.absolute + tolerance.relative * float((moved * self.weight).max(initial=0.0))
         return float(local.max(initial=0.0)) / allowed
 
 
@@ -249,6 +249,14 @@ def _trend(before: AlphaPoint, rate: np.ndarray) -> np.ndarray:
     still, onward = np.abs(change).sum(), np.abs(change - before.trend).sum()
     guessed_well = onward < still if before.trend.any() else still > 0.0
     return change if guessed_well else np.zeros_like(change)
+
+
+def _quickest(plain: Stepper) -> Any:
+    """Return steps in compiled loops, where the model and its feed allow that."""
+    from flexctrl.dynamics.marching import can_march
+    from flexctrl.dynamics.marching_stepper import MarchingStepper
+
+    return MarchingStepper(plain) if can_march(plain.model) and not plain.feed.continuous else plain
 
 
 @dataclass(frozen=True)
@@ -292,8 +300,9 @@ class GeneralizedAlpha:
     def pace(self) -> Fixed:
         return Fixed(self.step)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper:
-        return Stepper(model, feed, Coefficients.of(self.rho), min(_NEWTON, 1e-3 * tolerance.absolute))
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
+        newton = min(1e-6, max(1e-3 * tolerance.absolute, 1e-13))
+        return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
 
 
 @dataclass(frozen=True)
@@ -340,8 +349,9 @@ class AdaptiveAlpha:
     def pace(self) -> Controlled:
         return Controlled(self.first_step, self.largest_step, steepness=3)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper:
-        return Stepper(model, feed, Coefficients.of(self.rho), min(1e-8, max(1e-3 * tolerance.absolute, 1e-13)))
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
+        newton = min(1e-8, max(1e-3 * tolerance.absolute, 1e-13))
+        return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
 
 
 def _check_rho(rho: float) -> None:

@@ -97,6 +97,18 @@ class Books:
         if due or sums.entered < _OFTEN:
             self.close(block.last)
 
+    def enter_ride(self, steps: int, found: tuple[float, float, np.ndarray, float], last: Point) -> None:
+        """Enter many steps with their work, losses, reach from the run's start, and the power at their end."""
+        sums = self.sums
+        work, lost, sums.moved, power = found
+        sums.work += work
+        sums.lost += lost
+        sums.power = power if self.dissipates else sums.power
+        due = sums.entered // _OFTEN < (sums.entered + steps) // _OFTEN or sums.entered < _OFTEN
+        sums.entered += steps
+        if due:
+            self.close(last)
+
     def _trapezoid(self, before: Point, after: Point) -> None:
         loads = self.model.loads
         step = after.state.q - before.state.q

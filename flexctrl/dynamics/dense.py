@@ -79,6 +79,31 @@ def curves_of(model: Model, stepper: Stepper[Any]) -> Callable[[Point, Point], C
     return lambda before, after: Hermite(local, before.state, after.state)
 
 
+class Stretched(Protocol):
+    """Steps between two points; ``states`` has those after each of them."""
+
+    @property
+    def states(self) -> Sequence[State]: ...
+
+    @property
+    def before(self) -> Point: ...
+
+    @property
+    def after(self) -> Point: ...
+
+
+class Repeatable(Protocol):
+    """Many steps that can be done again: their stretches, when these start, and the bytes it takes to remember."""
+
+    @property
+    def bytes(self) -> float: ...
+
+    @property
+    def starts(self) -> list[float]: ...
+
+    def stretches(self) -> Sequence[Stretched]: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """Steps between two points; ``states`` has those after each of them."""
@@ -106,7 +131,7 @@ class Track:
     curve: Callable[[Point, Point], Curve]
     used: float = 0.0
     starts: list[float] = field(default_factory=list)
-    stretches: list[Stretch] = field(default_factory=list)
+    stretches: list[Stretched] = field(default_factory=list)
 
     def keep(self, states: Sequence[State], before: Point, after: Point) -> None:
         """Keep one step or many."""
@@ -119,6 +144,15 @@ class Track:
         self.starts.append(before.state.t)
         self.stretches.append(Stretch(states, before, after))
 
+    def remember(self, ride: Repeatable) -> None:
+        """Keep many steps that can be done again."""
+        if self.used <= self.room:
+            self.used += ride.bytes
+            self.starts += ride.starts
+            self.stretches += ride.stretches()
+        if self.used > self.room:
+            self.starts, self.stretches = [], []
+
     def state(self, t: float) -> tuple[State, np.ndarray]:
         """Return the state and the inputs at a time."""
         before, after = self._step(self.stretches[max(0, bisect_right(self.starts, t) - 1)], t)
@@ -130,7 +164,7 @@ class Track:
         share = ((t - before.state.t) / h, h)
         return state, self.feed.between(before.supply, after.supply, share, state).u
 
-    def _step(self, s: Stretch, t: float) -> tuple[Point, Point]:
+    def _step(self, s: Stretched, t: float) -> tuple[Point, Point]:
         if len(s.states) == 1:
             return s.before, s.after
         ends = [s.before.state, *s.states]

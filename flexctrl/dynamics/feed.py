@@ -58,7 +58,7 @@ class Feed:
         return tuple(getattr(self.controller, "breaks", ())) if self.continuous else ()
 
     @cached_property
-    def _reads(self) -> np.ndarray:
+    def reads(self) -> np.ndarray:
         assert self.controller is not None
         return np.array([self.model.outputs.index(name) for name in self.controller.inputs], dtype=int)
 
@@ -69,7 +69,7 @@ class Feed:
 
     def measured(self, state: State) -> np.ndarray:
         """What the controller reads of a state."""
-        return self.model.measure(state)[self._reads] if self._reads.size else np.zeros(0)
+        return self.model.measure(state)[self.reads] if self.reads.size else np.zeros(0)
 
     def first(self, state: State) -> Supply:
         """Return the inputs at the start."""
@@ -80,10 +80,14 @@ class Feed:
 
     def sample(self, state: State, supply: Supply) -> Supply:
         """Return the inputs from a sample instant on."""
-        assert self.controller is not None
-        y = self.measured(state)
-        u = self._total(self.controller.command(state.t, supply.x, y))
-        x = np.asarray(self.controller.update(state.t, supply.x, y), dtype=float) if supply.x.size else supply.x
+        return self.sampled(state.t, self.measured(state), supply)
+
+    def sampled(self, t: float, y: np.ndarray, supply: Supply) -> Supply:
+        """Return the inputs from a sample instant on, of what the controller reads there."""
+        c = self.controller
+        assert c is not None
+        u = self._total(c.command(t, supply.x, y))
+        x = np.asarray(c.update(t, supply.x, y), dtype=float) if supply.x.size else supply.x
         return Supply(u, x, supply.rate)
 
     def restart(self, state: State, supply: Supply) -> Supply:
@@ -134,12 +138,12 @@ class Feed:
     def slope(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return ∂(generalised forces of the inputs)/∂(own motion) through a continuous controller."""
         n = self.model.n
-        if not self.continuous or not self._reads.size:
+        if not self.continuous or not self.reads.size:
             return sp.csr_matrix((n, n))
         rates = self.model.rates(state)
         on_place, on_rates = self.model.signals.slopes(state, rates, self.model.motion.raw)
         T = self.model.motion.jacobian(state)[: self.model.motion.raw]
-        C = (seeds[0] * on_place + seeds[1] * on_rates)[self._reads] @ T
+        C = (seeds[0] * on_place + seeds[1] * on_rates)[self.reads] @ T
         gain = sp.csr_matrix(self._gain(state, supply, h))
         slope = (T.T @ self.model.signals.loads_at(state) @ gain @ C).tocsr()
         return self.model.switches.freed(state, slope) if self.model.switches.sticks(state) else slope

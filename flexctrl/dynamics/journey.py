@@ -16,6 +16,7 @@ from flexctrl.dynamics.dense import Curve, Track
 from flexctrl.dynamics.events import Crossing, Occurrence, Watch
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
+from flexctrl.dynamics.ride import ride
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Mark, Point, StepError, Stepper
@@ -101,7 +102,6 @@ class Journey:
             with Interruption() as interruption:
                 self._through_stops(interruption)
         except KeyboardInterrupt:
-            self.stepper.memory = self._memory
             self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
         except StepError as error:
             self.stepper.counts.worst = error.worst
@@ -124,7 +124,8 @@ class Journey:
             if stop - t <= self._tick:
                 self._renew(stop)
                 continue
-            step(stop, self.plan.until)
+            if not ride(self):
+                step(stop, self.plan.until)
             self._memory = self.stepper.memory
             interruption.check()
             if (now := time.perf_counter()) - self._told > 0.1:

@@ -21,6 +21,9 @@ class Recorder(Protocol):
     def row(self, t: float, y: np.ndarray, u: np.ndarray) -> None:
         """Write the signals of an instant."""
 
+    def rows(self, table: np.ndarray, u: np.ndarray) -> None:
+        """Write many rows of (t, y) under the same inputs."""
+
     def table(self) -> np.ndarray:
         """Return what the run shall hold: rows of (t, y, u)."""
 
@@ -111,23 +114,32 @@ class _Table:
     """Rows in one array that grows by half: no object is kept per row."""
 
     def __init__(self, width: int) -> None:
-        self.rows = np.empty((64, width))
+        self.held = np.empty((64, width))
         self.count = 0
 
     def row(self, t: float, y: np.ndarray, u: np.ndarray) -> None:
-        if self.count == len(self.rows):
-            self.rows = np.concatenate([self.rows, np.empty((1 + self.count // 2, self.rows.shape[1]))])
-        place = self.rows[self.count]
+        place = self._room(1)[0]
         place[0] = t
         place[1 : 1 + len(y)] = y
         place[1 + len(y) :] = u
-        self.count += 1
+
+    def rows(self, table: np.ndarray, u: np.ndarray) -> None:
+        place = self._room(len(table))
+        place[:, : table.shape[1]] = table
+        place[:, table.shape[1] :] = u
+
+    def _room(self, more: int) -> np.ndarray:
+        """Return the place of the next rows."""
+        start, self.count = self.count, self.count + more
+        if self.count > len(self.held):
+            self.held = np.concatenate([self.held, np.empty((more + start // 2, self.held.shape[1]))])
+        return self.held[start : self.count]
 
     def table(self) -> np.ndarray:
-        return self.rows[: self.count].copy()
+        return self.held[: self.count].copy()
 
     def close(self) -> None:
-        self.rows = self.rows[: self.count]
+        self.held = self.held[: self.count]
 
 
 class _Stream:
@@ -141,6 +153,10 @@ class _Stream:
         values = [float(t), *y.tolist(), *u.tolist()]
         self.file.write(",".join(map(repr, values)) + "\n")
         self.ends = [self.ends[0] if self.ends else values, values]
+
+    def rows(self, table: np.ndarray, u: np.ndarray) -> None:
+        for row in table:
+            self.row(row[0], row[1:], u)
 
     def table(self) -> np.ndarray:
         return np.array(self.ends).reshape(-1, self.width)

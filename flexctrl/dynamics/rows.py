@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from flexctrl.dynamics.dense import Curve
-from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.record import Recorder
-from flexctrl.dynamics.steps import Block, Point
+from flexctrl.dynamics.steps import Block, Fixed, Pace, Point
 from flexctrl.model.motion import State
 
 __all__ = ["Rows"]
@@ -80,6 +80,44 @@ class Rows:
                 return
             self._write(state, u)
 
+    def on_steps(self, pace: Pace, sample: float) -> bool:
+        """Tell whether rows are due at the ends of steps only."""
+        if self.every is None:
+            return True
+        if not isinstance(pace, Fixed):
+            return False
+        return all(abs(s - round(s)) < _NEAR for s in (self.every / pace.step, sample / pace.step))
+
+    def due(self) -> tuple[float, float]:
+        """Return when the next state for drawing is due, and their spacing."""
+        spacing = self.until / _FRAMES * (1 - _NEAR)
+        return (self.frames[-1].t + spacing if self.frames else 0.0), spacing
+
+    def ridden(self, start: State, table: np.ndarray, states: list[State], supply: Supply, to_jump: bool) -> None:
+        """Write the rows of many steps: times and outputs, and all states or those due for drawing."""
+        times, kept = table[:, 0], len(table) - to_jump
+        if self.every is not None and len(states) == len(table):
+            before, last = (Point(state, np.zeros(0), supply) for state in (start, states[-1]))
+            self.among(before, Block(times, states, last, 0.0, 0.0, np.zeros(0)), to_jump)
+            return
+        self.frames += states
+        chosen = table[:kept]
+        if self.every is not None:
+            near = _NEAR * (times[0] - start.t)
+            ahead = int((times[-1] + near) / self.every) + 1
+            wanted = np.searchsorted(times, self.every * np.arange(self.count, ahead) - near)
+            chosen = table[wanted[wanted < kept]]
+        self.count += len(chosen)
+        self.recorder.rows(chosen, supply.u)
+
+    def row(self, t: float, y: np.ndarray, u: np.ndarray, slack: float) -> bool:
+        """Write the row of an instant whose outputs are known, if one is due within some slack; tell whether it was."""
+        due = self.every is None or abs(self.count * self.every - t) <= slack
+        if due:
+            self.count += 1
+            self.recorder.row(t, y, u)
+        return due
+
     def finish(self, state: State, u: np.ndarray) -> np.ndarray:
         """Write the row of the end, if the last one is before it, and return all rows."""
         rows = self.recorder.table()
@@ -90,5 +128,9 @@ class Rows:
     def _write(self, state: State, u: np.ndarray) -> None:
         self.count += 1
         self.recorder.row(state.t, self.feed.model.measure(state), u)
+        self.frame(state)
+
+    def frame(self, state: State) -> None:
+        """Keep a state for drawing, if one is due."""
         if not self.frames or state.t >= self.frames[-1].t + self.until / _FRAMES * (1 - 1e-9):
             self.frames.append(state)

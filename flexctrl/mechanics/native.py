@@ -54,10 +54,10 @@ class Packed:
     """
 
     def __init__(self, record: Any) -> None:
-        known = record_fields(type(record))
+        known = record_fields(type(record))  # type: ignore[arg-type]
         words = np.zeros(len(known), dtype=_WHOLE)
-        own: dict[str, Any] = {"record": record, "words": words, "reals": words.view(FLOAT), "kept": []}
-        own["places"] = {name: (i, kind) for i, (name, kind) in enumerate(known.items()) if kind in SCALARS}
+        own: dict[str, Any] = {"_record": record, "_words": words, "_reals": words.view(FLOAT), "_kept": []}
+        own["_places"] = {name: (i, kind) for i, (name, kind) in enumerate(known.items()) if kind in SCALARS}
         self.__dict__.update(own)
         for i, (name, kind) in enumerate(known.items()):
             if kind in SCALARS:
@@ -68,30 +68,30 @@ class Packed:
     def _address(self, name: str, kind: Any, value: Any) -> int:
         if isinstance(kind, type):
             inner = Packed(value)
-            self.kept.append(inner)
-            return int(inner.words.ctypes.data)
+            self._kept.append(inner)
+            return int(inner._words.ctypes.data)
         if kind == RUNS:
             value = np.array([word for run in value for word in (run.address, run.arguments)], dtype=_WHOLE)
         wanted = FLOAT if kind == "Reals" else _WHOLE
         if not (isinstance(value, np.ndarray) and value.dtype == wanted and value.flags.c_contiguous):
             raise KernelError(f"record field {name!r} is no contiguous vector of {wanted}")
-        self.kept.append(value)
+        self._kept.append(value)
         return int(value.ctypes.data)
 
     def __getattr__(self, name: str) -> Any:
-        if name not in self.places:
-            return getattr(self.record, name)
-        i, kind = self.places[name]
-        return float(self.reals[i]) if kind == "float" else int(self.words[i])
+        if name not in self._places:
+            return getattr(self._record, name)
+        i, kind = self._places[name]
+        return float(self._reals[i]) if kind == "float" else int(self._words[i])
 
     def __setattr__(self, name: str, value: Any) -> None:
-        i, kind = self.places[name]
-        (self.reals if kind == "float" else self.words)[i] = value
+        i, kind = self._places[name]
+        (self._reals if kind == "float" else self._words)[i] = value
 
     def bound(self, function: Callable[[Any], int]) -> Callable[[], int]:
         """Return a function of such records, compiled, on this one."""
         code = compiled(function)
-        address = ctypes.c_void_p(self.words.ctypes.data)
+        address = ctypes.c_void_p(self._words.ctypes.data)
         return lambda: code(address)
 
 

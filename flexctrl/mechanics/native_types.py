@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 from flexctrl.errors import KernelError
@@ -26,6 +27,7 @@ class Value(NamedTuple):
     text: str
 
 
+@cache
 def record_fields(record: type) -> dict[str, Any]:
     """Return the fields of a record and their types, in order."""
     names = vars(sys.modules[record.__module__])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,6 +62,7 @@ def inverse_tangent(theta: ca.SX, v: ca.SX) -> ca.SX:
     return v + 0.5 * turned + eta * ca.cross(theta, turned)
 
 
+@cache
 def turn_kernel() -> Kernel:
     """Return the kernel (R, θ) → exp(θ×) R, row by row, with R's round-off drift from orthonormality removed."""
     import casadi as ca

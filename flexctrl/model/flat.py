@@ -29,6 +29,8 @@ class Flat:
     ----------
     n, padded : int
         Degrees of freedom; length of their vectors, a multiple of eight and more than n.
+    size, nodes : int
+        Length of the workspace; nodes, the ground included.
     z : Reals
         The workspace, slots first.
     seeds, pose, step, v, rate : Reals *
@@ -58,7 +60,7 @@ class Flat:
         Of each load that turns with a node: the input, the node, and where its three components act.
     toward : Reals
         Their directions at rest.
-    u : Reals
+    u : Reals *
         Inputs.
     turn, linkage, winding, forces, tangents, energies : Runs
         Kernels; of the linkage: places, rates, accelerations, forces; of its drives: driven coordinates.
@@ -68,6 +70,8 @@ class Flat:
 
     n: int
     padded: int
+    size: int
+    nodes: int
     moving: int
     turning: int
     linking: int

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.mechanics.kernel import Kernel, Run
 from flexctrl.mechanics.rotation import turn_kernel
+from flexctrl.model.axes import Axes, axes_of
 from flexctrl.model.flat import Flat
 from flexctrl.model.fronts import Plan, plan_of
 from flexctrl.model.gauges import Gauges, gauges_of
@@ -39,6 +41,8 @@ class Flattened:
     flat : Flat
     gauges : Gauges
         Its outputs.
+    axes : Axes
+        Of its tangents.
     plan : Plan
         How its tangents are eliminated; degrees of freedom stand in that order.
     pattern : tuple of numpy.ndarray
@@ -48,6 +52,7 @@ class Flattened:
     model: Model
     flat: Flat
     gauges: Gauges
+    axes: Axes
     plan: Plan
     pattern: tuple[np.ndarray, np.ndarray]
 
@@ -84,7 +89,7 @@ class Flattened:
 
 
 def flatten(model: Model) -> Flattened:
-    """Return a model on flat vectors.
+    """Return a model on flat vectors of its own; what does not change is worked out once a model.
 
     Parameters
     ----------
@@ -95,7 +100,10 @@ def flatten(model: Model) -> Flattened:
     -------
     Flattened
     """
-    return _Layout(model).made()
+    layout = model.__dict__.get("_layout")
+    if layout is None:
+        layout = model.__dict__["_layout"] = _Layout(model)
+    return layout.made()
 
 
 class _Layout:
@@ -106,22 +114,20 @@ class _Layout:
         m = self.motion
         self.padded = (m.n // 8 + 1) * 8
         self.linked = np.zeros(0, dtype=int) if m.plain else m.linked_cells
-        carried = -(-len(self.linked) // 8) * 8
-        sizes = {
+        self.carried = -(-len(self.linked) // 8) * 8
+        self.sizes = {
             "slots": self.forces.slot_count,
             "seeds": 3,
             "pose": 12 * len(m.place),
             **dict.fromkeys(("step", "v", "rate"), self.padded),
-            **dict.fromkeys(("force", "load"), self.padded + carried),
+            **dict.fromkeys(("force", "load"), self.padded + self.carried),
             "q": self.padded,
             "found": len(m.drives),
+            "u": len(self.model.inputs),
         }
-        self.starts, self.carried, end = {}, carried, 0
-        for name, size in sizes.items():
-            self.starts[name] = end
-            end += -(-size // 8) * 8
-        self.z = _aligned(end)
-        self.parts = {name: self.z[start : start + sizes[name]] for name, start in self.starts.items()}
+        ends = np.cumsum([0, *(-(-size // 8) * 8 for size in self.sizes.values())])
+        self.starts = dict(zip(self.sizes, ends.tolist(), strict=False))
+        self.length = int(ends[-1])
 
     @cached_property
     def pattern(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -132,16 +138,19 @@ class _Layout:
             rows, columns = (m.cells[cells] for cells in raw)
             kept = np.flatnonzero((rows < m.n) & (columns < m.n))
             return rows[kept], columns[kept], kept
-        found = self._some_slope().tocoo()
+        found = self._slopes().tocoo()
         return found.row, found.col, np.zeros(0, dtype=int)
 
-    def _some_slope(self) -> sp.csr_matrix:
-        """The slope in a state in which no entry vanishes by chance."""
+    def _slopes(self) -> sp.csr_matrix:
+        """A matrix with all entries that slopes have: those of levers in a place where none vanishes by chance, as
+        pieces push on them even where they do not (slack ropes), and as they turn in motion."""
         m, rng = self.motion, np.random.default_rng(0)
         step, v, a = rng.uniform(0.1, 0.4, (3, m.n))
         state = m.advance(m.rest, step, v, 0.0)
         u = rng.uniform(0.5, 1.0, len(self.model.inputs))
-        return self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)
+        T = abs(m.jacobian(state))
+        pushed = sp.csr_matrix((np.ones(len(self.forces.pattern[0])), self.forces.pattern), shape=(m.raw, m.raw))
+        return abs(self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)) + T.T @ pushed @ T
 
     @cached_property
     def plan(self) -> Plan:
@@ -161,64 +170,91 @@ class _Layout:
         return found
 
     def made(self) -> Flattened:
-        m, part = self.motion, self.parts
+        z = _aligned(self.length)
+        part = {name: z[start : start + self.sizes[name]] for name, start in self.starts.items()}
+        del part["slots"]
+        vectors: dict[str, Any] = {"z": z, "driven": np.zeros(len(self.motion.drives)), "books": np.zeros(3), **part}
+        flat = Flat(
+            **vectors,
+            **self._numbers,
+            **self._tables,
+            **self._runs,
+        )
+        gauges = replace(self._gauges, sums=np.zeros(self._gauges.rows))
+        return Flattened(self.model, flat, gauges, self._axes, self.plan, self.pattern[:2])
+
+    @cached_property
+    def _gauges(self) -> Gauges:
+        return gauges_of(self.model, self.starts["q"], self.plan.position)
+
+    @cached_property
+    def _axes(self) -> Axes:
+        return axes_of(self.model, self.plan, self.pattern[:2])
+
+    @cached_property
+    def _own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Nodes that are not placed by the linkage; those that move, and those that turn."""
+        m = self.motion
         own = np.setdiff1d(np.arange(len(m.place)), [] if m.plain else m.nodes)
-        moved = own[(m.place[own, :3] < m.n).any(axis=1)]
-        turned = own[(m.place[own, 3:] < m.n).any(axis=1)]
+        moved, turned = (own[(m.place[own, cells] < m.n).any(axis=1)] for cells in (slice(3), slice(3, 6)))
+        return own, moved, turned
+
+    @cached_property
+    def _tables(self) -> dict[str, Any]:
+        m, (own, moved, turned) = self.motion, self._own
         cells = self.position[m.place[own]]
         nodes, freedoms = np.nonzero(cells < m.n)
         loads = self.model.signals.loads.tocoo()
-        linkage = () if m.plain else self._linkage()
-        flat = Flat(
-            n=m.n,
-            padded=self.padded,
-            moving=len(moved),
-            turning=len(turned),
-            linking=0 if m.plain else len(m.nodes),
-            rates=len(nodes),
-            drives=len(m.drives),
-            pieces=len(self.forces.families),
-            unit_loads=loads.nnz,
-            following=len(self.model.signals.follows),
-            carried=self.carried,
-            entries=self.plan.length,
-            drive_base=self.forces.drive_base,
-            z=self.z,
-            seeds=part["seeds"],
-            pose=part["pose"],
-            step=part["step"],
-            v=part["v"],
-            rate=part["rate"],
-            force=part["force"],
-            load=part["load"],
-            q=part["q"],
-            driven=np.zeros(len(m.drives)),
-            found=part["found"],
-            moved=moved,
-            turned=turned,
-            linked=m.nodes if linkage else np.zeros(0, dtype=int),
-            cells=self.position[m.place].ravel(),
-            slots=NODE_SLOT * own[nodes] + 12 + freedoms,
-            sources=cells[nodes, freedoms],
-            shafts=self.position[m.sources],
-            rigid=m.rigid.astype(np.int64),
-            rotary=m.rotary.astype(np.int64),
-            ratios=m.ratios,
-            inputs=np.concatenate([self.targets[loads.row], loads.col]).astype(np.int64),
-            unit=loads.data.astype(float),
-            follows=self._follows(),
-            toward=np.array([d for f in self.model.signals.follows for d in f.direction], dtype=float),
-            u=np.zeros(len(self.model.inputs)),
-            turn=(self._turn(turned),) if len(turned) else (),
-            linkage=linkage,
-            winding=(self._winding(),) if m.drives else (),
-            forces=tuple(self._forces()),
-            tangents=tuple(self._tangents()) if m.plain else (),
-            energies=tuple(self._energies()),
-            books=np.zeros(3),
-        )
-        gauges = gauges_of(self.model, self.starts["q"], self.plan.position)
-        return Flattened(self.model, flat, gauges, self.plan, self.pattern[:2])
+        return {
+            "moved": moved,
+            "turned": turned,
+            "linked": np.zeros(0, dtype=int) if m.plain else m.nodes,
+            "cells": self.position[m.place].ravel(),
+            "slots": NODE_SLOT * own[nodes] + 12 + freedoms,
+            "sources": cells[nodes, freedoms],
+            "shafts": self.position[m.sources],
+            "rigid": m.rigid.astype(np.int64),
+            "rotary": m.rotary.astype(np.int64),
+            "ratios": m.ratios,
+            "inputs": np.concatenate([self.targets[loads.row], loads.col]).astype(np.int64),
+            "unit": loads.data.astype(float),
+            "follows": self._follows(),
+            "toward": np.array([d for f in self.model.signals.follows for d in f.direction], dtype=float),
+        }
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        m, tables = self.motion, self._tables
+        return {
+            "n": m.n,
+            "padded": self.padded,
+            "size": self.length,
+            "nodes": len(m.place),
+            "moving": len(tables["moved"]),
+            "turning": len(tables["turned"]),
+            "linking": len(tables["linked"]),
+            "rates": len(tables["slots"]),
+            "drives": len(m.drives),
+            "pieces": len(self.forces.families),
+            "unit_loads": len(tables["unit"]),
+            "following": len(self.model.signals.follows),
+            "carried": self.carried,
+            "entries": self.plan.length,
+            "drive_base": self.forces.drive_base,
+        }
+
+    @cached_property
+    def _runs(self) -> dict[str, Any]:
+        m, turned = self.motion, self._own[2]
+        own_tangents = m.plain and not self.model.signals.follows
+        return {
+            "turn": (self._turn(turned),) if len(turned) else (),
+            "linkage": () if m.plain else self._linkage(),
+            "winding": (self._winding(),) if m.drives else (),
+            "forces": tuple(self._forces()),
+            "tangents": tuple(self._tangents()) if own_tangents else (),
+            "energies": tuple(self._energies()),
+        }
 
     def _follows(self) -> np.ndarray:
         follows = self.model.signals.follows

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.errors import KernelError
 from flexctrl.mechanics.eights import eight, put
 from flexctrl.mechanics.native import Reals, Wholes
 
@@ -53,7 +54,13 @@ class Plan:
         return place
 
     def places(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return where entries of the matrix, by row and column, stand among those of the fronts."""
+        """Return where entries of the matrix, by row and column, stand among those of the fronts.
+
+        Raises
+        ------
+        KernelError
+            For an entry that the pattern does not have.
+        """
         f = self.fronts
         r, c = self.position[rows], self.position[columns]
         front = np.repeat(np.arange(f.count), f.pivots)[np.minimum(r, c)]
@@ -64,8 +71,11 @@ class Plan:
         f = self.fronts
         within = unknown - f.first[front]
         keys = np.repeat(np.arange(f.count), f.size - f.pivots) * f.n + f.others
-        found = np.searchsorted(keys, front * f.n + unknown) - f.rest[front] + f.pivots[front]
-        return np.where(within < f.pivots[front], within, found)
+        wanted, own = front * f.n + unknown, within < f.pivots[front]
+        found = np.searchsorted(keys, wanted)
+        if not (own | (np.append(keys, -1)[found] == wanted)).all():
+            raise KernelError("an entry lies outside the pattern that the fronts were made for")
+        return np.where(own, within, found - f.rest[front] + f.pivots[front])
 
 
 @dataclass

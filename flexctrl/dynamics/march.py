@@ -1,0 +1,168 @@
+"""Generalised alpha in compiled loops: one step.
+
+The method, its Newton iterations and its tests are those of `alpha`, but for the tangent, which is kept longer
+(see `march_axes`), and for Newton's tolerance, which is a share of the method's own error.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flexctrl.dynamics.march_axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march_record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
+from flexctrl.mechanics.eights import Eight, eight, larger, largest, put, total
+from flexctrl.model.flat import drive, place, push, tangent
+from flexctrl.model.fronts import factor
+
+__all__ = ["blended", "refactored", "step", "to_rate", "to_v"]
+
+_TURNED = 0.05
+_POOR = 0.25
+_ASTRAY = 1.5
+_ITERATIONS = 12
+_TRUSTED = 8
+_HABIT = 0.02
+
+
+def step(m: March) -> int:
+    """Solve a step, once more with tangents made anew if need be; after `refactored` it goes on where it was."""
+    while True:
+        if m.phase == FRESH:
+            predict(m)
+        status = newton(m)
+        if status == WANTS_TANGENT:
+            return status
+        m.phase = FRESH
+        if status == DONE or m.attempt == 1:
+            m.attempt = 0
+            return status
+        m.attempt = 1
+
+
+def predict(m: March) -> None:
+    """Guess the end of the step: accelerations go on as in the last one."""
+    f = m.flat
+    h = m.h
+    for i in range(0, f.padded, 8):
+        rate = eight(m.rate[i:]) + eight(m.trend[i:])
+        own = eight(m.algorithmic[i:])
+        lead = blended(m, rate, eight(m.rate[i:]), own)
+        put(f.rate[i:], rate)
+        put(f.step[i:], h * eight(m.v[i:]) + h * h * ((0.5 - m.beta) * own + m.beta * lead))
+        put(f.v[i:], eight(m.v[i:]) + h * ((1.0 - m.gamma) * own + m.gamma * lead))
+    m.phase = EVALUATE
+    m.iteration = 0
+    m.last = math.inf
+    m.contraction = 0.0
+    m.strayed = 0.0
+
+
+def blended(m: March, rate: Eight, before: Eight, own: Eight) -> Eight:
+    """Return the method's own acceleration after a step, from the true ones at both ends and its own before."""
+    return ((1.0 - m.alpha_f) * rate + m.alpha_f * before - m.alpha_m * own) * (1.0 / (1.0 - m.alpha_m))
+
+
+def newton(m: March) -> int:
+    """Iterate until the step is solved."""
+    f = m.flat
+    while m.iteration < _ITERATIONS:
+        if m.phase == EVALUATE:
+            place(f)
+            drive(f)
+            push(f)
+            m.phase = CORRECT
+            if m.attempt == 1 or m.contraction > _POOR or (m.iteration == 0 and stale(m)):
+                m.last = math.inf
+                if m.asking == 1:
+                    return WANTS_TANGENT
+                tangent(f, 1.0, to_v(m), to_rate(m), m.tangent.entries)
+                if refactored(m) != DONE:
+                    return SINGULAR
+        m.phase = EVALUATE
+        size = correct(m)
+        if not math.isfinite(size) or m.strayed > _ASTRAY:
+            return FAILED
+        m.contraction = size / m.last if math.isfinite(m.last) else 0.0
+        if m.contraction > 2.0 and m.iteration > 3:
+            return FAILED
+        if converged(m, size):
+            return DONE
+        m.last = size
+        m.iteration += 1
+    return FAILED
+
+
+def to_v(m: March) -> float:
+    """Return what an increment of the step adds to the rates at its end."""
+    return m.gamma / (m.h * m.beta)
+
+
+def to_rate(m: March) -> float:
+    """Return what an increment of the step adds to the accelerations at its end."""
+    return (1.0 - m.alpha_m) / (m.h * m.h * m.beta * (1.0 - m.alpha_f))
+
+
+def stale(m: March) -> bool:
+    """Tell whether the tangent is of another step length or of another shape."""
+    if not abs(m.h - m.made_for) <= 1e-6 * m.h:
+        return True
+    return turned_too_far(m.axes, m.tangent, m.flat, _TURNED)
+
+
+def refactored(m: March) -> int:
+    """Factorise the tangent that has been filled in for the present end of the step."""
+    where = factor(m.fronts, m.tangent.entries, m.tangent.diagonal)
+    m.made_for = -1.0
+    if where >= 0:
+        m.worst = where
+        return SINGULAR
+    m.factorisations += 1
+    m.made_for = m.h
+    m.habit = 0.0
+    mark(m.axes, m.tangent, m.flat)
+    return DONE
+
+
+def converged(m: March, size: float) -> bool:
+    """Tell whether a correction of this size was the last that is needed.
+
+    A first correction is believed to be followed by ones as much smaller as those of the steps before; now and
+    then that is looked at again.
+    """
+    if m.contraction > 0.0:
+        m.habit = max(m.contraction, max(m.habit, _HABIT))
+        m.trusted = 0
+    if size <= m.tolerance:
+        return True
+    if m.contraction > 0.0:
+        return m.contraction < 1.0 and size * m.contraction <= 0.5 * m.tolerance
+    if m.habit > 0.0 and m.trusted < _TRUSTED and size * m.habit <= 0.25 * m.tolerance:
+        m.trusted += 1
+        return True
+    return False
+
+
+def correct(m: March) -> float:
+    """Take a Newton step; return its size, NaN where it is not finite."""
+    f = m.flat
+    for i in range(0, f.padded, 8):
+        put(m.b[i:], -eight(f.force[i:]))
+    m.b[f.n] = 0.0
+    solved(m.axes, m.tangent, m.fronts, m.b)
+    speed = to_v(m)
+    pull = to_rate(m)
+    most = 0.0 * eight(m.weight)
+    sums = most
+    turn = most
+    for i in range(0, f.padded, 8):
+        change = eight(m.b[i:])
+        put(f.step[i:], eight(f.step[i:]) + change)
+        put(f.v[i:], eight(f.v[i:]) + speed * change)
+        put(f.rate[i:], eight(f.rate[i:]) + pull * change)
+        sizes = abs(change) * eight(m.weight[i:])
+        most = larger(most, sizes)
+        sums = sums + sizes
+        turn = larger(turn, abs(change) * eight(m.turns[i:]))
+    m.newton += 1
+    m.strayed += largest(turn)
+    return largest(most) if math.isfinite(total(sums)) else math.nan

@@ -1,0 +1,101 @@
+"""Factorised matrices seen from axes that turn with the nodes: compiled loops.
+
+A part that turns as a whole keeps its matrix in axes that turn with it. What makes a factorised matrix stale
+is that axes that meet in a piece have turned against each other.
+"""
+
+from __future__ import annotations
+
+from flexctrl.dynamics.march_record import Factors
+from flexctrl.mechanics.native import Reals, Wholes
+from flexctrl.model.axes import Axes
+from flexctrl.model.flat import Flat
+from flexctrl.model.fronts import Fronts, solve
+from flexctrl.model.kinds import NODE_SLOT
+
+__all__ = ["mark", "solved", "turned_too_far"]
+
+
+def mark(axes: Axes, factors: Factors, f: Flat) -> None:
+    """Remember the axes: the matrix is made now."""
+    for k in range(axes.count):
+        R = f.z[NODE_SLOT * axes.nodes[k] + 3 :]
+        for i in range(9):
+            factors.made[9 * k + i] = R[i]
+            factors.turned[9 * k + i] = 1.0 if i % 4 == 0 else 0.0
+    for k in range(axes.angle_count):
+        factors.angles[k] = f.q[axes.angles[k]] + f.step[axes.angles[k]]
+    for i in range(f.size):
+        factors.place[i] = f.z[i]
+
+
+def turned_too_far(axes: Axes, factors: Factors, f: Flat, most: float) -> bool:
+    """Tell whether the machine has turned in itself since the matrix was made; work out how the axes have."""
+    for k in range(axes.angle_count):
+        i = axes.angles[k]
+        if abs(f.q[i] + f.step[i] - factors.angles[k]) > most:
+            return True
+    for k in range(axes.count):
+        since(f.z[NODE_SLOT * axes.nodes[k] + 3 :], factors.made[9 * k :], factors.turned[9 * k :])
+    for k in range(axes.pair_count):
+        one = factors.turned[9 * axes.pairs[2 * k] :]
+        if axes.pairs[2 * k + 1] >= 0:
+            if apart(one, factors.turned[9 * axes.pairs[2 * k + 1] :]) > most:
+                return True
+        elif tilt(one) > most:
+            return True
+    return False
+
+
+def since(R: Reals, made: Reals, turned: Reals) -> None:
+    """Work out R madeᵀ."""
+    for i in range(3):
+        for j in range(3):
+            turned[3 * i + j] = R[3 * i] * made[3 * j] + R[3 * i + 1] * made[3 * j + 1] + R[3 * i + 2] * made[3 * j + 2]
+
+
+def apart(a: Reals, b: Reals) -> float:
+    """Return the largest difference of the entries of two rotations."""
+    most = 0.0
+    for i in range(9):
+        most = max(most, abs(a[i] - b[i]))
+    return most
+
+
+def tilt(a: Reals) -> float:
+    """Return the largest difference of the entries of a rotation from those of none."""
+    most = 0.0
+    for i in range(9):
+        most = max(most, abs(a[i] - 1.0) if i % 4 == 0 else abs(a[i]))
+    return most
+
+
+def solved(axes: Axes, factors: Factors, fronts: Fronts, b: Reals) -> None:
+    """Solve in place with the matrix as it would be now."""
+    turn_back(axes.triple_count, axes.triples, factors.turned, b)
+    solve(fronts, factors.entries, b, factors.work)
+    turn_on(axes.triple_count, axes.triples, factors.turned, b)
+
+
+def turn_back(count: int, triples: Wholes, turned: Reals, b: Reals) -> None:
+    """See forces from the axes as they were."""
+    for k in range(count):
+        x = b[triples[2 * k] :]
+        R = turned[9 * triples[2 * k + 1] :]
+        first = R[0] * x[0] + R[3] * x[1] + R[6] * x[2]
+        second = R[1] * x[0] + R[4] * x[1] + R[7] * x[2]
+        x[2] = R[2] * x[0] + R[5] * x[1] + R[8] * x[2]
+        x[0] = first
+        x[1] = second
+
+
+def turn_on(count: int, triples: Wholes, turned: Reals, b: Reals) -> None:
+    """See motions in the axes as they were from space."""
+    for k in range(count):
+        x = b[triples[2 * k] :]
+        R = turned[9 * triples[2 * k + 1] :]
+        first = R[0] * x[0] + R[1] * x[1] + R[2] * x[2]
+        second = R[3] * x[0] + R[4] * x[1] + R[5] * x[2]
+        x[2] = R[6] * x[0] + R[7] * x[1] + R[8] * x[2]
+        x[0] = first
+        x[1] = second

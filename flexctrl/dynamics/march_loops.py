@@ -1,0 +1,319 @@
+"""Generalised alpha in compiled loops: many steps, their books and records; jumps of the inputs."""
+
+from __future__ import annotations
+
+import math
+
+from flexctrl.dynamics.march import blended, refactored, step, to_rate, to_v
+from flexctrl.dynamics.march_axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march_record import (
+    CONTROLLED,
+    DONE,
+    FAILED,
+    FIXED,
+    FRESH,
+    JUMP,
+    REFACTOR,
+    REMADE,
+    SETTLE,
+    SHORT,
+    SINGULAR,
+    WANTS_MASS,
+    WANTS_TANGENT,
+    WEIGHED,
+    March,
+)
+from flexctrl.mechanics.eights import eight, larger, largest, put, total
+from flexctrl.mechanics.native import Reals
+from flexctrl.model.flat import clear, drive, energy, keep, load, place, pull, push, tangent
+from flexctrl.model.fronts import factor
+from flexctrl.model.gauges import read
+
+__all__ = ["run"]
+
+_SMALLEST = 1e-12
+_MASS_TURNED = 0.05
+_SOLUTIONS = 8
+_EXACT = 1e-13
+_NEAR = 1e-9
+_TINY = 1e-300
+_MASSLESS = 1e-14
+
+
+def run(m: March) -> int:
+    """Do the task that is set."""
+    if m.task == FIXED:
+        return fixed(m)
+    if m.task == CONTROLLED:
+        return controlled(m)
+    if m.task == JUMP:
+        return jump(m)
+    if m.task == SETTLE:
+        return settle(m)
+    if m.task == REMADE or m.task == WEIGHED:
+        return made_again(m)
+    return refactored(m) if m.task == REFACTOR else weighed(m)
+
+
+def made_again(m: March) -> int:
+    """Make a matrix again in the workspace in which it was made."""
+    if m.task == WEIGHED:
+        tangent(m.flat, 0.0, 0.0, 1.0, m.mass.entries)
+        return weighed(m)
+    tangent(m.flat, 1.0, to_v(m), to_rate(m), m.tangent.entries)
+    return refactored(m)
+
+
+def fixed(m: March) -> int:
+    """Take steps of one length until all wanted are done, or one needs a tangent or fails."""
+    while m.done < m.wanted:
+        status = step(m)
+        if status != DONE:
+            return status
+        judge(m)
+        accept(m)
+    return DONE
+
+
+def controlled(m: March) -> int:
+    """Take steps of controlled error until all wanted are done, the stop is reached or the end would be passed."""
+    again = False
+    while m.done < m.wanted and m.stop - m.t > 1e-12 * m.until:
+        if m.phase == FRESH:
+            m.h = m.size if again else fitted(min(m.size, m.largest), m.stop - m.t)
+            if m.t + m.h > m.until * (1.0 + 1e-12):
+                return DONE
+        if m.h < _SMALLEST * max(1.0, m.t):
+            return SHORT
+        status = step(m)
+        if status == WANTS_TANGENT:
+            return status
+        if status == SINGULAR:
+            return status
+        error = 0.0
+        if status == DONE:
+            judge(m)
+            error = m.error / (m.absolute + m.relative * m.reached)
+        if status != DONE or error > 1.0:
+            m.rejected += 1
+            m.size = 0.25 * m.h if status != DONE else m.h * max(0.2, 0.9 * growth(error))
+            again = True
+            continue
+        again = False
+        factor = 0.9 * growth(error)
+        if factor > 1.3 and m.h > 0.5 * m.size:
+            m.size = m.h * min(2.5, factor)
+        elif factor < 1.0:
+            m.size = m.h * factor
+        accept(m)
+    return DONE
+
+
+def fitted(h: float, left: float) -> float:
+    """Return a step that ends at the stop or leaves room for another."""
+    if h > 0.99 * left:
+        return left
+    return 0.5 * left if h > 0.5 * left else h
+
+
+def growth(error: float) -> float:
+    """Return by what a step may be longer for an error of 1: it grows with the cube."""
+    return math.pow(max(error, 1e-9), -1.0 / 3.0)
+
+
+def judge(m: March) -> None:
+    """Work out the method's own acceleration at the end of the step, and with it the error."""
+    f = m.flat
+    local = 0.0 * eight(m.weight)
+    for i in range(0, f.padded, 8):
+        own = eight(m.algorithmic[i:])
+        lead = blended(m, eight(f.rate[i:]), eight(m.rate[i:]), own)
+        put(m.lead[i:], lead)
+        local = larger(local, abs(lead - own) * eight(m.weight[i:]))
+    m.error = abs(m.beta - 1.0 / 6.0) * m.h * m.h * largest(local)
+
+
+def accept(m: March) -> None:
+    """Go on to the end of the step; enter it in the books and records."""
+    f = m.flat
+    place(f)
+    keep(f)
+    zero = 0.0 * eight(m.weight)
+    still = zero
+    onward = zero
+    far = zero
+    for i in range(0, f.padded, 8):
+        rate = eight(f.rate[i:])
+        change = rate - eight(m.rate[i:])
+        still = still + abs(change)
+        onward = onward + abs(change - eight(m.trend[i:]))
+        reach = larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:])))
+        far = larger(far, reach * eight(m.weight[i:]))
+        put(m.reach[i:], reach)
+        put(m.trend[i:], change)
+        put(m.rate[i:], rate)
+        put(m.algorithmic[i:], eight(m.lead[i:]))
+        put(m.v[i:], eight(f.v[i:]))
+    m.reached = max(m.reached, largest(far))
+    tighten(m, total(still), total(onward))
+    trend(m, total(still), total(onward))
+    m.t += m.h
+    enter(m)
+    note(m)
+    m.done += 1
+
+
+def tighten(m: March, still: float, onward: float) -> None:
+    """Choose Newton's tolerance for the next step.
+
+    What he leaves kicks the rates by two over the step, while the method's own error does so by how fast it
+    changes: the smoother the motion, the more exactly steps are to be solved.
+    """
+    smooth = min(1.0, onward / still) if still > 0.0 else 0.0
+    m.tolerance = min(max(m.least, m.share * m.error * smooth), m.loosest)
+
+
+def trend(m: March, still: float, onward: float) -> None:
+    """Expect accelerations to go on as they went, if that was the better guess for the last step."""
+    if m.trending == 1 and not onward < still:
+        m.trending = 0
+        clear(m.flat.padded, m.trend)
+    else:
+        m.trending = 1 if still > 0.0 else 0
+
+
+def enter(m: March) -> None:
+    """Enter the step in the books: work of the inputs, and what was lost."""
+    f = m.flat
+    work = 0.0 * eight(m.weight)
+    if f.carried > 0 or f.following > 0:
+        pull(f)
+        for i in range(0, f.padded, 8):
+            work = work + 0.5 * (eight(m.pulled[i:]) + eight(f.force[i:])) * eight(f.step[i:])
+            put(m.pulled[i:], eight(f.force[i:]))
+    else:
+        for i in range(0, f.padded, 8):
+            work = work + eight(f.load[i:]) * eight(f.step[i:])
+    m.gained += total(work)
+    if m.losing == 1:
+        drive(f)
+        energy(f)
+        m.lost += 0.5 * m.h * (m.power + f.books[2])
+        m.power = f.books[2]
+
+
+def note(m: March) -> None:
+    """Write down outputs and, where it is wanted, the state."""
+    f = m.flat
+    row = m.rows[(1 + m.gauges.outputs) * m.done :]
+    row[0] = m.t
+    if m.gauges.moving == 1 and m.losing == 0:
+        drive(f)
+    read(m.gauges, f.z, row[1:])
+    if m.keeping == 1 or m.t >= m.due:
+        nodes = 12 * f.nodes
+        width = nodes + 2 * f.padded + f.drives + 1
+        state = m.states[width * m.kept :]
+        copy(nodes, f.pose, state)
+        copy(f.padded, f.q, state[nodes:])
+        copy(f.padded, m.v, state[nodes + f.padded :])
+        copy(f.drives, f.driven, state[nodes + 2 * f.padded :])
+        state[width - 1] = m.t
+        m.kept += 1
+        m.due = m.t + m.spacing
+
+
+def copy(n: int, x: Reals, y: Reals) -> None:
+    """Copy entries."""
+    for i in range(n):
+        y[i] = x[i]
+
+
+def settle(m: March) -> int:
+    """Take up the state that has been entered: loads, and what outputs read."""
+    f = m.flat
+    load(f)
+    pull(f)
+    copy(f.padded, f.force, m.pulled)
+    if m.losing == 1:
+        drive(f)
+        energy(f)
+        m.power = f.books[2]
+    return DONE
+
+
+def jump(m: March) -> int:
+    """Let the accelerations follow a jump of the inputs: solve for them with the mass, kept as tangents are.
+
+    The method's own accelerations keep their lead on the true ones.
+    """
+    f = m.flat
+    load(f)
+    clear(f.padded, f.step)
+    copy(f.padded, m.v, f.v)
+    copy(f.padded, m.rate, f.rate)
+    copy(f.padded, m.rate, m.lead)
+    if m.mass_for != 1.0 or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
+        if m.asking == 1:
+            return WANTS_MASS
+        drive(f)
+        tangent(f, 0.0, 0.0, 1.0, m.mass.entries)
+        if weighed(m) != DONE:
+            return SINGULAR
+    last = math.inf
+    for _k in range(_SOLUTIONS):
+        drive(f)
+        push(f)
+        size = accelerate(m)
+        if not math.isfinite(size) or (size > last and last > _NEAR):
+            return FAILED
+        if size <= _EXACT or size > last:
+            break
+        last = size
+    for i in range(0, f.padded, 8):
+        put(m.algorithmic[i:], eight(m.algorithmic[i:]) + eight(f.rate[i:]) - eight(m.lead[i:]))
+        put(m.rate[i:], eight(f.rate[i:]))
+    pull(f)
+    copy(f.padded, f.force, m.pulled)
+    return DONE
+
+
+def accelerate(m: March) -> float:
+    """Correct the accelerations by what is out of balance; return the share of the correction."""
+    f = m.flat
+    for i in range(0, f.padded, 8):
+        put(m.b[i:], -eight(f.force[i:]))
+    m.b[f.n] = 0.0
+    solved(m.axes, m.mass, m.fronts, m.b)
+    most = 0.0 * eight(m.weight)
+    sums = most
+    size = most
+    for i in range(0, f.padded, 8):
+        change = eight(m.b[i:])
+        rate = eight(f.rate[i:]) + change
+        put(f.rate[i:], rate)
+        most = larger(most, abs(change) * eight(m.weight[i:]))
+        sums = sums + abs(change)
+        size = larger(size, abs(rate) * eight(m.weight[i:]))
+    if not math.isfinite(total(sums)):
+        return math.nan
+    return largest(most) / max(largest(size), _TINY)
+
+
+def weighed(m: March) -> int:
+    """Factorise the mass that has been filled in for the present shape."""
+    f = m.flat
+    where = factor(m.fronts, m.mass.entries, m.mass.diagonal)
+    m.mass_for = 0.0
+    most = 0.0
+    for i in range(f.n):
+        most = max(most, m.mass.diagonal[i])
+    for i in range(f.n):
+        if not m.mass.diagonal[i] > _MASSLESS * most:
+            where = i
+    if where >= 0:
+        return SINGULAR
+    m.mass_for = 1.0
+    m.weighings += 1
+    mark(m.axes, m.mass, f)
+    return DONE

@@ -1,0 +1,168 @@
+"""What a compiled march works on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from flexctrl.mechanics.native import Reals
+from flexctrl.model.axes import Axes
+from flexctrl.model.flat import Flat
+from flexctrl.model.fronts import Fronts
+from flexctrl.model.gauges import Gauges
+
+DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT = 0, 1, 2, 3, 4, 5
+"""How a call ends: with all done; before it can go on; at a step that does not converge, or cannot be shorter."""
+
+FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED = 0, 1, 2, 3, 4, 5, 6, 7
+"""What to do."""
+
+FRESH, EVALUATE, CORRECT = 0, 1, 2
+"""Where in a step it is: before it, before an iteration, or with the forces of one known."""
+
+
+@dataclass
+class Factors:
+    """A factorised matrix, as seen from axes that turn with the nodes.
+
+    Attributes
+    ----------
+    entries, diagonal, work : Reals
+        Its fronts; the sizes of its diagonal before, and room for a column.
+    made, turned : Reals
+        Rotations of the axes when it was made, and since.
+    angles : Reals
+        Turning degrees of freedom without axes, when it was made.
+    place : Reals
+        The workspace when it was made.
+    """
+
+    entries: Reals
+    diagonal: Reals
+    work: Reals
+    made: Reals
+    turned: Reals
+    angles: Reals
+    place: Reals
+
+
+@dataclass
+class March:
+    """A march under way. Vectors of degrees of freedom stand in the order of elimination.
+
+    Attributes
+    ----------
+    flat : Flat
+    gauges : Gauges
+    fronts : Fronts
+    axes : Axes
+    tangent, mass : Factors
+    alpha_m, alpha_f, beta, gamma : float
+        The method; see `Coefficients`.
+    least, loosest, share : float
+        Newton's tolerance: a share of the method's own error, within these bounds.
+    tolerance, error : float
+        That tolerance; the method's error in the last step (see `Stepper.error`).
+    h, t : float
+        Step; time.
+    size, largest, stop, until : float
+        Of error-controlled steps: the next one and the largest, where to end and what not to pass [s].
+    relative, absolute, reached : float
+        Their tolerance, and how far any degree of freedom has been from where it was first.
+    task : int
+    wanted, done, rejected : int
+        Steps.
+    phase, attempt, iteration, last, contraction, strayed : int, float
+        Where in a step it is.
+    habit, trusted : float, int
+        How much smaller each correction has been than the one before, and in how many steps that was only believed.
+    trending : int
+        Whether accelerations are expected to go on as they went.
+    made_for, mass_for : float
+        Step for which the tangent was made; 1 once the mass has been.
+    newton, factorisations, weighings, worst : int
+    losing, asking : int
+        Whether power is dissipated; whether tangents are asked for.
+    keeping, due, spacing, kept : int, float
+        Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many.
+    power, gained, lost : float
+        Dissipated power; work of the inputs and energy dissipated.
+    v, rate, algorithmic, trend : Reals
+        At the start of the step; see `AlphaPoint`.
+    lead, b, pulled : Reals
+        The method's own acceleration at its end; forces, then corrections; the inputs' forces at its start.
+    weight, turns : Reals
+        One over the yardsticks; 1 for what turns.
+    reach, first : Reals
+        Largest distance of each degree of freedom from where it was first.
+    rows : Reals
+        Time and outputs after each step.
+    states : Reals
+        Poses, degrees of freedom, rates, driven coordinates, and the time.
+    """
+
+    flat: Flat
+    gauges: Gauges
+    fronts: Fronts
+    axes: Axes
+    tangent: Factors
+    mass: Factors
+    v: Reals
+    rate: Reals
+    algorithmic: Reals
+    trend: Reals
+    lead: Reals
+    b: Reals
+    pulled: Reals
+    weight: Reals
+    turns: Reals
+    reach: Reals
+    first: Reals
+    rows: Reals
+    states: Reals
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+    least: float
+    loosest: float
+    share: float
+    asking: int
+    tolerance: float = 0.0
+    error: float = 0.0
+    h: float = 0.0
+    t: float = 0.0
+    size: float = 0.0
+    largest: float = math.inf
+    stop: float = 0.0
+    until: float = 0.0
+    relative: float = 0.0
+    absolute: float = 0.0
+    reached: float = 0.0
+    task: int = FIXED
+    wanted: int = 0
+    done: int = 0
+    rejected: int = 0
+    phase: int = FRESH
+    attempt: int = 0
+    iteration: int = 0
+    last: float = math.inf
+    contraction: float = 0.0
+    strayed: float = 0.0
+    habit: float = 0.0
+    trusted: int = 0
+    trending: int = 0
+    made_for: float = -1.0
+    mass_for: float = 0.0
+    newton: int = 0
+    factorisations: int = 0
+    weighings: int = 0
+    worst: int = 0
+    losing: int = 0
+    keeping: int = 1
+    due: float = 0.0
+    spacing: float = 0.0
+    kept: int = 0
+    power: float = 0.0
+    gained: float = 0.0
+    lost: float = 0.0

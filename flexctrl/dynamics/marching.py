@@ -1,0 +1,348 @@
+"""From a model to a compiled march: its record, and points that come and go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
+from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.march_loops import run
+from flexctrl.dynamics.march_record import (
+    CONTROLLED,
+    DONE,
+    FIXED,
+    FRESH,
+    JUMP,
+    REFACTOR,
+    REMADE,
+    SETTLE,
+    SINGULAR,
+    WANTS_MASS,
+    WANTS_TANGENT,
+    WEIGH,
+    WEIGHED,
+    Factors,
+    March,
+)
+from flexctrl.errors import KernelError
+from flexctrl.mechanics.kernel import Compiled
+from flexctrl.mechanics.native import Packed
+from flexctrl.model.flattening import Flattened, can_be_flat, flatten
+from flexctrl.model.kinds import NODE_SLOT
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
+
+_SHARE = 1e-5
+_LOOSEST = 1e-7
+_TIGHT = 0.99e-10
+_CAPACITY = 1024
+_BYTES = 16e6
+
+
+def can_march(model: Model) -> bool:
+    """Tell whether a model can be marched through time in compiled loops.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    bool
+    """
+    return isinstance(model, Model) and isinstance(model.backend, Compiled) and can_be_flat(model)
+
+
+@dataclass(frozen=True)
+class Method:
+    """What a march needs to know of the method.
+
+    Attributes
+    ----------
+    coefficients : Coefficients
+    least : float
+        Tolerance of Newton's method; one that is not tight may be loosened to a share of the method's own error.
+    weight : numpy.ndarray, shape (n,)
+        One over the yardsticks of the degrees of freedom.
+    turning : numpy.ndarray of bool, shape (n,)
+    """
+
+    coefficients: Coefficients
+    least: float
+    weight: np.ndarray
+    turning: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Remembered:
+    """What later steps of a march depend on beside the point they start from.
+
+    Attributes
+    ----------
+    tangent, mass : numpy.ndarray
+        The workspace when they were made; empty if they have not been.
+    made_for : float
+        Step of the tangent [s].
+    numbers : tuple of float
+        Newton's habit and trust, and his tolerance.
+    """
+
+    tangent: np.ndarray
+    mass: np.ndarray
+    made_for: float
+    numbers: tuple[float, ...]
+
+
+class Pacing(NamedTuple):
+    """Steps of controlled error: the first and the largest, where to stop and what not to pass [s]; the tolerance."""
+
+    size: float
+    largest: float
+    stop: float
+    until: float
+    relative: float
+    absolute: float
+
+
+class Marcher:
+    """A model on a compiled march.
+
+    Parameters
+    ----------
+    model : Model
+        One that `can_march`.
+    method : Method
+    """
+
+    def __init__(self, model: Model, method: Method) -> None:
+        self.model, self.method = model, method
+        self.flattened = flatten(model)
+        self.march = Packed(_march(self.flattened, method))
+        m = self.march
+        self._run = m.bound(run)
+        self._kept: tuple[tuple[int, int], np.ndarray, np.ndarray] = ((-1, -1), np.zeros(0), np.zeros(0))
+        self.width = 1 + len(model.outputs)
+        self.rows = m.rows.reshape(-1, self.width)
+
+    def remembered(self) -> Remembered:
+        """Return what another march needs to go on with the same bits."""
+        m, kept = self.march, self._kept
+        if (m.factorisations, m.weighings) != kept[0]:
+            tangent = m.tangent.place.copy() if m.made_for > 0.0 else np.zeros(0)
+            mass = m.mass.place.copy() if m.mass_for == 1.0 else np.zeros(0)
+            self._kept = kept = ((m.factorisations, m.weighings), tangent, mass)
+        return Remembered(kept[1], kept[2], m.made_for, (m.habit, m.trusted, m.tolerance))
+
+    def recall(self, memory: Remembered) -> None:
+        """Go on as the march whose memory this is."""
+        m, f = self.march, self.flattened.flat
+        made = m.factorisations
+        for place, factors, mass in ((memory.tangent, m.tangent, False), (memory.mass, m.mass, True)):
+            if place.size:
+                f.z[:], m.h = place, memory.made_for
+                self._make(factors, mass)
+        m.factorisations, m.made_for = made, memory.made_for
+        habit, trusted, m.tolerance = memory.numbers
+        m.habit, m.trusted = habit, int(trusted)
+
+    def _make(self, factors: Factors, mass: bool) -> None:
+        if self.march.asking:
+            self._made(factors, (0.0, 0.0, 1.0) if mass else self._seeds, WEIGH if mass else REFACTOR)
+        else:
+            self._do(WEIGHED if mass else REMADE)
+
+    @property
+    def room(self) -> int:
+        """How many steps can be taken in one call."""
+        return len(self.march.states) // self._state_width if self.march.keeping else _CAPACITY
+
+    @cached_property
+    def _state_width(self) -> int:
+        f = self.flattened.flat
+        return 12 * f.nodes + 2 * f.padded + f.drives + 1
+
+    def entered(self, point: AlphaPoint) -> Marcher:
+        """Put a point at the start; return the march."""
+        m, F = self.march, self.flattened
+        F.enter(point.state)
+        m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
+        m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
+        m.trending, m.phase, m.attempt, m.t = int(point.trend.any()), FRESH, 0, point.state.t
+        self.supply(point.supply.u)
+        self.open(point.state.q, np.zeros(self.model.n), False)
+        return self
+
+    def open(self, first: np.ndarray, moved: np.ndarray, losing: bool) -> None:
+        """Open the books.
+
+        Parameters
+        ----------
+        first, moved : numpy.ndarray, shape (n,)
+            Where the degrees of freedom were at first, and how far they have been from there.
+        losing : bool
+            Whether power is dissipated.
+        """
+        m, F = self.march, self.flattened
+        m.first[:], m.reach[:] = F.ordered(first), F.ordered(moved)
+        m.reached = float((moved * self.method.weight).max(initial=0.0))
+        m.losing, m.gained, m.lost = int(losing), 0.0, 0.0
+        self._do(SETTLE)
+
+    def worst(self) -> int:
+        """Return the degree of freedom with the largest correction in the last iteration."""
+        m, order = self.march, self.flattened.plan.order
+        return int(order[np.argmax(np.abs(m.b * m.weight)[: self.flattened.flat.n])])
+
+    def supply(self, u: np.ndarray) -> None:
+        """Set the inputs."""
+        self.flattened.flat.u[:] = u
+
+    def point(self, supply: Supply) -> AlphaPoint:
+        """Return where the march stands."""
+        m, F = self.march, self.flattened
+        return AlphaPoint(F.state(m.v, m.t), F.own(m.rate), supply, F.own(m.algorithmic), F.own(m.trend))
+
+    def fixed(self, h: float, count: int) -> int:
+        """Take up to ``count`` steps of one length; return how it ended."""
+        return self.travel(h, count)[0]
+
+    def travel(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
+        """Take up to ``count`` steps of one length or as paced; return how it ended, and how many there were."""
+        m = self.march
+        m.wanted, m.done, m.kept = count, 0, 0
+        if isinstance(pacing, Pacing):
+            m.size, m.largest, m.stop, m.until, m.relative, m.absolute = pacing
+            status = self._through(CONTROLLED)
+        else:
+            m.h = pacing
+            status = self._through(FIXED)
+        return status, m.done
+
+    def travelled(self, pacing: float | Pacing, count: int) -> list[State]:
+        """Take as many steps and return the states after them."""
+        found: list[State] = []
+        while len(found) < count:
+            self.travel(pacing, min(self.room, count - len(found)))
+            found += self.states()
+            if isinstance(pacing, Pacing):
+                pacing = pacing._replace(size=self.march.size)
+        return found
+
+    def keep(self, all_states: bool, due: float = math.inf, spacing: float = math.inf) -> None:
+        """Keep the states after all steps, or only when they are due."""
+        m = self.march
+        m.keeping, m.due, m.spacing = int(all_states), due, spacing
+
+    def books(self) -> tuple[float, float, np.ndarray, float]:
+        """Return work, losses, how far degrees of freedom have been, and the power dissipated now."""
+        m = self.march
+        return m.gained, m.lost, self.flattened.own(m.reach), m.power
+
+    def jump(self, u: np.ndarray) -> int:
+        """Let the inputs jump; return how it ended."""
+        self.supply(u)
+        return self._through(JUMP)
+
+    def _do(self, task: int) -> int:
+        self.march.task = task
+        return self._run()
+
+    def _through(self, task: int) -> int:
+        """Do a task, with the matrices it asks for."""
+        while True:
+            status = self._do(task)
+            if status == WANTS_TANGENT:
+                made = self._made(self.march.tangent, self._seeds, REFACTOR)
+            elif status == WANTS_MASS:
+                made = self._made(self.march.mass, (0.0, 0.0, 1.0), WEIGH)
+            else:
+                return status
+            if made != DONE:
+                self.march.phase = FRESH
+                return SINGULAR
+
+    @property
+    def _seeds(self) -> tuple[float, float, float]:
+        c, h = self.method.coefficients, self.march.h
+        return 1.0, c.gamma / (h * c.beta), (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
+
+    def _made(self, factors: Factors, seeds: tuple[float, float, float], task: int) -> int:
+        """Fill in a matrix that the loops do not make themselves, and factorise it."""
+        F, f, m = self.flattened, self.flattened.flat, self.march
+        poses = f.z[: self.model.forces.drive_base].reshape(-1, NODE_SLOT)[:, :12]
+        state = F.pose_state(poses.ravel(), f.q + f.step, f.v, f.found, m.t)
+        slope = self.model.slope(state, state.v, F.own(f.rate), seeds, f.u).tocoo()
+        factors.entries[:] = 0.0
+        try:
+            factors.entries[F.plan.places(slope.row, slope.col)] = slope.data
+        except KernelError:
+            return SINGULAR
+        return self._do(task)
+
+    def states(self) -> list[State]:
+        """Return the states kept in the last call."""
+        F, f, count = self.flattened, self.flattened.flat, self.march.kept
+        if not count:
+            return []
+        n, nodes, width = f.n, 12 * f.nodes, self._state_width
+        table = self.march.states[: count * width].reshape(count, width).copy()
+        poses = table[:, :nodes].reshape(count, -1, 12)
+        x, R = np.ascontiguousarray(poses[:, :, :3]), np.ascontiguousarray(poses[:, :, 3:])
+        q, v = np.empty((2, count, n))
+        q[:, F.plan.order] = table[:, nodes : nodes + n]
+        v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
+        driven, t = table[:, nodes + 2 * f.padded : width - 1], table[:, width - 1].tolist()
+        R = R.reshape(count, -1, 3, 3)
+        return [State(x[i], R[i], q[i], v[i], driven[i], t[i]) for i in range(count)]
+
+
+def _march(F: Flattened, method: Method) -> March:
+    flat, c = F.flat, method.coefficients
+    v, rate, algorithmic, trend, lead, b, pulled, reach, first = np.zeros((9, flat.padded))
+    state = 12 * flat.nodes + 2 * flat.padded + flat.drives + 1
+    return March(
+        flat=flat,
+        gauges=F.gauges,
+        fronts=F.plan.fronts,
+        axes=F.axes,
+        tangent=_factors(F),
+        mass=_factors(F),
+        v=v,
+        rate=rate,
+        algorithmic=algorithmic,
+        trend=trend,
+        lead=lead,
+        b=b,
+        pulled=pulled,
+        weight=F.ordered(method.weight),
+        turns=F.ordered(method.turning.astype(float)),
+        reach=reach,
+        first=first,
+        rows=np.zeros((1 + F.gauges.outputs) * _CAPACITY),
+        states=np.zeros(state * int(min(_CAPACITY, max(1, _BYTES // (8 * state))))),
+        alpha_m=c.alpha_m,
+        alpha_f=c.alpha_f,
+        beta=c.beta,
+        gamma=c.gamma,
+        least=method.least,
+        loosest=max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
+        share=_SHARE,
+        asking=int(not flat.tangents),
+        tolerance=method.least,
+    )
+
+
+def _factors(F: Flattened) -> Factors:
+    axes = F.axes
+    made, turned = np.zeros((2, 9 * axes.count))
+    entries, place = np.zeros(F.plan.length + 1), np.zeros(F.flat.size)
+    return Factors(
+        entries, np.zeros(F.flat.n), np.zeros(F.plan.widest), made, turned, np.zeros(axes.angle_count), place
+    )

@@ -1,0 +1,123 @@
+"""Steps of generalised alpha by compiled loops, with the plain ones behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from flexctrl.dynamics import alpha
+from flexctrl.dynamics.alpha import AlphaPoint
+from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.march_record import DONE
+from flexctrl.dynamics.marching import Marcher, Method, Remembered
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.steps import Counts
+from flexctrl.model.motion import State
+
+__all__ = ["MarchingStepper", "Memory"]
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """The tangents in use: of the plain steps and of the march."""
+
+    plain: alpha.Tangent | None
+    march: Remembered
+
+
+@dataclass
+class MarchingStepper:
+    """A stepper whose steps are marched; what fails there is tried plainly.
+
+    For models that `can_march`, without a continuous controller.
+
+    Attributes
+    ----------
+    plain : Stepper
+    """
+
+    plain: alpha.Stepper
+    _here: AlphaPoint | None = None
+    _made: int = 0
+
+    @property
+    def counts(self) -> Counts:
+        """What the steps have cost so far."""
+        return self.plain.counts
+
+    @cached_property
+    def marcher(self) -> Marcher:
+        """The model on a march."""
+        p = self.plain
+        return Marcher(p.model, Method(p.coefficients, p.tolerance, p.weight, p.turning))
+
+    @property
+    def memory(self) -> Memory:
+        """The tangents in use."""
+        return Memory(self.plain.memory, self.marcher.remembered())
+
+    def recall(self, memory: Memory) -> None:
+        """Make the tangents of another stepper's memory again."""
+        self.plain.recall(memory.plain)
+        self.marcher.recall(memory.march)
+        self._here = None
+
+    def start(self, state: State, supply: Supply, step: float) -> AlphaPoint:
+        """Return a state with the accelerations it has under its inputs.
+
+        Raises
+        ------
+        SingularMatrixError
+            If a freedom has neither mass nor stiffness.
+        """
+        zero = np.zeros(self.plain.model.n)
+        self.enter(AlphaPoint(state, zero, supply, zero, zero))
+        if self.marcher.jump(supply.u) != DONE:
+            return self.plain.start(state, supply, step)
+        return self.leave(supply)
+
+    def renew(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
+        """Return a point under other inputs: the true accelerations jump; the method's own keep their lead on them."""
+        self.enter(point)
+        if self.marcher.jump(supply.u) == DONE:
+            return self.leave(supply)
+        self._here = None
+        return self.plain.renew(point, supply, step)
+
+    def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
+        """Return the point a step later.
+
+        Raises
+        ------
+        StepError
+            If Newton's method does not converge, even with a fresh tangent.
+        """
+        self.enter(point)
+        done = self.marcher.fixed(h, 1) == DONE
+        self.count()
+        return self.leave(point.supply) if done else self.plain.step(point, h)
+
+    def error(self, before: AlphaPoint, after: AlphaPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
+        """Return the local error of the step just taken over what is allowed."""
+        return self.plain.error(before, after, moved, tolerance)
+
+    def enter(self, point: AlphaPoint) -> None:
+        """Put the march at a point, unless it is there."""
+        if point is not self._here:
+            self.marcher.entered(point)
+            self._here = point
+
+    def leave(self, supply: Supply) -> AlphaPoint:
+        """Return where the march stands."""
+        self._here = point = self.marcher.point(supply)
+        return point
+
+    def count(self) -> None:
+        """Take over what the march has counted."""
+        m, counts = self.marcher.march, self.counts
+        counts.newton += m.newton
+        counts.factorisations += m.factorisations - self._made
+        counts.worst = self.marcher.worst()
+        m.newton, self._made = 0, m.factorisations

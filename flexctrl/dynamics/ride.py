@@ -1,0 +1,125 @@
+"""Many steps of a run at once, where its method marches: from sample to sample of a controller too.
+
+A ride does what `Journey` does step by step: it stops at samples, lets the inputs jump, and fills books, rows,
+frames and track. States between are not kept; the track makes them by riding again when it is asked for them.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.dynamics.legs import Leg, Legs
+from flexctrl.dynamics.march_record import DONE
+from flexctrl.dynamics.marching import Pacing
+from flexctrl.dynamics.marching_stepper import MarchingStepper
+from flexctrl.dynamics.steps import Controlled
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["ride"]
+
+_NEAR = 1e-9
+_SECONDS = 0.1
+
+
+def ride(journey: Journey) -> bool:
+    """Take as many steps of a run as can be marched, for about a tenth of a second; tell whether there were any."""
+    stepper = journey.stepper
+    if not isinstance(stepper, MarchingStepper) or not journey.watch.idle:
+        return False
+    return _Ride(journey, stepper).go()
+
+
+class _Ride:
+    """A ride under way."""
+
+    def __init__(self, journey: Journey, stepper: MarchingStepper) -> None:
+        j = self.journey = journey
+        self.stepper, self.marcher, self.supply = stepper, stepper.marcher, j.point.supply
+        self.tick, self.until = 1e-12 * j.plan.until, j.plan.until
+        stepper.enter(j.point)
+        sums = j.books.sums
+        self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved)
+        self.marcher.open(j.books.first, sums.moved, j.books.dissipates)
+        self.marcher.keep(not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time), *j.rows.due())
+        self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
+
+    def go(self) -> bool:
+        """Ride on from stop to stop."""
+        began, m = time.perf_counter(), self.marcher.march
+        well = True
+        while well and m.t < self.until - self.tick and time.perf_counter() - began < _SECONDS:
+            stop = self.journey.stops.next
+            well = self._leg(stop) if stop - m.t > self.tick else self._renew(stop)
+        return self._end()
+
+    def _leg(self, stop: float) -> bool:
+        """Go on towards a stop; tell whether all is well."""
+        t = self.marcher.march.t
+        pacing, count = self._paced(t, stop)
+        if not count:
+            return False
+        status, done = self.marcher.travel(pacing, count)
+        if done:
+            self._passed(Leg(self.supply, t, pacing, done), stop)
+        return status == DONE and done > 0
+
+    def _paced(self, t: float, stop: float) -> tuple[float | Pacing, int]:
+        """How steps are taken from here, and how many at most."""
+        plan, mark = self.journey.plan, self.journey.mark
+        pace, room = plan.method.pace, self.marcher.room
+        if isinstance(pace, Controlled):
+            tolerance = plan.tolerance
+            return Pacing(mark.size, pace.largest, stop, self.until, tolerance.relative, tolerance.absolute), room
+        if not mark.left:
+            count = max(1, math.ceil((stop - t) / pace.step - 1e-6)) if math.isfinite(stop) else 0
+            mark.size, mark.left = (stop - t) / count if count else pace.step, count or -1
+        room = min(room, math.floor((self.until - t) / mark.size + _NEAR))
+        return mark.size, room if mark.left < 0 else min(room, mark.left)
+
+    def _passed(self, leg: Leg, stop: float) -> None:
+        """Enter a leg in marks and rows."""
+        marcher, mark, rows = self.marcher, self.journey.mark, self.journey.rows
+        self.legs.legs.append(leg)
+        mark.steps += leg.count
+        mark.left -= leg.count if mark.left > 0 else 0
+        if isinstance(leg.pacing, Pacing):
+            mark.size = marcher.march.size
+        states = marcher.states()
+        to_jump = stop - marcher.march.t <= self.tick
+        rows.ridden(self.last, marcher.rows[: leg.count], states, leg.supply, to_jump)
+        self.last = states[-1] if len(states) == leg.count else self.last
+
+    def _renew(self, stop: float) -> bool:
+        """Take a sample and let the inputs jump."""
+        j, m = self.journey, self.marcher.march
+        m.t = stop
+        j.stops.passed += 1
+        j.mark.left = 0
+        y = self.marcher.rows[m.done - 1, 1:]
+        feed, before = j.plan.feed, self.supply
+        self.supply = feed.sampled(stop, y[feed.reads], before)
+        u = self.supply.u
+        if j.rows.row(stop, y, u, 1e-6 * j.mark.size) and abs(self.last.t - stop) < self.tick:
+            j.rows.frame(self.last)
+        self.jumped = np.array_equal(u, before.u) or self.marcher.jump(u) == DONE
+        return self.jumped
+
+    def _end(self) -> bool:
+        """Hand over to the journey; tell whether there were any steps."""
+        j, m, legs = self.journey, self.marcher.march, self.legs.legs
+        self.stepper.count()
+        j.mark.rejected += m.rejected - self.rejected
+        if not legs:
+            return False
+        self.legs.end = j.point = self.stepper.leave(self.supply)
+        j.books.enter_ride(sum(leg.count for leg in legs), self.marcher.books(), j.point)
+        j.track.remember(self.legs)
+        if not self.jumped:
+            j.point = self.stepper.plain.renew(j.point, self.supply, j.mark.size)
+        return True
