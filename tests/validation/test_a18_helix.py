@@ -60,6 +60,7 @@ def test_the_end_is_on_the_helix(record, slenderness):
     )
 
 
+@pytest.mark.slow
 def test_strains_are_constant(record):
     _, rest = helix(1e2, 40)
     R = rest.state.R[:41]
