@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ReducedStates", "Triple", "states_transfer"]
 
+_CLOSEST = float(np.finfo(float).eps)
+
 
 class Triple(NamedTuple):
     """ẋ = A x + B u, y = C x."""
@@ -49,7 +51,9 @@ def states_transfer(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) 
         x = np.zeros((*load.shape, s.size), complex)
         for k in range(len(T) - 1, -1, -1):
             above = np.tensordot(T[k, k + 1 :], x[k + 1 :], 1)
-            x[k] = (load[k, :, None] + above) / (s - T[k, k])
+            away = s - T[k, k]
+            # on the pole itself: as near as round-off lets s be, so a search that runs into it sees a large value
+            x[k] = (load[k, :, None] + above) / np.where(away == 0.0, _CLOSEST * max(abs(T[k, k]), _CLOSEST), away)
         return np.asarray(np.tensordot(seen, x, 1) + D[:, :, None])
 
     return evaluate
