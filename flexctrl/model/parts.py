@@ -178,9 +178,9 @@ def energies_by_part(parts: Mapping[str, PartMatrices], shapes: np.ndarray) -> t
     """
     if isinstance(parts, Parts):
         return parts.energies(shapes)
-    none = np.zeros((0, shapes.shape[1]))
+    size = (len(parts), shapes.shape[1])
     strain, kinetic = (
-        np.array([np.einsum("ij,ij->j", shapes.conj(), A @ shapes).real for A in matrices]).reshape(len(parts), none.shape[1])
+        np.array([np.einsum("ij,ij->j", shapes.conj(), A @ shapes).real for A in matrices]).reshape(size)
         for matrices in ([p.stiffness for p in parts.values()], [p.mass for p in parts.values()])
     )
     return strain, kinetic
