@@ -97,6 +97,11 @@ class LinearModel:
         for name, shape in shapes.items():
             _check_matrix(name, getattr(self, name), shape)
 
+    def __str__(self) -> str:
+        signals = f"{', '.join(self.inputs) or 'nothing'} → {', '.join(self.outputs) or 'nothing'}"
+        size = f"{self.name}: {len(self.coordinates)} degrees of freedom, {signals}"
+        return f"{size}\n{self.certificate}" if self.certificate else size
+
     # -- views and transformations
 
     def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:

@@ -197,3 +197,10 @@ def test_a_large_model_is_reduced_sparsely():
     static = sp.linalg.spsolve(full.K.tocsc(), full.B[:, 0])
     np.testing.assert_allclose(dense_response(reduced.linear, np.zeros(1))[0, 0, 0], full.Cq[0] @ static, rtol=1e-9)
     assert reduced.error_up_to(0.5 * reduced.modes().frequencies[-1]).worst < 0.05
+
+
+def test_models_say_in_a_line_what_they_are():
+    linear = s.chain(6)
+    reduced = linear.reduce(ModalTruncation(2))
+    assert str(reduced).startswith(f"{linear.name}: 2 of 6 coordinates by ModalTruncation")
+    assert str(linear).splitlines()[0].startswith(f"{linear.name}: 6 degrees of freedom, ")

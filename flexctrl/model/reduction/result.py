@@ -49,6 +49,9 @@ class Reduced(ABC):
     full: LinearModel
     method: Method
 
+    def __str__(self) -> str:
+        return f"{self.full.name}: {self.order} of {len(self.full.coordinates)} coordinates by {self.method}"
+
     @property
     @abstractmethod
     def order(self) -> int:
