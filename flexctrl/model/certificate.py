@@ -208,7 +208,8 @@ def _without(shapes: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 def whole_body(coordinates: tuple[str, ...], motion: Motion, state: State) -> list[tuple[str, np.ndarray]]:
     """Return displacements of some coordinates in which the whole machine moves as one, with their names."""
-    places = [motion.names.index(name) for name in coordinates]
+    number = {name: i for i, name in enumerate(motion.names)}
+    places = [number[name] for name in coordinates]
     T = motion.jacobian(state)[:, places]
     x = state.x[:-1]
     center = x.mean(axis=0)

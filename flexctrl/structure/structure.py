@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -266,9 +267,9 @@ def _check_names(s: Structure) -> None:
     parts = [item.name for item in (*s.elements, *s.drives)]
     signals = [item.name for item in (*s.inputs, *s.outputs)]
     for kind, names in (("part", parts), ("signal", signals)):
-        twice = [name for i, name in enumerate(names) if name in names[:i]]
-        if twice:
-            raise StructureError(f"Structure {s.name!r}: the {kind} name {twice[0]!r} is used twice; rename one")
+        twice = next((name for name, count in Counter(names).items() if count > 1), None)
+        if twice is not None:
+            raise StructureError(f"Structure {s.name!r}: the {kind} name {twice!r} is used twice; rename one")
 
 
 def _check_nodes(s: Structure) -> None:

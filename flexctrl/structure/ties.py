@@ -105,13 +105,14 @@ class _Tying:
             links[a].add(b)
             links[b].add(a)
         depth: dict[int, int] = {}
-        while left := [u for u in links if u not in depth]:
-            most = max(held[u] for u in left)
-            level, step = {u for u in left if held[u] == most} if most else {left[0]}, 0
-            while level:
-                depth |= dict.fromkeys(level, step)
-                level = {q for p in level for q in links[p] if q not in depth}
-                step += 1
+        for most in sorted(set(held.values()), reverse=True):
+            units = [u for u in links if held[u] == most]
+            for start in [units] if most else [[u] for u in units]:
+                level, step = {u for u in start if u not in depth}, 0
+                while level:
+                    depth.update(dict.fromkeys(level, step))
+                    level = {q for p in level for q in links[p] if q not in depth}
+                    step += 1
         return depth
 
     def _unite(self, joints: Sequence[Joint]) -> list[Hinge | Slide]:
