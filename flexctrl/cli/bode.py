@@ -10,8 +10,8 @@ import numpy as np
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
 from flexctrl.cli.loops import Cut, cut_of
 from flexctrl.cli.program import Request
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.response import FrequencyResponse
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.response import FrequencyResponse
 from flexctrl.plots.frequency import plot_bode
 from flexctrl.plots.loops import mark_margins
 from flexctrl.scene import load_scene

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexctrl.cli.program import Request
 from flexctrl.errors import SceneError, did_you_mean
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.scene import Scene
 from flexctrl.study.broken_loop import broken_loop
 from flexctrl.study.loop import Loop, open_loop

@@ -7,7 +7,7 @@ import numpy as np
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
 from flexctrl.cli.program import Request
 from flexctrl.errors import SceneError
-from flexctrl.model.modes import Modes
+from flexctrl.linear.modes import Modes
 from flexctrl.plots.modes import modes_figure
 from flexctrl.scene import Scene, load_scene
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
 from flexctrl.cli.program import Request
-from flexctrl.model.condense import Audit, Freedom
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.condense import Audit, Freedom
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.plots.machine import add_machine_axes, draw_machine
 from flexctrl.scene import load_scene

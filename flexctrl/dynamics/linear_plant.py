@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.motion import State
 from flexctrl.structure.freedoms import check_finite
 

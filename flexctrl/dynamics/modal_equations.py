@@ -9,10 +9,10 @@ import numpy as np
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_plant import LinearPlant
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.modal import modal_system
+from flexctrl.linear.modal import modal_system
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.statespace import FirstOrder, first_order
 from flexctrl.model.model import Model
-from flexctrl.model.statespace import FirstOrder, first_order
 
 __all__ = ["ModalEquations", "closed", "opened"]
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from flexctrl.model.statespace import FirstOrder
+from flexctrl.linear.statespace import FirstOrder
 
 __all__ = ["NODES", "Propagator", "response"]
 

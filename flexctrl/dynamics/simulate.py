@@ -25,8 +25,8 @@ from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.equilibrium import Rest
-from flexctrl.model.linear import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 

@@ -1,1 +1,1 @@
-"""The equations: coordinates, assembly, equilibrium, linear models and their reduction."""
+"""The equations of a machine: coordinates, assembly, equilibrium, linearisation."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexctrl.model.condense import Audit, Freedom
-from flexctrl.model.condense import audit as audit_linear
+from flexctrl.linear.condense import Audit, Freedom
+from flexctrl.linear.condense import audit as audit_linear
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.equilibrium import Rest
-from flexctrl.model.linear import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.balance import Balance
-from flexctrl.model.certificate import whole_body
+from flexctrl.model.certify import whole_body
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.pivots import holds, negative_pivots

@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.linear.parts import Parts, parts_of
 from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.model.families import Family
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.mixed import Excess, Mixed
 from flexctrl.model.motion import DENSE_UP_TO, Motion, State
-from flexctrl.model.parts import Parts, parts_of
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError
+from flexctrl.linear.model import LinearModel, Place
 from flexctrl.model.balance import Balance
-from flexctrl.model.certificate import certify, taylor_slope
+from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.equilibrium import Rest, equilibrium
-from flexctrl.model.linear import LinearModel, Place
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque

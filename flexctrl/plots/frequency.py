@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from flexctrl.errors import StructureError
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.response import FrequencyResponse
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.response import FrequencyResponse
 from flexctrl.plots.modes import modes_picture
 from flexctrl.plots.style import CYCLE, INK, new_figure, tidy
 

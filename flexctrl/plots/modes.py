@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from flexctrl.linear.model import Place
+from flexctrl.linear.modes import Modes
 from flexctrl.mechanics.rotation import exponential
-from flexctrl.model.linear import Place
-from flexctrl.model.modes import Modes
 from flexctrl.plots.machine import Drawn, add_machine_axes, best_plane, draw_deformed
 from flexctrl.plots.style import CYCLE, INK, PALE, new_figure, tidy
 

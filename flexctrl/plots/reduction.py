@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.model.reduction import Reduced
+from flexctrl.linear.reduction import Reduced
 from flexctrl.plots.frequency import HZ, channel_values, line_style
 from flexctrl.plots.style import INK, new_figure, tidy
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.model.modes import Modes
+from flexctrl.linear.modes import Modes
 from flexctrl.plots.modes import mode_label, mode_pose
 from flexctrl.structure.structure import Structure
 

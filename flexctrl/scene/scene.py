@@ -20,9 +20,9 @@ from flexctrl.effects.flexibility import Flexible
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import SceneError, did_you_mean
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
-from flexctrl.model.linear import LinearModel
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State

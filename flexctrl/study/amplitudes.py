@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from flexctrl.errors import StructureError
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 

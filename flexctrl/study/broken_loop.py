@@ -13,7 +13,7 @@ from flexctrl.design.hardware import Delayed
 from flexctrl.design.tracking import Commanded, OpenLoop, Together
 from flexctrl.design.wrapping import Wrapper
 from flexctrl.errors import ControllerError, StructureError, did_you_mean
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.study.loop import Loop, open_loop
 
 __all__ = ["broken_loop", "linear_law"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.reduction.low_frequency import undamped
-from flexctrl.model.statespace import modal_first_order
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.reduction.low_frequency import undamped
+from flexctrl.linear.statespace import modal_first_order
 
 __all__ = ["Quadruple", "channel_states"]
 

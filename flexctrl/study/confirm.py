@@ -12,7 +12,7 @@ from flexctrl.dynamics.alpha import GeneralizedAlpha
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.errors import StructureError
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.study.critical_mode import CriticalMode, critical_mode

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.design.controller import LinearController
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.parts import energies_by_part
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.parts import energies_by_part
 from flexctrl.study.gain_family import Crossing, GainFamily
 
 __all__ = ["CriticalMode", "Origin", "critical_mode"]

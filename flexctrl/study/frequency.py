@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from flexctrl.model.grid import peak_grid, refined
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.reduction import Reduced
-from flexctrl.model.response import response_span
-from flexctrl.model.transfer import transfer
+from flexctrl.linear.grid import peak_grid, refined
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.reduction import Reduced
+from flexctrl.linear.response import response_span
+from flexctrl.linear.transfer import transfer
 from flexctrl.study.loop import Loop
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from scipy.optimize import linear_sum_assignment
 
 from flexctrl.design.controller import LinearController
 from flexctrl.errors import StructureError
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.statespace import modal_first_order
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.statespace import modal_first_order
 
 __all__ = ["Crossing", "GainFamily", "Spectrum", "first_crossing", "gain_family"]
 

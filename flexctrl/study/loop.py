@@ -11,10 +11,10 @@ import numpy as np
 from scipy.linalg import eigvals, matrix_balance
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.reduction import Reduced, ReducedModel, ReducedStates
-from flexctrl.model.reduction.states import states_transfer
-from flexctrl.model.transfer import transfer
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.reduction import Reduced, ReducedModel, ReducedStates
+from flexctrl.linear.reduction.states import states_transfer
+from flexctrl.linear.transfer import transfer
 from flexctrl.study.channel import channel_states
 from flexctrl.study.zeros import deflated_zeros, zeros
 

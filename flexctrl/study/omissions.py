@@ -18,7 +18,7 @@ from flexctrl.effects.flexibility import BeamFlexibility, Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import ControllerError
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.structure.elements import Beam
 from flexctrl.structure.structure import Structure

@@ -13,9 +13,9 @@ from flexctrl.dynamics.alpha import GeneralizedAlpha, Integrator
 from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.errors import EquilibriumError, LinearizationError, StructureError, did_you_mean
+from flexctrl.linear.statespace import modal_first_order
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
-from flexctrl.model.statespace import modal_first_order
 from flexctrl.study.amplitudes import Amplitude, Case, ConstantLoad
 
 __all__ = [

@@ -10,9 +10,9 @@ import numpy as np
 
 from flexctrl.design.controller import LinearController
 from flexctrl.errors import StructureError
+from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
-from flexctrl.model.linear import LinearModel
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.study.channel import Quadruple, channel_states
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ HOUSE = (
     "structure",
     "mechanics",
     "effects",
+    "linear",
     "model",
     "design",
     "dynamics",

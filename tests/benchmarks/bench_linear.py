@@ -15,11 +15,11 @@ import control
 import numpy as np
 import scipy.linalg as la
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "model"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "linear"))
 
 from fixtures import structures as s
 
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 
 
 def best_of(times: int, job: Callable[[], object]) -> float:

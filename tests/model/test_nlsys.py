@@ -11,8 +11,8 @@ import flexctrl as fc
 from flexctrl.design import ControllerError
 from flexctrl.dynamics.sampled import sampled_response
 from flexctrl.errors import ChartError, MechanismError, StructureError
+from flexctrl.linear.statespace import PhysicalForm
 from flexctrl.model.nlsys import equations_of
-from flexctrl.model.statespace import PhysicalForm
 
 G = 9.81
 RIGID = (fc.Gravity(), fc.LargeRotation())

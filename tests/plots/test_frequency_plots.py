@@ -10,8 +10,8 @@ import pytest
 import scipy.sparse as sp
 
 from flexctrl.errors import StructureError
-from flexctrl.model.linear import LinearModel
-from flexctrl.model.reduction import ModalTruncation
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.reduction import ModalTruncation
 from flexctrl.plots.frequency import plot_bode
 from flexctrl.plots.loops import mark_margins, plot_nichols, plot_nyquist, plot_sensitivities
 from flexctrl.plots.reduction import plot_reduction

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 
 G = 9.81
 

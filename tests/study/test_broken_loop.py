@@ -23,7 +23,7 @@ from flexctrl.design import (
     pid,
 )
 from flexctrl.errors import StructureError
-from flexctrl.model.linear import LinearModel
+from flexctrl.linear.model import LinearModel
 from flexctrl.study.broken_loop import broken_loop, linear_law
 from flexctrl.study.frequency import margins
 

@@ -9,7 +9,7 @@ import pytest
 from plants import cantilever, chain, crane, plant
 
 from flexctrl.errors import StructureError
-from flexctrl.model.reduction import BalancedTruncation, ModalTruncation
+from flexctrl.linear.reduction import BalancedTruncation, ModalTruncation
 from flexctrl.study.frequency import loop_grid, margins, peak_gain
 from flexctrl.study.loop import open_loop
 

@@ -91,7 +91,7 @@ def test_noncollocated_zeros_and_their_uncertainty(elements, output):
 def test_python_control_misses_what_is_found_here():
     """Design fact: in [q; q'] form SLICOT's non-collocated zeros of a stiff beam are wrong, without a word."""
     pytest.importorskip("slycot", reason="without the extra [slicot] control takes scipy's zeros, which are right")
-    from flexctrl.model.statespace import PhysicalForm
+    from flexctrl.linear.statespace import PhysicalForm
 
     linear = cantilever(20).select(outputs=["middle"])
     found = zeros(linear).finite

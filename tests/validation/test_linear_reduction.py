@@ -10,7 +10,7 @@ import pytest
 from recorder import Absolute
 
 import flexctrl as fc
-from flexctrl.model.reduction.balanced import hankel_singular_values
+from flexctrl.linear.reduction.balanced import hankel_singular_values
 
 PAGE = "linear"
 TABLE = {

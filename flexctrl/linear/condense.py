@@ -1,0 +1,261 @@
+"""Audit of freedoms, and exact condensation of the massless ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.errors import LinearizationError, MechanismError
+from flexctrl.linear.eigen import coordinate_scales
+from flexctrl.linear.massless import Massless, as_dense, massless, pivots, solved
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.pattern import congruent, symmetric
+
+__all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map"]
+
+
+class Freedom(Enum):
+    """What a coordinate is, dynamically."""
+
+    DYNAMIC = "dynamic"
+    STATIC = "massless but stiff"
+    RELAXING = "massless but damped"
+    MECHANISM = "mechanism"
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Label of every coordinate.
+
+    Where a massless direction does not lie along one coordinate, the coordinate that carries most of it
+    bears the label.
+
+    Attributes
+    ----------
+    coordinates : tuple of str
+    labels : tuple of Freedom
+    mechanisms : tuple of tuple of str
+        For each motion without mass and stiffness, the coordinates that move, most first.
+    """
+
+    coordinates: tuple[str, ...]
+    labels: tuple[Freedom, ...]
+    mechanisms: tuple[tuple[str, ...], ...]
+
+    def named(self, kind: Freedom) -> tuple[str, ...]:
+        """Names of the coordinates with this label.
+
+        Parameters
+        ----------
+        kind : Freedom
+
+        Returns
+        -------
+        tuple of str
+        """
+        return tuple(name for name, label in zip(self.coordinates, self.labels, strict=True) if label is kind)
+
+    def __str__(self) -> str:
+        lines = [f"{len(self.coordinates)} freedoms"]
+        for kind in Freedom:
+            names = self.named(kind)
+            shown = "" if kind is Freedom.DYNAMIC else ": " + ", ".join(names)
+            if names:
+                lines.append(f"  {len(names)} {kind.value}{shown}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """A linear model in coordinates scaled by powers of two, with its massless freedoms.
+
+    Attributes
+    ----------
+    model : LinearModel
+        In scaled coordinates z; q = scales · z. It knows neither parts nor place.
+    scales : numpy.ndarray, shape (n,)
+    massless : Massless
+    """
+
+    model: LinearModel
+    scales: np.ndarray
+    massless: Massless
+
+    @cached_property
+    def stiffness(self) -> tuple[sp.csc_matrix, float]:
+        """The symmetric part of K, and the largest entry of the rest relative to K's largest."""
+        even, gap = symmetric(self.model.K)
+        return even, gap / max(float(np.abs(even.data).max(initial=0.0)), np.finfo(float).tiny)
+
+    @cached_property
+    def mass(self) -> sp.csc_matrix:
+        """The symmetric part of M."""
+        return symmetric(self.model.M)[0]
+
+
+def audit(linear: LinearModel) -> Audit:
+    """Label every coordinate dynamic, static, relaxing or mechanism.
+
+    Parameters
+    ----------
+    linear : LinearModel
+
+    Returns
+    -------
+    Audit
+        Never raises for a mechanism; :func:`condense` does.
+    """
+    kinds = linear._scaled.massless
+    labels = [Freedom.DYNAMIC] * len(linear.coordinates)
+    for basis, kind in (
+        (kinds.static, Freedom.STATIC),
+        (kinds.relaxing, Freedom.RELAXING),
+        (kinds.mechanisms, Freedom.MECHANISM),
+    ):
+        for i in pivots(basis):
+            labels[i] = kind
+    return Audit(linear.coordinates, tuple(labels), _moving(kinds.mechanisms, linear.coordinates))
+
+
+def scaled(linear: LinearModel) -> Scaled:
+    """Scale the coordinates and sort the massless freedoms.
+
+    Parameters
+    ----------
+    linear : LinearModel
+
+    Returns
+    -------
+    Scaled
+
+    Raises
+    ------
+    MechanismError
+        For a motion with neither mass nor stiffness (nor damping), by coordinate names.
+    """
+    result = linear._scaled
+    loose = _moving(result.massless.mechanisms, linear.coordinates)
+    if loose:
+        motions = "; ".join(" with ".join(names) for names in loose)
+        raise MechanismError(
+            f"{len(loose)} motion(s) with neither mass nor stiffness: {motions}. "
+            "Hold the freedom, or give it stiffness or inertia."
+        )
+    return result
+
+
+def condense(linear: LinearModel) -> LinearModel:
+    """Eliminate massless, undamped freedoms exactly (the limit of vanishing mass).
+
+    With N the null space common to M and C, the equations Nᵀ(K q − B u) = 0 are algebraic; solved,
+    q = T b + N (Nᵀ K N)⁻¹ Nᵀ B u, where b are the coordinates kept (their names stay). On this set static
+    condensation (Guyan 1965) is exact. Inputs acting on eliminated freedoms become feedthrough D. Massless
+    but damped freedoms stay: M remains singular there.
+
+    Parameters
+    ----------
+    linear : LinearModel
+
+    Returns
+    -------
+    LinearModel
+        The same model if nothing is to be eliminated.
+
+    Raises
+    ------
+    MechanismError
+        For a motion with neither mass nor stiffness, by coordinate names.
+    LinearizationError
+        If an output measures the velocity of an eliminated freedom that an input moves directly: the
+        response would contain the derivative of the input.
+    """
+    base = scaled(linear)
+    static, model = base.massless.static, base.model
+    if not static.shape[1]:
+        return linear
+    right, kept = static_map(model.K, static)
+    left, _ = static_map(model.K.T, static)
+    direct = static @ solved(static.T @ model.K @ static, static.T @ model.B)
+    refuse_improper(model, direct)
+    inner = sp.diags(1.0 / base.scales[kept])
+    outer = sp.diags(base.scales)
+    names = [linear.coordinates[i] for i in kept]
+    reduced = linear.projected(outer @ right @ inner, names, left=outer @ left @ inner)
+    return replace(reduced, D=linear.D + model.Cq @ direct.toarray())
+
+
+def static_map(K: sp.spmatrix, null: sp.csc_matrix) -> tuple[sp.csc_matrix, np.ndarray]:
+    """T with Nᵀ K T = 0 and the identity on the coordinates kept.
+
+    Parameters
+    ----------
+    K : sparse matrix, shape (n, n)
+    null : sparse matrix, shape (n, r)
+        Columns N.
+
+    Returns
+    -------
+    T : sparse matrix, shape (n, n - r)
+    kept : numpy.ndarray of int, shape (n - r,)
+    """
+    n = K.shape[0]
+    gone = pivots(null)
+    kept = np.setdiff1d(np.arange(n), gone)
+    rows = sp.csc_matrix(null.T @ K)
+    unit = sp.identity(n, format="csc")
+    return sp.csc_matrix(unit[:, kept] - unit[:, gone] @ solved(rows[:, gone], rows[:, kept])), kept
+
+
+def refuse_improper(model: LinearModel, direct: sp.spmatrix | np.ndarray) -> None:
+    """Raise if a velocity output sees a freedom that follows an input without delay.
+
+    Parameters
+    ----------
+    model : LinearModel
+    direct : array or sparse matrix, shape (n, n_inputs)
+        Immediate displacement of each coordinate per input.
+
+    Raises
+    ------
+    LinearizationError
+    """
+    dense = as_dense(direct)
+    jump = np.abs(model.Cv @ dense)
+    size = np.abs(model.Cv) @ np.abs(dense)
+    bad = np.argwhere(jump > 1e-12 * size.max(initial=0.0))
+    if bad.size:
+        y, u = bad[0]
+        raise LinearizationError(
+            f"output {model.outputs[y]!r} is the velocity of a massless freedom that input "
+            f"{model.inputs[u]!r} moves at once: give that freedom inertia or damping, or measure its position"
+        )
+
+
+def scaled_any(linear: LinearModel) -> Scaled:
+    """As :func:`scaled`, mechanisms included.
+
+    Parameters
+    ----------
+    linear : LinearModel
+
+    Returns
+    -------
+    Scaled
+    """
+    s = coordinate_scales(linear.M, linear.C, linear.K)
+    M, C, K = congruent(s, linear.M, linear.C, linear.K)
+    signals = {"B": s[:, None] * linear.B, "Cq": linear.Cq * s, "Cv": linear.Cv * s}
+    return Scaled(replace(linear, M=M, C=C, K=K, parts={}, place=None, **signals), s, massless(M, C, K))
+
+
+def _moving(basis: sp.csc_matrix, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    motions = []
+    for column in np.abs(basis.toarray()).T:
+        order = np.argsort(-column, kind="stable")[:6]
+        motions.append(tuple(names[i] for i in order if column[i] > 0.1 * column.max()))
+    return tuple(motions)

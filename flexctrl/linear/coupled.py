@@ -1,0 +1,129 @@
+"""Responses of models whose damping couples the modes: the eigenvectors or a Schur form, then all s at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg as la
+
+from flexctrl.errors import LinearizationError
+from flexctrl.linear.modal import ModalSystem
+from flexctrl.linear.statespace import FirstOrder, first_order
+
+__all__ = ["coupled_transfer"]
+
+WORST_BASIS = 1e3
+BLOCK = 32
+CHUNK = 512
+
+
+@dataclass(frozen=True, eq=False)
+class _Integrators:
+    """States that nothing else depends on (A has a zero column): x = (row x_rest + input u) / s.
+
+    Attributes
+    ----------
+    row, input : numpy.ndarray
+        Their rows of A (columns of the rest) and of B.
+    weight : numpy.ndarray
+        How the wanted rows of the level above see these states.
+    """
+
+    row: np.ndarray
+    input: np.ndarray
+    weight: np.ndarray
+
+
+def coupled_transfer(system: ModalSystem) -> Callable[[np.ndarray], np.ndarray]:
+    """H(s) from the energy-scaled first-order modal form.
+
+    Positions of rigid-body modes (zero columns of A) are peeled off first, so that their poles at 0 stay
+    exact. The rest is diagonalised if its eigenvectors are well conditioned (light damping: they are nearly
+    unitary), else brought to Schur form, which is backward stable for critically damped modes too.
+
+    Parameters
+    ----------
+    system : ModalSystem
+
+    Returns
+    -------
+    callable
+        s of shape (N,) to H of shape (n_outputs, n_inputs, N).
+    """
+    first = first_order(replace(system, jump=np.zeros_like(system.jump)))
+    levels, A, B, wanted = _peeled(first)
+    rest = _resolvent(A, B, wanted)
+
+    def evaluate(s: np.ndarray) -> np.ndarray:
+        s = np.asarray(s, dtype=complex)
+        pieces = [rest(s[i : i + CHUNK]) for i in range(0, s.size, CHUNK)]
+        values = np.concatenate(pieces, axis=-1) if pieces else np.zeros((len(wanted), B.shape[1], 0), complex)
+        for level in reversed(levels):
+            values = _integrated(level, values, s)
+        return values + first.D[:, :, None] + system.jump[:, :, None] * s
+
+    return evaluate
+
+
+def _peeled(first: FirstOrder) -> tuple[list[_Integrators], np.ndarray, np.ndarray, np.ndarray]:
+    """Integrators level by level, and A, B and the rows wanted of what is left."""
+    A, B, wanted = first.A, first.B, first.C
+    levels: list[_Integrators] = []
+    while A.size and not np.all(A.any(axis=0)):
+        dead = np.asarray(~A.any(axis=0))
+        row = A[np.ix_(dead, ~dead)]
+        levels.append(_Integrators(row, B[dead], wanted[:, dead]))
+        A, B, wanted = A[np.ix_(~dead, ~dead)], B[~dead], np.vstack([wanted[:, ~dead], row])
+    return levels, A, B, wanted
+
+
+def _integrated(level: _Integrators, values: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Rows wanted of the level above, from those of this one (the integrators' own rows come last)."""
+    count = len(level.weight)
+    sources = values[count:] + level.input[:, :, None]
+    seen = np.einsum("pi,imn->pmn", level.weight, sources)
+    still = s == 0
+    if seen[..., still].any():
+        raise _infinite(0.0)
+    return values[:count] + seen / np.where(still, 1.0, s)
+
+
+def _resolvent(A: np.ndarray, B: np.ndarray, wanted: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """s ↦ wanted (s I - A)⁻¹ B, shape (rows, n_inputs, N)."""
+    if not A.size:
+        return lambda s: np.zeros((len(wanted), B.shape[1], s.size), dtype=complex)
+    poles, vectors = la.eig(A)
+    if np.linalg.cond(vectors) < WORST_BASIS:
+        start = np.linalg.solve(vectors, B.astype(complex))
+        residues = np.einsum("pk,km->kpm", wanted @ vectors, start).reshape(len(A), -1)
+        return lambda s: ((1.0 / _nonzero(s[:, None] - poles, s)) @ residues).T.reshape(len(wanted), B.shape[1], s.size)
+    T, Q = la.schur(A, output="complex")
+    return lambda s: np.einsum("pi,imn->pmn", wanted @ Q, _substituted(T, Q.conj().T @ B, s))
+
+
+def _substituted(T: np.ndarray, start: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """(s I - T)⁻¹ start for upper triangular T and all s together, block row by block row."""
+    n, m = start.shape
+    x = np.zeros((n, m * s.size), dtype=complex)
+    for high in range(n, 0, -BLOCK):
+        low = max(0, high - BLOCK)
+        pull = T[low:high, high:] @ x[high:] + np.repeat(start[low:high], s.size, axis=1)
+        for i in range(high - 1, low - 1, -1):
+            total = pull[i - low] + T[i, i + 1 : high] @ x[i + 1 : high]
+            x[i] = total / np.tile(_nonzero(s - T[i, i], s), m)
+    return x.reshape(n, m, s.size)
+
+
+def _nonzero(below: np.ndarray, s: np.ndarray) -> np.ndarray:
+    if not below.all():
+        raise _infinite(complex(s[np.argwhere(below == 0)[0][0]]))
+    return below
+
+
+def _infinite(s: complex) -> LinearizationError:
+    return LinearizationError(
+        f"the response at s = {complex(s):.6g} is infinite: the model has an undamped pole there; leave that "
+        "frequency out (for an integrator: start above 0)"
+    )

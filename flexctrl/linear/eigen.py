@@ -1,0 +1,240 @@
+"""Eigenpairs of K φ = λ M φ that are right at the low end, with exact zeros where zero is meant.
+
+A dense solver of the pencil (K, M) is wrong by eps·λ_max in every λ, which is all of the lowest ones
+of a fine mesh; a solver of the inverted pencil (M, K − σM) is wrong by eps·λ²/(λ₁ − σ). Low pairs are taken
+from the inverted one, high pairs from the direct one in the M-orthogonal rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import lapack
+
+from flexctrl.errors import LinearizationError
+from flexctrl.linear.pencil import EPS, HIDDEN, DensePencil, Pencil, ShiftedPencil, faint_shift, stiffness_noise
+
+__all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
+
+RIGID_NOISE = 30.0
+SOFT_NOISE = 1e6
+RIGID_GAP = 1e-8
+UNCLEAR = 1e5 * EPS
+SHORT_SPAN = 1e4
+WIDTH = 4
+SCOUTS = 8
+
+
+@dataclass(frozen=True)
+class Eigenpairs:
+    """Pairs in ascending order of λ; the rigid ones have λ = 0 exactly.
+
+    Attributes
+    ----------
+    values : numpy.ndarray, shape (k,)
+        λ = ω², (rad/s)²; negative where the equilibrium is unstable.
+    shapes : numpy.ndarray, shape (n, k)
+        φ, with φᵀ M φ = 1.
+    rigid : numpy.ndarray of bool, shape (k,)
+        Which of them are rigid-body modes.
+    noise : numpy.ndarray, shape (k,)
+        Spread of λ by the rounding of K's entries.
+    """
+
+    values: np.ndarray
+    shapes: np.ndarray
+    rigid: np.ndarray
+    noise: np.ndarray
+
+
+def coordinate_scales(M: sp.spmatrix, C: sp.spmatrix, K: sp.spmatrix) -> np.ndarray:
+    """Scales s (powers of two, so that scaling rounds nothing) with diag(S (K + w²M) S) about 1.
+
+    Parameters
+    ----------
+    M, C, K : sparse matrices, shape (n, n)
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        q = s · scaled coordinate.
+    """
+    m, c, k = (np.abs(A.diagonal()) for A in (M, C, K))
+    both = (m > 0) & (k > 0)
+    w2 = float(np.median(k[both] / m[both])) if both.any() else 1.0
+    d = k + w2 * m + np.sqrt(w2) * c
+    return 2.0 ** -np.round(0.5 * np.log2(np.where(d > 0, d, 1.0)))
+
+
+def complete_pairs(
+    K: np.ndarray, M: np.ndarray, origin: tuple[sp.csc_matrix, sp.csc_matrix] | None = None
+) -> Eigenpairs:
+    """All eigenpairs; M positive definite.
+
+    Parameters
+    ----------
+    K, M : numpy.ndarray, shape (n, n), symmetric, scaled
+    origin : tuple of two sparse matrices, optional
+        K₀ and T where K = Tᵀ K₀ T: rounding is then judged by the entries of K₀.
+
+    Returns
+    -------
+    Eigenpairs
+    """
+    if not K.size:
+        return Eigenpairs(np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool), np.zeros(0))
+    pencil = DensePencil(K, M, origin)
+    lam, phi = pencil.direct()
+    top = float(np.abs(lam).max())
+    if top > SHORT_SPAN * np.abs(lam).min():
+        shifted, lowest = _scouted(pencil, phi, SCOUTS)
+        low = int(np.count_nonzero(lam <= np.sqrt(top * lowest)))
+        lam[:low], phi[:, :low] = shifted.ritz(phi[:, :low])
+    else:
+        shifted = pencil.below_all(-max(top, 1.0))
+    return _settled(pencil, _found(pencil, shifted, lam, phi))
+
+
+def _scouted(pencil: DensePencil, phi: np.ndarray, count: int) -> tuple[ShiftedPencil, float]:
+    """A shift that suits the lowest pairs, given vectors near them, and its distance to the lowest."""
+    shifted, x = pencil.below_all(faint_shift(pencil.K, pencil.M)), phi[:, :count]
+    for _ in range(4):
+        lam, x = shifted.ritz(x)
+        better = _better_shift(_found(pencil, shifted, lam, x, 0), shifted.sigma)
+        if better in (0.0, shifted.sigma):
+            break
+        shifted = pencil.below_all(better)
+    if better == 0.0 and count < len(phi):
+        return _scouted(pencil, phi, 4 * count)
+    return shifted, lam[0] - shifted.sigma
+
+
+def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
+    """At least `count` lowest eigenpairs by shift-invert Lanczos; none is missed (Sturm count).
+
+    Parameters
+    ----------
+    K, M : sparse matrices, shape (n, n), symmetric, scaled
+        M may be singular; K may be indefinite.
+    count : int
+
+    Returns
+    -------
+    Eigenpairs
+        On to the next gap, so that repeated modes are not cut in two.
+
+    Raises
+    ------
+    LinearizationError
+        If the Sturm count of K − μM never agrees with the modes found.
+    """
+    n, pencil = K.shape[0], Pencil(K, M)
+    wanted, width = min(count, n - 2), WIDTH
+    shifted = pencil.below_all(faint_shift(K, M))
+    start = _noise(n, width)
+    for _ in range(20):
+        found = _found(pencil, shifted, *shifted.lanczos(start, wanted))
+        better = _better_shift(found, shifted.sigma)
+        if better == 0.0 and 2 * wanted < n - 2:
+            wanted, start = 2 * wanted, np.hstack([found.phi, _noise(n, width)])
+        elif better not in (0.0, shifted.sigma):
+            shifted, start = pencil.below_all(better), np.hstack([found.phi, _noise(n, width)])
+        elif _none_missed(pencil, np.sort(found.lam), count):
+            return _settled(pencil, found.without_last())
+        else:
+            # more equal modes than the block is wide, or a start that does not hold one
+            width = min(2 * width, n // 4)
+            start = _noise(n, width)
+    raise LinearizationError("the lowest modes could not be certified by a Sturm count; ask for another count")
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Pairs near a shift; soft ones, whose λ may be rounding alone, are polished."""
+
+    lam: np.ndarray
+    phi: np.ndarray
+    noise: np.ndarray
+    soft: np.ndarray
+
+    @cached_property
+    def rigid(self) -> np.ndarray:
+        """Which λ are 0 as far as can be told."""
+        size = np.abs(self.lam)
+        flexible = size[~self.soft].min(initial=np.inf)
+        gap = RIGID_GAP * flexible if np.isfinite(flexible) else 0.0
+        return self.soft & (size <= np.maximum(RIGID_NOISE * self.noise, gap))
+
+    def without_last(self) -> _Found:
+        return _Found(self.lam[:-1], self.phi[:, :-1], self.noise[:-1], self.soft[:-1])
+
+
+def _found(
+    pencil: Pencil | DensePencil, shifted: ShiftedPencil, lam: np.ndarray, phi: np.ndarray, polish: int = 3
+) -> _Found:
+    noise = pencil.noise(phi)
+    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * noise, UNCLEAR * abs(shifted.sigma))
+    if soft.any():
+        phi[:, soft], lam[soft] = _polished(pencil, phi[:, soft], shifted, polish)
+        noise[soft] = pencil.noise(phi[:, soft])
+    return _Found(lam, phi, noise, soft)
+
+
+def _polished(
+    pencil: Pencil | DensePencil, x: np.ndarray, shifted: ShiftedPencil, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Inverse iteration on a soft subspace, then Rayleigh–Ritz within it."""
+    x = _orthonormal(pencil.M, x)
+    for _ in range(steps):
+        x = _orthonormal(pencil.M, shifted.iterate(x))
+    ritz, y = np.linalg.eigh(x.T @ (pencil.K @ x))
+    return x @ y, ritz
+
+
+def _noise(n: int, width: int) -> np.ndarray:
+    return np.random.default_rng(width).standard_normal((n, width))
+
+
+def _better_shift(found: _Found, sigma: float) -> float:
+    """The shift if it suits the pairs found with it, another if not; 0 if all of them are without stiffness.
+
+    With rigid-body modes it has to be about as large as the first flexible λ, or these lose digits beside them.
+    """
+    clear = ~found.rigid & (np.abs(found.lam) > UNCLEAR * abs(sigma))
+    if not clear.any():
+        return 0.0
+    scale = float(np.abs(found.lam[clear]).min())
+    small_enough = -sigma <= 10.0 * max(scale, -float(found.lam.min()))
+    # twice: at -scale there may be an eigenvalue, the negative one that set the scale
+    return sigma if small_enough and (clear.all() or 0.01 * scale <= -sigma) else -2.0 * scale
+
+
+def _none_missed(pencil: Pencil, lam: np.ndarray, count: int) -> bool:
+    """Whether as many λ lie under some gap beyond `count` as were found there."""
+    for i in range(min(count, lam.size - 1), lam.size):
+        gap = lam[i] - lam[i - 1] if i else 0.0
+        if gap > 1e-6 * abs(lam[i]):
+            return pencil.below(0.5 * (lam[i] + lam[i - 1])) in (i, HIDDEN)
+    return True
+
+
+def _settled(pencil: Pencil | DensePencil, found: _Found) -> Eigenpairs:
+    """Set λ of the rigid ones to 0, orthonormalise (these first) and sort."""
+    first = np.argsort(~found.rigid, kind="stable")
+    phi = _orthonormal(pencil.M, found.phi[:, first])
+    lam, rigid, noise = np.where(found.rigid, 0.0, found.lam)[first], found.rigid[first], found.noise[first]
+    order = np.argsort(lam, kind="stable")
+    return Eigenpairs(lam[order], phi[:, order], rigid[order], noise[order])
+
+
+def _orthonormal(M: np.ndarray | sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
+    """M-orthonormal columns spanning the same nested spaces (Cholesky, until nothing is left to do)."""
+    for _ in range(2):
+        gram = phi.T @ (M @ phi)
+        if np.abs(gram - np.eye(len(gram))).max(initial=0.0) <= 8.0 * EPS:
+            break
+        phi = lapack.dtrtrs(np.linalg.cholesky(gram), phi.T, lower=1)[0].T
+    return phi

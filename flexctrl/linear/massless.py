@@ -1,0 +1,266 @@
+"""Freedoms without mass: which are stiff (static), which creep through a damper (relaxing), which are mechanisms.
+
+They are null vectors of M, along coordinates or not. Numerical ranks are judged on matrices scaled to unit
+diagonal, component by component of their graph, so that a light part does not pass for a massless one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+from scipy.linalg import lapack
+from scipy.sparse.csgraph import connected_components
+
+from flexctrl.errors import LinearizationError
+from flexctrl.linear.banded import band_of
+from flexctrl.linear.pattern import congruent
+
+__all__ = ["Massless", "as_dense", "massless", "null_split", "pivots", "solved"]
+
+MASS_RANK = 1e-12
+STIFFNESS_RANK = 1e-13
+MASS_DUST = 1e-26
+DUST = 1e-14
+DENSE_BLOCK = 300
+SMALL_PIVOT = 1e-8
+
+
+@dataclass(frozen=True)
+class Massless:
+    """Bases (columns, in scaled coordinates) of the three kinds of massless freedom.
+
+    Attributes
+    ----------
+    static : scipy.sparse.csc_matrix, shape (n, r)
+        Neither mass nor damping, but stiffness.
+    relaxing : scipy.sparse.csc_matrix, shape (n, d)
+        Damping but no mass (K-orthogonal to the static ones): first-order states.
+    mechanisms : scipy.sparse.csc_matrix, shape (n, k)
+        Neither mass, damping nor stiffness.
+    """
+
+    static: sp.csc_matrix
+    relaxing: sp.csc_matrix
+    mechanisms: sp.csc_matrix
+
+    @property
+    def every(self) -> sp.csc_matrix:
+        """Static and relaxing together, shape (n, r + d)."""
+        if not self.relaxing.shape[1]:
+            return self.static
+        return sp.csc_matrix(sp.hstack([self.static, self.relaxing]))
+
+
+def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
+    """Sort the null space of M.
+
+    Parameters
+    ----------
+    M, C, K : sparse matrices, shape (n, n)
+        Scaled to about unit diagonal.
+
+    Returns
+    -------
+    Massless
+
+    Raises
+    ------
+    LinearizationError
+        If M is not positive semidefinite, or a massless freedom without damping of its own is pushed by
+        velocities of others (gyroscopic), which would need the derivative of the inputs.
+    """
+    if _heavy(M):
+        none = sp.csc_matrix((M.shape[0], 0))
+        return Massless(none, none, none)
+    null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
+    if not null.shape[1]:
+        return Massless(null, null, null)
+    own = _restricted(C, null)
+    undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK)
+    static, relaxing = null @ undamped, null @ damped
+    if static.shape[1] and max(_peak(C @ static), _peak(C.T @ static)) > 1e-11 * _peak(C):
+        raise LinearizationError(
+            "a massless freedom without damping of its own is moved by velocities of others; give it inertia or damping"
+        )
+    free, _ = null_split(_restricted(K, static), STIFFNESS_RANK)
+    if relaxing.shape[1] and static.shape[1] and not free.shape[1]:
+        relaxing = relaxing - static @ solved(static.T @ K @ static, static.T @ K @ relaxing)
+    return Massless(sp.csc_matrix(static), sp.csc_matrix(relaxing), sp.csc_matrix(static @ free))
+
+
+def null_split(A: sp.spmatrix, tolerance: float, semidefinite: bool = False) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    """Bases of the null space of a symmetric matrix and of a complement.
+
+    Parameters
+    ----------
+    A : sparse matrix, shape (n, n)
+    tolerance : float
+        Eigenvalues of the matrix scaled to unit diagonal under this are zero.
+    semidefinite : bool
+        Refuse a negative eigenvalue.
+
+    Returns
+    -------
+    null, rest : sparse matrices, shapes (n, r) and (n, n - r)
+        Unit vectors wherever the null space lies along coordinates.
+    """
+    A = sp.csc_matrix(A)
+    n = A.shape[0]
+    size = np.sqrt(abs(A).max(axis=1).toarray().ravel()) if n else np.zeros(0)
+    diagonal = np.sqrt(np.abs(A.diagonal()))
+    scale = np.where(diagonal > 0, diagonal, size)
+    empty = np.flatnonzero(size == 0.0)
+    full = np.flatnonzero(size > 0.0)
+    unit = sp.identity(n, format="csc")
+    if not full.size:
+        return unit[:, empty], unit[:, full]
+    invert = sp.diags(1.0 / scale[full])
+    block = sp.csc_matrix(invert @ A[full][:, full] @ invert)
+    if _definite(block):
+        return unit[:, empty], unit[:, full]
+    null, rest = _split_components(block, tolerance, semidefinite)
+    back = unit[:, full] @ invert
+    return sp.csc_matrix(sp.hstack([unit[:, empty], back @ null])), sp.csc_matrix(back @ rest)
+
+
+def pivots(basis: sp.csc_matrix) -> np.ndarray:
+    """One coordinate for each column: its own where it lies along one, else by pivoted QR.
+
+    Parameters
+    ----------
+    basis : sparse matrix, shape (n, r)
+
+    Returns
+    -------
+    numpy.ndarray of int, shape (r,)
+    """
+    basis = sp.csc_matrix(basis)
+    basis.eliminate_zeros()
+    single = np.diff(basis.indptr) == 1
+    chosen = np.zeros(basis.shape[1], dtype=int)
+    chosen[single] = basis[:, single].indices
+    free = np.ones(basis.shape[0])
+    free[chosen[single]] = 0.0
+    others = sp.csc_matrix(sp.diags(free) @ basis[:, ~single])
+    columns = np.flatnonzero(~single)
+    for group in _groups(others.T @ others):
+        block = sp.csc_matrix(others[:, group])
+        rows = np.unique(block.indices)
+        leading = la.qr(block[rows].toarray().T, mode="r", pivoting=True)[1][: group.size]
+        chosen[columns[group]] = rows[leading]
+    return chosen
+
+
+def solved(A: sp.spmatrix, rhs: sp.spmatrix | np.ndarray) -> sp.csc_matrix:
+    """A⁻¹ rhs for a well-conditioned sparse A."""
+    return sp.csc_matrix(sla.splu(sp.csc_matrix(A)).solve(as_dense(rhs)))
+
+
+def as_dense(A: sp.spmatrix | np.ndarray) -> np.ndarray:
+    """A as an ndarray."""
+    return A.toarray() if isinstance(A, sp.spmatrix | sp.sparray) else np.asarray(A)
+
+
+def _without_dust(M: sp.csc_matrix) -> sp.csc_matrix:
+    """Drop rows whose mass is only the rounding error of a rotation (cos 90° squared)."""
+    diagonal = np.abs(M.diagonal())
+    dust = diagonal < MASS_DUST * diagonal.max(initial=0.0)
+    keep = sp.diags((~dust).astype(float))
+    return sp.csc_matrix(keep @ M @ keep)
+
+
+def _heavy(M: sp.csc_matrix) -> bool:
+    """Whether M is plainly positive definite."""
+    diagonal = M.diagonal()
+    if not diagonal.size or diagonal.min() <= MASS_DUST * diagonal.max():
+        return False
+    return _definite(congruent(1.0 / np.sqrt(diagonal), M)[0])
+
+
+def _restricted(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
+    """Nᵀ A N without the entries that are only rounding."""
+    full = sp.csc_matrix(N.T @ A @ N)
+    size = sp.csc_matrix(abs(N).T @ abs(A) @ abs(N))
+    return sp.csc_matrix(full.multiply(abs(full) > DUST * size))
+
+
+def _peak(A: sp.spmatrix) -> float:
+    return float(abs(A).max()) if A.shape[0] and A.shape[1] and A.nnz else 0.0
+
+
+def _definite(block: sp.csc_matrix) -> bool:
+    """Whether all pivots of the unit-diagonal matrix stand clear of zero."""
+    if block.shape[0] <= DENSE_BLOCK:
+        root, info = lapack.dpotrf(block.toarray(), lower=1)
+        return bool(info == 0 and np.square(root.diagonal()).min() > SMALL_PIVOT)
+    if (band := band_of(block)) is not None:
+        factor = band.factorise(block.data)
+        return factor is not None and bool(factor.pivots.min() > SMALL_PIVOT)
+    try:
+        lu = _symmetric_lu(block)
+    except RuntimeError:
+        return False
+    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > SMALL_PIVOT).all())
+
+
+def _groups(A: sp.spmatrix) -> list[np.ndarray]:
+    """Connected components of a symmetric pattern, as index arrays."""
+    count, label = connected_components(A, directed=False)
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.searchsorted(label[order], np.arange(1, count))) if count else []
+
+
+def _split_components(
+    block: sp.csc_matrix, tolerance: float, semidefinite: bool
+) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    nulls, rests = [], []
+    for rows in _groups(block):
+        null, rest = _split_block(block[rows][:, rows], tolerance, semidefinite)
+        embed = sp.identity(block.shape[0], format="csc")[:, rows]
+        nulls.append(embed @ null)
+        rests.append(embed @ rest)
+    return sp.csc_matrix(sp.hstack(nulls)), sp.csc_matrix(sp.hstack(rests))
+
+
+def _split_block(block: sp.csc_matrix, tolerance: float, semidefinite: bool) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    if block.shape[0] <= DENSE_BLOCK:
+        return _split_dense(block, tolerance, semidefinite)
+    null, rest = _split_sparse(block)
+    if _peak(block @ null) > 100.0 * tolerance:
+        return _split_dense(block, tolerance, semidefinite)
+    return null, rest
+
+
+def _split_dense(block: sp.csc_matrix, tolerance: float, semidefinite: bool) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    values, vectors = la.eigh(block.toarray())
+    limit = tolerance * max(np.abs(values).max(), 1.0)
+    if semidefinite and values.min() < -1e-9 * np.abs(values).max():
+        raise LinearizationError(
+            f"the mass matrix is not positive semidefinite (scaled eigenvalue {values.min():.2e}); "
+            "check for a negative mass or inertia"
+        )
+    null = np.abs(values) <= limit
+    return sp.csc_matrix(vectors[:, null]), sp.csc_matrix(vectors[:, ~null])
+
+
+def _split_sparse(block: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+    """Coordinates with a vanishing pivot depend on the others: N = [-A_II⁻¹ A_IJ; 1], as sparse as A is local."""
+    n = block.shape[0]
+    unit = sp.identity(n, format="csc")
+    lu = _symmetric_lu(sp.csc_matrix(block + 1e-13 * unit))
+    pivot = np.zeros(n)
+    pivot[np.argsort(lu.perm_c)] = lu.U.diagonal()
+    dependent = np.flatnonzero(np.abs(pivot) < SMALL_PIVOT)
+    free = np.setdiff1d(np.arange(n), dependent)
+    weights = _symmetric_lu(block[free][:, free]).solve(block[free][:, dependent].toarray())
+    weights[np.abs(weights) < 1e-13] = 0.0
+    return sp.csc_matrix(unit[:, dependent] - unit[:, free] @ sp.csc_matrix(weights)), unit[:, free]
+
+
+def _symmetric_lu(A: sp.csc_matrix) -> sla.SuperLU:
+    options = {"SymmetricMode": True}
+    return sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options=options)

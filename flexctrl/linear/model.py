@@ -1,0 +1,322 @@
+"""The linear model, second order in its coordinates: the truth that every export comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.errors import LinearizationError, StructureError, did_you_mean
+from flexctrl.linear.parts import PartMatrices, projected_parts
+
+if TYPE_CHECKING:
+    import control
+    from matplotlib.figure import Figure
+
+    from flexctrl.linear.certificate import Certificate
+    from flexctrl.linear.condense import Audit, Scaled
+    from flexctrl.linear.discrete import Hold
+    from flexctrl.linear.modal import ModalSystem
+    from flexctrl.linear.modes import Modes
+    from flexctrl.linear.reduction import Method, Reduced, RelativeError
+    from flexctrl.linear.response import FrequencyResponse
+    from flexctrl.linear.statespace import Form
+
+__all__ = ["LinearModel", "PartMatrices", "Place"]
+
+
+Machine = TypeVar("Machine")
+Shape = TypeVar("Shape")
+
+
+@dataclass(frozen=True, eq=False)
+class Place(Generic[Machine, Shape]):
+    """The machine that a linear model is of: for drawing its modes.
+
+    Attributes
+    ----------
+    model : Model
+    state : State
+        The equilibrium.
+    basis : scipy.sparse.csc_matrix, shape (model.n, n)
+        Displacements of the machine's degrees of freedom for one of each coordinate.
+    """
+
+    model: Machine
+    state: Shape
+    basis: sp.csc_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """M q̈ + C q̇ + K q = B u,  y = Cq q + Cv q̇ + D u, with names.
+
+    Attributes
+    ----------
+    M, C, K : scipy.sparse.csc_matrix, shape (n, n)
+        Mass, damping and stiffness (geometric stiffness included); SI units. M may be singular.
+    B : numpy.ndarray, shape (n, n_inputs)
+        Input distribution.
+    Cq, Cv : numpy.ndarray, shape (n_outputs, n)
+        Output rows on displacement and velocity.
+    D : numpy.ndarray, shape (n_outputs, n_inputs)
+        Feedthrough.
+    coordinates, inputs, outputs : tuple of str
+        Names, legal for python-control.
+    name : str
+        Name of the machine.
+    parts : mapping of str to PartMatrices
+        Each part's share of K and M; empty where unknown.
+    certificate : Certificate, optional
+        What `linearize` checked; absent in models made from matrices.
+    place : Place, optional
+        The machine; absent in models made from matrices.
+    """
+
+    M: sp.csc_matrix
+    C: sp.csc_matrix
+    K: sp.csc_matrix
+    B: np.ndarray
+    Cq: np.ndarray
+    Cv: np.ndarray
+    D: np.ndarray
+    coordinates: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    name: str = "linear"
+    parts: Mapping[str, PartMatrices] = field(default_factory=dict)
+    certificate: Certificate | None = None
+    place: Place | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        n, m, p = len(self.coordinates), len(self.inputs), len(self.outputs)
+        shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "B": (n, m), "Cq": (p, n), "Cv": (p, n), "D": (p, m)}
+        for name, shape in shapes.items():
+            _check_matrix(name, getattr(self, name), shape)
+
+    def __str__(self) -> str:
+        signals = f"{', '.join(self.inputs) or 'nothing'} → {', '.join(self.outputs) or 'nothing'}"
+        size = f"{self.name}: {len(self.coordinates)} degrees of freedom, {signals}"
+        return f"{size}\n{self.certificate}" if self.certificate else size
+
+    # -- views and transformations
+
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
+        """The same dynamics seen through some of the signals only.
+
+        Parameters
+        ----------
+        inputs, outputs : sequence of str, optional
+            Names to keep, in the order wanted; all of them if left out.
+
+        Returns
+        -------
+        LinearModel
+
+        Raises
+        ------
+        StructureError
+            For a name that is not a signal of this model.
+        """
+        u = _indices(self.inputs if inputs is None else inputs, self.inputs, "input")
+        y = _indices(self.outputs if outputs is None else outputs, self.outputs, "output")
+        return replace(
+            self,
+            B=self.B[:, u],
+            Cq=self.Cq[y],
+            Cv=self.Cv[y],
+            D=self.D[np.ix_(y, u)],
+            inputs=tuple(self.inputs[i] for i in u),
+            outputs=tuple(self.outputs[i] for i in y),
+        )
+
+    def projected(
+        self,
+        basis: np.ndarray | sp.spmatrix,
+        coordinates: Sequence[str],
+        left: np.ndarray | sp.spmatrix | None = None,
+    ) -> LinearModel:
+        """Galerkin projection q = T b: Tᵀ M T, …; names of signals and parts are kept.
+
+        Parameters
+        ----------
+        basis : array or sparse matrix, shape (n, k)
+            Columns T.
+        coordinates : sequence of k str
+            Names of the new coordinates b.
+        left : array or sparse matrix, shape (n, k), optional
+            Test functions, if they are not T (Petrov–Galerkin).
+
+        Returns
+        -------
+        LinearModel
+        """
+        T = sp.csc_matrix(basis)
+        L = (T if left is None else sp.csc_matrix(left)).T
+
+        def congruent(A: sp.csc_matrix) -> sp.csc_matrix:
+            return sp.csc_matrix(L @ A @ T)
+
+        return replace(
+            self,
+            M=congruent(self.M),
+            C=congruent(self.C),
+            K=congruent(self.K),
+            B=L @ self.B,
+            Cq=(T.T @ self.Cq.T).T,
+            Cv=(T.T @ self.Cv.T).T,
+            coordinates=tuple(coordinates),
+            parts=projected_parts(self.parts, T),
+            place=self.place and replace(self.place, basis=sp.csc_matrix(self.place.basis @ T)),
+        )
+
+    # -- analysis
+
+    def audit(self) -> Audit:
+        """Label every coordinate dynamic, static (massless but stiff), relaxing or mechanism.
+
+        See :func:`flexctrl.linear.condense.audit`.
+        """
+        from flexctrl.linear.condense import audit
+
+        return audit(self)
+
+    def condense(self) -> LinearModel:
+        """Eliminate the massless, undamped freedoms exactly; see :func:`flexctrl.linear.condense.condense`."""
+        from flexctrl.linear.condense import condense
+
+        return condense(self)
+
+    def modes(self, count: int | None = None) -> Modes:
+        """Undamped modes, lowest first; see :func:`flexctrl.linear.modes.modes`.
+
+        Parameters
+        ----------
+        count : int, optional
+            How many; left out: all of them up to 1000 coordinates, the 20 lowest beyond.
+        """
+        from flexctrl.linear.modes import modes
+
+        return modes(self, count)
+
+    def damped_poles(self, count: int | None = None) -> np.ndarray:
+        """Roots s of det(s² M + s C + K) = 0; see :func:`flexctrl.linear.poles.damped_poles`."""
+        from flexctrl.linear.poles import damped_poles
+
+        return damped_poles(self, count)
+
+    def frequency_response(
+        self, omega: np.ndarray | Sequence[float] | None = None, span: tuple[float, float] | None = None
+    ) -> FrequencyResponse:
+        """Response y(iω)/u(iω); see :func:`flexctrl.linear.response.frequency_response`.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Angular frequencies, rad/s; left out: an adaptive grid with every peak and anti-resonance.
+        span : tuple of two floats, optional
+            Limits of the adaptive grid, rad/s.
+        """
+        from flexctrl.linear.response import frequency_response
+
+        return frequency_response(self, omega, span)
+
+    def reduce(self, to: Method | RelativeError, using: Callable[[int], Method] | None = None) -> Reduced:
+        """Fewer coordinates, same signals; see :func:`flexctrl.linear.reduction.reduce`.
+
+        Parameters
+        ----------
+        to : Method or RelativeError
+            ``ModalTruncation``, ``CraigBampton``, ``BalancedTruncation``, ``MomentMatching``, or an error.
+        using : callable, optional
+            For an error: the method as a function of its order; ``ModalTruncation`` if left out.
+        """
+        from flexctrl.linear.reduction import ModalTruncation, reduce
+
+        return reduce(self, to, using or ModalTruncation)
+
+    def plot(self) -> Figure:
+        """Draw the poles and the frequency response of every channel.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.frequency import linear_figure
+
+        return linear_figure(self)
+
+    # -- export
+
+    def to_ss(self, form: Form | None = None, modes: Modes | None = None) -> control.StateSpace:
+        """First-order model for python-control; see :func:`flexctrl.linear.statespace.to_ss`.
+
+        Parameters
+        ----------
+        form : Form, optional
+            ``ModalForm()`` (default) or ``PhysicalForm()``.
+        modes : Modes, optional
+            Keep these modes only (modal form).
+        """
+        from flexctrl.linear.statespace import to_ss
+
+        return to_ss(self, form, modes)
+
+    def discretize(self, dt: float, hold: Hold | None = None) -> control.StateSpace:
+        """Exact sampled model; see :func:`flexctrl.linear.discrete.discretize`.
+
+        Parameters
+        ----------
+        dt : float
+            Sampling time, s.
+        hold : Hold, optional
+            ``ZeroOrderHold(delay=…)`` (default) or ``FirstOrderHold(delay=…)``.
+        """
+        from flexctrl.linear.discrete import discretize
+
+        return discretize(self, dt, hold)
+
+    def save_mat(self, path: str | Path) -> None:
+        """Write a MATLAB/Scilab file; see :func:`flexctrl.linear.matfile.save_mat`."""
+        from flexctrl.linear.matfile import save_mat
+
+        save_mat(self, path)
+
+    @classmethod
+    def load_mat(cls, path: str | Path) -> LinearModel:
+        """Read what :meth:`save_mat` wrote."""
+        from flexctrl.linear.matfile import load_mat
+
+        return load_mat(path)
+
+    @cached_property
+    def _scaled(self) -> Scaled:
+        from flexctrl.linear.condense import scaled_any
+
+        return scaled_any(self)
+
+    @cached_property
+    def _modal(self) -> ModalSystem:
+        from flexctrl.linear.modal import modal_system
+
+        return modal_system(self)
+
+
+def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, int]) -> None:
+    if value.shape != shape:
+        raise LinearizationError(f"{name} has shape {value.shape}; the names ask for {shape}")
+    data = value.data if sp.issparse(value) else value
+    if not np.isfinite(data).all():
+        raise LinearizationError(f"{name} holds a value that is not finite; check the parameters it came from")
+
+
+def _indices(wanted: Sequence[str], known: tuple[str, ...], kind: str) -> list[int]:
+    for name in wanted:
+        if name not in known:
+            raise StructureError(f"{kind} {name!r} is not a signal of this model{did_you_mean(name, known)}")
+    return [known.index(name) for name in wanted]

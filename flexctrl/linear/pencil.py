@@ -1,0 +1,245 @@
+"""K − σM for many shifts σ: factors, Sylvester counts, inverse iteration, block Lanczos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+from scipy.linalg import lapack
+
+from flexctrl.errors import LinearizationError
+from flexctrl.linear.banded import Band, band_of
+from flexctrl.linear.krylov import krylov
+from flexctrl.linear.pattern import aligned
+
+__all__ = [
+    "EPS",
+    "HIDDEN",
+    "SINGULAR",
+    "DensePencil",
+    "Pencil",
+    "ShiftedPencil",
+    "faint_shift",
+    "stiffness_noise",
+]
+
+EPS = float(np.finfo(float).eps)
+HIDDEN, SINGULAR = -1, -2
+TINY = 1e-12
+
+Matrix: TypeAlias = "np.ndarray | sp.csc_matrix"
+
+
+def stiffness_noise(K: Matrix, shapes: np.ndarray) -> np.ndarray:
+    """Spread of φᵀ K φ when every entry of K carries its own rounding error.
+
+    Parameters
+    ----------
+    K : array or sparse matrix, shape (n, n)
+    shapes : numpy.ndarray, shape (n, k)
+
+    Returns
+    -------
+    numpy.ndarray, shape (k,)
+    """
+    return _noise(_squared(K), shapes)
+
+
+def _squared(K: Matrix) -> Matrix:
+    return K * K if isinstance(K, np.ndarray) else sp.csc_matrix((K.data**2, K.indices, K.indptr), K.shape)
+
+
+def _noise(squared: Matrix, shapes: np.ndarray) -> np.ndarray:
+    squares = shapes * shapes
+    return EPS * np.sqrt(np.einsum("ij,ij->j", squares, squared @ squares))
+
+
+@dataclass(frozen=True)
+class ShiftedPencil:
+    """K − σM, factorised.
+
+    Attributes
+    ----------
+    K, M : array or sparse matrix, shape (n, n)
+    sigma : float
+        (rad/s)².
+    inverse : callable
+        rhs ↦ (K − σM)⁻¹ rhs.
+    below : int
+        How many λ lie under σ (Sylvester); HIDDEN if the pivoting does not tell.
+    """
+
+    K: Matrix
+    M: Matrix
+    sigma: float
+    inverse: Callable[[np.ndarray], np.ndarray]
+    below: int
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """(K − σM)⁻¹ rhs with one step of refinement."""
+        x = self.inverse(rhs)
+        return x + self.inverse(rhs - self.K @ x + self.sigma * (self.M @ x))
+
+    def iterate(self, x: np.ndarray) -> np.ndarray:
+        """One step of inverse iteration."""
+        return self.solve(self.M @ x)
+
+    def ritz(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """One refined step of subspace iteration, and the pairs within the space; ascending when λ > σ."""
+        image = self.M @ x
+        after = self.solve(image)
+        theta, z, _ = lapack.dsygvd(image.T @ after, x.T @ image)
+        return self.sigma + 1.0 / theta[::-1], (after @ z / theta)[:, ::-1]
+
+    def lanczos(self, start: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The `count` pairs nearest to σ, which must lie under all of them, and on to the next gap; ascending."""
+        return self.ritz(krylov(self.inverse, self.M, start, count))
+
+
+class Pencil:
+    """K − σM, sparse, for many σ: both matrices on one pattern, so that shifting costs one addition.
+
+    Parameters
+    ----------
+    K, M : scipy.sparse.csc_matrix, shape (n, n), symmetric
+    """
+
+    def __init__(self, K: sp.csc_matrix, M: sp.csc_matrix) -> None:
+        self.K, self.M = aligned(K, M)
+
+    @cached_property
+    def _squares(self) -> Matrix:
+        return _squared(self.K)
+
+    def noise(self, shapes: np.ndarray) -> np.ndarray:
+        """Spread of φᵀ K φ by the rounding of the entries of K."""
+        return _noise(self._squares, shapes)
+
+    def at(self, sigma: float) -> ShiftedPencil:
+        """Factorise K − σM.
+
+        Raises
+        ------
+        LinearizationError
+            If it is singular: a freedom with neither mass nor stiffness, or σ an eigenvalue.
+        """
+        A = sp.csc_matrix((self.K.data - sigma * self.M.data, self.K.indices, self.K.indptr), self.K.shape)
+        options = {"SymmetricMode": True}
+        try:
+            lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options=options)
+        except RuntimeError as error:
+            raise LinearizationError(
+                f"K - ({sigma:.3g}) M is singular: a freedom has neither mass nor stiffness; see audit()"
+            ) from error
+        hidden = (lu.perm_r != lu.perm_c).any()
+        below = HIDDEN if hidden else int(np.count_nonzero(lu.U.diagonal() < 0))
+        return ShiftedPencil(self.K, self.M, sigma, lu.solve, below)
+
+    @cached_property
+    def _band(self) -> Band | None:
+        return band_of(self.K)
+
+    def _under(self, sigma: float) -> ShiftedPencil:
+        """As `at` for σ under all λ, in a band where that is narrow."""
+        if self._band is None:
+            return self.at(sigma)
+        factor = self._band.factorise(self.K.data - sigma * self.M.data)
+        if factor is None:
+            raise LinearizationError(f"K - ({sigma:.3g}) M is not positive definite")
+        return ShiftedPencil(self.K, self.M, sigma, factor.solve, 0)
+
+    def below(self, sigma: float) -> int:
+        """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell."""
+        try:
+            return self.at(sigma).below
+        except LinearizationError:
+            return SINGULAR
+
+    def below_all(self, sigma: float) -> ShiftedPencil:
+        """Factors at or under σ with no λ under it, and far enough from 0 to be seen beside K."""
+        return _below_all(self._under, sigma)
+
+
+class DensePencil:
+    """K − σM, dense, for many σ.
+
+    Parameters
+    ----------
+    K, M : numpy.ndarray, shape (n, n), symmetric
+    origin : tuple of two sparse matrices, optional
+        K₀ and T where K = Tᵀ K₀ T: rounding is judged by the entries of K₀.
+    """
+
+    def __init__(self, K: np.ndarray, M: np.ndarray, origin: tuple[Matrix, Matrix] | None = None) -> None:
+        self.K, self.M, self.origin = K, M, origin
+
+    def noise(self, shapes: np.ndarray) -> np.ndarray:
+        """Spread of φᵀ K φ by the rounding of the entries that K was made from."""
+        return _noise(self._squares, shapes if self.origin is None else self.origin[1] @ shapes)
+
+    @cached_property
+    def _squares(self) -> Matrix:
+        return _squared(self.K if self.origin is None else self.origin[0])
+
+    def at(self, sigma: float) -> ShiftedPencil:
+        """Factorise K − σM.
+
+        Raises
+        ------
+        LinearizationError
+            If it is not positive definite: σ is not under all λ.
+        """
+        factor, info = lapack.dpotrf(self.K - sigma * self.M, lower=1)
+        if info:
+            raise LinearizationError(f"K - ({sigma:.3g}) M is not positive definite")
+        return ShiftedPencil(self.K, self.M, sigma, lambda rhs: lapack.dpotrs(factor, rhs, lower=1)[0], 0)
+
+    def below_all(self, sigma: float) -> ShiftedPencil:
+        """Factors at or under σ with no λ under it."""
+        return _below_all(self.at, sigma)
+
+    def direct(self) -> tuple[np.ndarray, np.ndarray]:
+        """All λ and φ by the pencil (K, M), ascending: right at the high end.
+
+        Raises
+        ------
+        LinearizationError
+            If M is not positive definite.
+        """
+        values, shapes, info = lapack.dsygvd(self.K, self.M)
+        if info:
+            raise LinearizationError("the mass matrix is not positive definite on the freedoms kept")
+        return values, shapes
+
+
+def _below_all(at: Callable[[float], ShiftedPencil], sigma: float) -> ShiftedPencil:
+    for _ in range(60):
+        try:
+            shifted = at(sigma)
+        except LinearizationError:
+            shifted = None
+        if shifted is not None and shifted.below in (0, HIDDEN):
+            return shifted
+        sigma *= 4.0
+    raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
+
+
+def faint_shift(K: Matrix, M: Matrix) -> float:
+    """A negative σ so small that it is seen only where K has no stiffness at all.
+
+    Parameters
+    ----------
+    K, M : array or sparse matrix, shape (n, n)
+
+    Returns
+    -------
+    float
+    """
+    k, m = K.diagonal(), M.diagonal()
+    both = (k > 0) & (m > 0)
+    return -TINY * (float((k[both] / m[both]).min()) if both.any() else 1.0)

@@ -1,0 +1,126 @@
+"""A reduced model that is first order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.linalg import eigvals, schur
+
+from flexctrl.linear.grid import peak_grid, refined
+from flexctrl.linear.reduction.result import Reduced
+from flexctrl.linear.response import MOST_POINTS, FrequencyResponse, response_span
+from flexctrl.linear.transfer import Transfer
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["ReducedStates", "Triple", "states_transfer"]
+
+_CLOSEST = float(np.finfo(float).eps)
+
+
+class Triple(NamedTuple):
+    """ẋ = A x + B u, y = C x."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+
+
+def states_transfer(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> Transfer:
+    """Evaluator of D + C (sI − A)⁻¹ B through one Schur form: n² operations for each s, no squared memory.
+
+    Parameters
+    ----------
+    A, B, C, D : numpy.ndarray
+        Balanced states, so that every block of A has the size of its poles.
+
+    Returns
+    -------
+    callable
+        s, shape (N,) to G, shape (n_outputs, n_inputs, N).
+    """
+    T, Q = schur(A, output="complex") if len(A) else (np.zeros((0, 0)), np.zeros((0, 0)))
+    load, seen = Q.conj().T @ B, C @ Q
+
+    def evaluate(s: np.ndarray) -> np.ndarray:
+        s = np.asarray(s, dtype=complex)
+        x = np.zeros((*load.shape, s.size), complex)
+        for k in range(len(T) - 1, -1, -1):
+            above = np.tensordot(T[k, k + 1 :], x[k + 1 :], 1)
+            away = s - T[k, k]
+            # on the pole itself: as near as round-off lets s be, so a search that runs into it sees a large value
+            x[k] = (load[k, :, None] + above) / np.where(away == 0.0, _CLOSEST * max(abs(T[k, k]), _CLOSEST), away)
+        return np.asarray(np.tensordot(seen, x, 1) + D[:, :, None])
+
+    return evaluate
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedStates(Reduced):
+    """A reduced model in first-order form, with the signal names of the full one.
+
+    Attributes
+    ----------
+    system : Triple
+        A, B, C; the states kept exactly come first.
+    D : numpy.ndarray, shape (n_outputs, n_inputs)
+        Feedthrough.
+    exact : int
+        States that were not approximated (integrators, unstable and undamped modes).
+    hankel : numpy.ndarray
+        Hankel singular values of the balanced part, decreasing.
+    bound : numpy.ndarray, shape (n_outputs, n_inputs)
+        2 Σ of the Hankel singular values left out, which |G − G_r| cannot exceed at any frequency; infinite
+        for a model cut to its lowest modes beforehand.
+    """
+
+    system: Triple
+    D: np.ndarray
+    exact: int
+    hankel: np.ndarray
+    bound: np.ndarray
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.system.A)
+
+    def transfer(self, top: float) -> Transfer:
+        """Evaluator of G_r(s), any s."""
+        return states_transfer(*self.system, self.D)
+
+    def frequency_response(
+        self, omega: np.ndarray | Sequence[float] | None = None, span: tuple[float, float] | None = None
+    ) -> FrequencyResponse:
+        """Response of the reduced model; as :meth:`LinearModel.frequency_response`."""
+        evaluate, poles = self.transfer(np.inf), self.damped_poles()
+        if omega is None:
+            points, values = refined(evaluate, peak_grid(poles, span or response_span(poles)), MOST_POINTS)
+        else:
+            points = np.asarray(omega, float)
+            values = evaluate(1j * points)
+        return FrequencyResponse(points, values, self.full.inputs, self.full.outputs, self.full.name)
+
+    def damped_poles(self) -> np.ndarray:
+        """Poles, smallest modulus first."""
+        poles = eigvals(self.system.A) if self.order else np.zeros(0)
+        return poles[np.argsort(abs(poles), kind="stable")]
+
+    def to_ss(self) -> control.StateSpace:
+        """The reduced model for python-control."""
+        import control
+
+        exact = [f"exact{i + 1}" for i in range(self.exact)]
+        rest = [f"balanced{i + 1}" for i in range(self.order - self.exact)]
+        return control.ss(
+            *self.system,
+            self.D,
+            inputs=list(self.full.inputs),
+            outputs=list(self.full.outputs),
+            states=exact + rest,
+            name=self.full.name,
+        )
