@@ -253,8 +253,8 @@ def _trend(before: AlphaPoint, rate: np.ndarray) -> np.ndarray:
 
 def _quickest(plain: Stepper) -> Any:
     """Return steps in compiled loops, where the model and its feed allow that."""
-    from flexctrl.dynamics.marching import can_march
-    from flexctrl.dynamics.marching_stepper import MarchingStepper
+    from flexctrl.dynamics.march.marching import can_march
+    from flexctrl.dynamics.march.stepper import MarchingStepper
 
     return MarchingStepper(plain) if can_march(plain.model) and not plain.feed.continuous else plain
 

@@ -16,7 +16,7 @@ from flexctrl.dynamics.dense import Curve, Track
 from flexctrl.dynamics.events import Crossing, Occurrence, Watch
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
-from flexctrl.dynamics.ride import ride
+from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Mark, Point, StepError, Stepper

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     import casadi as ca
 
-    from flexctrl.mechanics.kernel import Kernel
+    from flexctrl.kernels.kernel import Kernel
 
 
 def rotation_vector(R: ca.SX) -> ca.SX:
@@ -67,7 +67,7 @@ def turn_kernel() -> Kernel:
     """Return the kernel (R, θ) → exp(θ×) R, row by row, with R's round-off drift from orthonormality removed."""
     import casadi as ca
 
-    from flexctrl.mechanics.kernel import Kernel
+    from flexctrl.kernels.kernel import Kernel
 
     rows, theta = ca.SX.sym("R", 9), ca.SX.sym("theta", 3)
     R = rotation_of(theta) @ ca.reshape(rows, 3, 3).T

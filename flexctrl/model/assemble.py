@@ -14,7 +14,7 @@ from flexctrl.effects.flexibility import Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.mechanics.kernel import Backend, best_backend
+from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equilibrium import equilibrium
 from flexctrl.model.frictions import inner_freedoms
 from flexctrl.model.linearize import linearize

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.mechanics.native import Wholes
+from flexctrl.kernels.native import Wholes
 from flexctrl.model.fronts import Plan
 from flexctrl.model.model import Model
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from flexctrl.mechanics.eights import eight, put
-from flexctrl.mechanics.native import Reals, Runs, Wholes
+from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = ["Flat", "clear", "drive", "energy", "keep", "load", "place", "pull", "push", "tangent"]

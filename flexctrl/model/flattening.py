@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.mechanics.kernel import Kernel, Run
+from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.rotation import turn_kernel
 from flexctrl.model.axes import Axes, axes_of
 from flexctrl.model.flat import Flat

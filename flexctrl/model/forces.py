@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.kernels.kernel import Backend, Run
 from flexctrl.linear.parts import Parts, parts_of
-from flexctrl.mechanics.kernel import Backend, Run
 from flexctrl.model.families import Family
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.mixed import Excess, Mixed

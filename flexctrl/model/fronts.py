@@ -17,8 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import KernelError
-from flexctrl.mechanics.eights import eight, put
-from flexctrl.mechanics.native import Reals, Wholes
+from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.native import Reals, Wholes
 
 __all__ = ["Fronts", "Plan", "factor", "plan_of", "solve"]
 

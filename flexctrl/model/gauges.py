@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.kernels.kernel import Kernel, Run
+from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.mechanics.kernel import Kernel, Run
-from flexctrl.mechanics.native import Reals, Runs, Wholes
 from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, rope_pull, spring_pull
 from flexctrl.model.model import Model

@@ -14,10 +14,10 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
+from flexctrl.kernels.kernel import Kernel
 from flexctrl.mechanics import beam, pieces
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.beam_tangent import beam_slope
-from flexctrl.mechanics.kernel import Kernel
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.kernels.kernel import Kernel
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.mechanics.kernel import Kernel
 from flexctrl.mechanics.pieces import DriveMotion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
 from flexctrl.structure.drives import Drive, RotaryDrive

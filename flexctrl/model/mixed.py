@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.mechanics import beam, pieces
 from flexctrl.mechanics.beam_tangent import beam_slope
-from flexctrl.mechanics.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.model import kinds
 from flexctrl.model.kinds import Kind
 from flexctrl.model.motion import State

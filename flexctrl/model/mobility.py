@@ -10,7 +10,7 @@ from scipy.linalg import qr
 
 from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
-from flexctrl.mechanics.kernel import Backend
+from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.linkage import Link, Linkage, Loop, renumbered
 from flexctrl.model.motion import Dry, Motion, State

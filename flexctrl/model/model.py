@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.mechanics.kernel import Backend
+from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.assembly import assembled, mass_blocks, stiffness_blocks
 from flexctrl.model.families import families_of

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.mechanics.kernel import Kernel, Run
 from flexctrl.model.kinds import NODE_SLOT, Kind, moved, symbols_of
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.effects.effect import Inner
-from flexctrl.mechanics.kernel import Backend, Run
+from flexctrl.kernels.kernel import Backend, Run
 from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.linkage import Linkage, reciprocal_condition
 from flexctrl.structure.drives import Drive, RotaryDrive

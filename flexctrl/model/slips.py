@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.mechanics.kernel import Kernel, Run
+from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.model.families import Family
 from flexctrl.model.forces import Forces
 from flexctrl.model.friction_kinds import slip_of

@@ -14,8 +14,8 @@ import flexctrl
 from flexctrl.design.controller import Controller
 from flexctrl.dynamics.record import Record
 from flexctrl.dynamics.steps import Integrator
+from flexctrl.kernels.kernel import Backend
 from flexctrl.linear.reduction.selection import Selection
-from flexctrl.mechanics.kernel import Backend
 
 PROTOCOLS = (Backend, Controller, Integrator, Record, Selection)
 PUBLIC = {name: getattr(flexctrl, name) for name in flexctrl.__all__}

@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).parents[2] / "flexctrl"
 HOUSE = (
     "errors",
     "structure",
+    "kernels",
     "mechanics",
     "effects",
     "linear",

@@ -14,7 +14,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from flexctrl.mechanics.kernel import CasadiVM, Compiled, Kernel, Run
+from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel, Run
 
 PARTS = 24
 

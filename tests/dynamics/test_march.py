@@ -14,10 +14,10 @@ import flexctrl as fc
 from flexctrl.cranes.ceiling_crane import MEMBER
 from flexctrl.dynamics.alpha import Coefficients, Stepper
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.march_loops import run as tasks
-from flexctrl.dynamics.march_record import DONE, FIXED, SETTLE
-from flexctrl.dynamics.marching import Marcher, Method
-from flexctrl.dynamics.marching_stepper import MarchingStepper
+from flexctrl.dynamics.march.loops import run as tasks
+from flexctrl.dynamics.march.marching import Marcher, Method
+from flexctrl.dynamics.march.record import DONE, FIXED, SETTLE
+from flexctrl.dynamics.march.stepper import MarchingStepper
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
 from machines import machine

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.mechanics.native import Packed, Reals
+from flexctrl.kernels.native import Packed, Reals
 from flexctrl.model.flat import Flat, drive, energy, keep, load, place, pull, push, tangent
 from flexctrl.model.flattening import Flattened, can_be_flat, flatten
 from flexctrl.model.gauges import Gauges, read

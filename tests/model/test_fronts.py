@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from flexctrl.mechanics.native import Packed, Reals
+from flexctrl.kernels.native import Packed, Reals
 from flexctrl.model.fronts import Fronts, Plan, factor, plan_of, solve
 
 pytest.importorskip("llvmlite")

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.mechanics.kernel import Kernel, Tables, parameter_table
+from flexctrl.kernels.kernel import Kernel, Tables, parameter_table
 
 
 @dataclass(frozen=True, eq=False)
 class VMRun:
-    """A kernel bound to tables, run by casadi; see `flexctrl.mechanics.kernel.Run`.
+    """A kernel bound to tables, run by casadi; see `flexctrl.kernels.kernel.Run`.
 
     Attributes
     ----------

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flexctrl.mechanics.llvm_writer import Writer
+from flexctrl.kernels.llvm_writer import Writer
 
 _LARGE_ANGLE = 1e5
 _LARGE_SIDE = 1e300

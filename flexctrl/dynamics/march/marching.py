@@ -11,8 +11,8 @@ import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.march_loops import run
-from flexctrl.dynamics.march_record import (
+from flexctrl.dynamics.march.loops import run
+from flexctrl.dynamics.march.record import (
     CONTROLLED,
     DONE,
     FIXED,
@@ -30,8 +30,8 @@ from flexctrl.dynamics.march_record import (
     March,
 )
 from flexctrl.errors import KernelError
-from flexctrl.mechanics.kernel import Compiled
-from flexctrl.mechanics.native import Packed
+from flexctrl.kernels.kernel import Compiled
+from flexctrl.kernels.native import Packed
 from flexctrl.model.flattening import Flattened, can_be_flat, flatten
 from flexctrl.model.kinds import NODE_SLOT
 from flexctrl.model.model import Model

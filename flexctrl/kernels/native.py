@@ -16,9 +16,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from flexctrl.errors import KernelError
-from flexctrl.mechanics.kernel import FLOAT, Run
-from flexctrl.mechanics.native_ir import Translation
-from flexctrl.mechanics.native_types import DECLARATIONS, RUNS, SCALARS, record_fields
+from flexctrl.kernels.kernel import FLOAT, Run
+from flexctrl.kernels.native_ir import Translation
+from flexctrl.kernels.native_types import DECLARATIONS, RUNS, SCALARS, record_fields
 
 __all__ = ["Packed", "Reals", "Runs", "Wholes", "assembly", "compiled"]
 
@@ -116,7 +116,7 @@ def assembly(function: Callable[..., int]) -> str:
 @cache
 def compiled(function: Callable[[Any], int]) -> Callable[[ctypes.c_void_p], int]:
     """Return the machine code of a function that takes a record and returns an int; called on a record's address."""
-    from flexctrl.mechanics.llvm import link
+    from flexctrl.kernels.llvm import link
 
     library = link(assembly(function), 2, ("entry",), passes=True)
     code = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library["entry"])

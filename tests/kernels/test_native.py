@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from flexctrl.errors import KernelError
-from flexctrl.mechanics.eights import Eight, eight, larger, largest, put, total
-from flexctrl.mechanics.kernel import CasadiVM, Compiled, Kernel
-from flexctrl.mechanics.native import Packed, Reals, Runs, Wholes, assembly
+from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
+from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel
+from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly
 
 pytest.importorskip("llvmlite")
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.legs import Leg, Legs
-from flexctrl.dynamics.march_record import DONE
-from flexctrl.dynamics.marching import Pacing
-from flexctrl.dynamics.marching_stepper import MarchingStepper
+from flexctrl.dynamics.march.legs import Leg, Legs
+from flexctrl.dynamics.march.marching import Pacing
+from flexctrl.dynamics.march.record import DONE
+from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.steps import Controlled
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from typing import Any
 
 from flexctrl.errors import KernelError
-from flexctrl.mechanics import eights
-from flexctrl.mechanics.llvm_writer import double
-from flexctrl.mechanics.native_types import (
+from flexctrl.kernels import eights
+from flexctrl.kernels.llvm_writer import double
+from flexctrl.kernels.native_types import (
     EIGHT,
     INTRINSICS,
     LIBRARY,

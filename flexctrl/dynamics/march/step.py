@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.march_axes import mark, solved, turned_too_far
-from flexctrl.dynamics.march_record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
-from flexctrl.mechanics.eights import Eight, eight, larger, largest, put, total
+from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
+from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.model.flat import drive, place, push, tangent
 from flexctrl.model.fronts import factor
 

@@ -16,8 +16,8 @@ import textwrap
 from collections.abc import Callable
 from typing import Any
 
-from flexctrl.mechanics.native_expressions import Expressions
-from flexctrl.mechanics.native_types import VECTORS, ZERO, Value, llvm_type, signature
+from flexctrl.kernels.native_expressions import Expressions
+from flexctrl.kernels.native_types import VECTORS, ZERO, Value, llvm_type, signature
 
 
 class Translation(Expressions):

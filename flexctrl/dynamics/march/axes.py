@@ -6,8 +6,8 @@ is that axes that meet in a piece have turned against each other.
 
 from __future__ import annotations
 
-from flexctrl.dynamics.march_record import Factors
-from flexctrl.mechanics.native import Reals, Wholes
+from flexctrl.dynamics.march.record import Factors
+from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.axes import Axes
 from flexctrl.model.flat import Flat
 from flexctrl.model.fronts import Fronts, solve

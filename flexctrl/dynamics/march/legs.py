@@ -10,8 +10,8 @@ import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.marching import Pacing
-from flexctrl.dynamics.marching_stepper import MarchingStepper, Memory
+from flexctrl.dynamics.march.marching import Pacing
+from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.steps import Point
 from flexctrl.model.motion import State
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.march import blended, refactored, step, to_rate, to_v
-from flexctrl.dynamics.march_axes import mark, solved, turned_too_far
-from flexctrl.dynamics.march_record import (
+from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.record import (
     CONTROLLED,
     DONE,
     FAILED,
@@ -23,8 +22,9 @@ from flexctrl.dynamics.march_record import (
     WEIGHED,
     March,
 )
-from flexctrl.mechanics.eights import eight, larger, largest, put, total
-from flexctrl.mechanics.native import Reals
+from flexctrl.dynamics.march.step import blended, refactored, step, to_rate, to_v
+from flexctrl.kernels.eights import eight, larger, largest, put, total
+from flexctrl.kernels.native import Reals
 from flexctrl.model.flat import clear, drive, energy, keep, load, place, pull, push, tangent
 from flexctrl.model.fronts import factor
 from flexctrl.model.gauges import read

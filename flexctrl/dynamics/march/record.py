@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from flexctrl.mechanics.native import Reals
+from flexctrl.kernels.native import Reals
 from flexctrl.model.axes import Axes
 from flexctrl.model.flat import Flat
 from flexctrl.model.fronts import Fronts

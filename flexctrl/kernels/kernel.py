@@ -20,7 +20,7 @@ from flexctrl.errors import KernelError, MissingExtraError
 if TYPE_CHECKING:
     import casadi as ca
 
-    from flexctrl.mechanics.llvm import CompiledRun
+    from flexctrl.kernels.llvm import CompiledRun
 
 FLOAT = np.dtype(np.float64)
 _INDEX_LIMIT = 2**31
@@ -214,7 +214,7 @@ class CasadiVM:
 
     def bind(self, kernel: Kernel, gather: np.ndarray, params: np.ndarray, scatter: np.ndarray) -> Run:
         """Check the tables and return the run over them; raises KernelError."""
-        from flexctrl.mechanics.vm import VMRun
+        from flexctrl.kernels.vm import VMRun
 
         return VMRun.of(kernel, Tables.of(kernel, gather, scatter), params)
 
@@ -265,7 +265,7 @@ class Compiled:
         KernelError
             If a table does not fit, or the kernel has an operation that cannot be compiled.
         """
-        from flexctrl.mechanics.llvm import CompiledRun, best_lanes, compile_kernel
+        from flexctrl.kernels.llvm import CompiledRun, best_lanes, compile_kernel
 
         tables = Tables.of(kernel, gather, scatter)
         lanes = self.lanes or best_lanes(len(tables.gather))

@@ -10,8 +10,8 @@ import numpy as np
 from flexctrl.dynamics import alpha
 from flexctrl.dynamics.alpha import AlphaPoint
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.march_record import DONE
-from flexctrl.dynamics.marching import Marcher, Method, Remembered
+from flexctrl.dynamics.march.marching import Marcher, Method, Remembered
+from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
 from flexctrl.model.motion import State

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from flexctrl.errors import KernelError, MissingExtraError
-from flexctrl.mechanics.kernel import Batch, CasadiVM, Compiled, Kernel, best_backend
+from flexctrl.kernels.kernel import Batch, CasadiVM, Compiled, Kernel, best_backend
 
 pytest.importorskip("llvmlite")
-from flexctrl.mechanics.llvm import compile_kernel
-from flexctrl.mechanics.llvm_cache import cache_directory, stored
-from flexctrl.mechanics.llvm_ir import translate
+from flexctrl.kernels.llvm import compile_kernel
+from flexctrl.kernels.llvm_cache import cache_directory, stored
+from flexctrl.kernels.llvm_ir import translate
 
 BACKENDS = [CasadiVM(), *(Compiled(lanes) for lanes in (1, 2, 4, 8)), Compiled(4, optimize_up_to=0)]
 COMPILED = [*BACKENDS[1:], Compiled()]

@@ -23,9 +23,9 @@ import llvmlite
 import llvmlite.binding as binding
 import numpy as np
 
-from flexctrl.mechanics.kernel import FLOAT, Kernel, Tables, parameter_table
-from flexctrl.mechanics.llvm_cache import stored
-from flexctrl.mechanics.llvm_ir import LIBRARY, translate
+from flexctrl.kernels.kernel import FLOAT, Kernel, Tables, parameter_table
+from flexctrl.kernels.llvm_cache import stored
+from flexctrl.kernels.llvm_ir import LIBRARY, translate
 
 _lock = threading.Lock()
 _codes: dict[str, Code] = {}
@@ -194,7 +194,7 @@ def _library_addresses() -> dict[str, int]:
 
 @dataclass(frozen=True, eq=False)
 class CompiledRun:
-    """A compiled kernel bound to tables; see `flexctrl.mechanics.kernel.Run`.
+    """A compiled kernel bound to tables; see `flexctrl.kernels.kernel.Run`.
 
     Attributes
     ----------

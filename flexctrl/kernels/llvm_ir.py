@@ -13,13 +13,13 @@ from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from flexctrl.errors import KernelError
-from flexctrl.mechanics import llvm_math
-from flexctrl.mechanics.llvm_writer import Writer
+from flexctrl.kernels import llvm_math
+from flexctrl.kernels.llvm_writer import Writer
 
 if TYPE_CHECKING:
     import casadi as ca
 
-    from flexctrl.mechanics.kernel import Kernel
+    from flexctrl.kernels.kernel import Kernel
 
 _LIBRARY = (
     *("exp", "log", "pow", "asin", "acos", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),

@@ -1,0 +1,1 @@
+"""Many steps of a run at once, in compiled loops."""
