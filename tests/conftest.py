@@ -10,9 +10,11 @@ for _threads in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+pytest_plugins = ("recording",)
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that rewrites the pages of docs/validation; see tests/validation/recorder.py."""
+    """Add the option that rewrites the pages of docs/validation; see tests/recorder.py."""
     parser.addoption("--validation-pages", action="store_true", help="rewrite docs/validation from the cases that run")
 
 

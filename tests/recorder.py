@@ -1,6 +1,6 @@
-"""The pages of docs/validation, made from the tests.
+"""The pages of docs/validation, made from the tests of tests/validation and tests/hard.
 
-A test of a validation case asks for the fixture ``record`` and calls it once for each line of the page::
+A test of a case asks for the fixture ``record`` and calls it once for each line of the page::
 
     PAGE = "linear"  # docs/validation/linear.md
 
@@ -28,8 +28,10 @@ from pathlib import Path
 
 import numpy as np
 
-PAGES = Path(__file__).resolve().parents[2] / "docs" / "validation"
-COMMAND = "pytest tests/validation --validation-pages"
+HERE = Path(__file__).resolve().parent
+PAGES = HERE.parent / "docs" / "validation"
+FOLDERS = (HERE / "validation", HERE / "hard")
+COMMAND = "pytest tests/validation tests/hard --validation-pages"
 MARK = f"<!-- What follows is made by `{COMMAND}` -->"
 HEAD = "| case | reference | source | ours | difference | tolerance |\n|---|---|---|---|---|---|"
 _ROW = re.compile(r"^\| (.*) <!-- (\S+)::(.+) --> \| (.*) \| (.*) \| (.*) \| (.*) \| (.*) \|$", re.MULTILINE)
@@ -100,6 +102,11 @@ def _shown(values: np.ndarray) -> str:
     return ", ".join(f"{v:.10g}" for v in values)
 
 
+def home(module: str) -> Path | None:
+    """Return the file of a module of cases, if there is one."""
+    return next((folder / module for folder in FOLDERS if (folder / module).exists()), None)
+
+
 def page_of(name: str) -> Path:
     """Return the file of a page."""
     return PAGES / f"{name}.md"
@@ -125,7 +132,7 @@ def rewrite(page: Path, sections: dict[str, str]) -> None:
     assert MARK in text, f"{page} lacks the line {MARK!r}, under which the sections go"
     head, _, made = text.partition(MARK)
     kept = {m[1]: m[2].strip() for m in _SECTION.finditer(made)}
-    there = {name: body for name, body in {**kept, **sections}.items() if (Path(__file__).parent / name).exists()}
+    there = {name: body for name, body in {**kept, **sections}.items() if home(name)}
     body = "\n\n".join(f"<!-- {name} -->\n{there[name]}" for name in sorted(there))
     page.write_text(f"{head}{MARK}\n\n{body}\n", encoding="utf-8")
 

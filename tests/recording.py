@@ -1,4 +1,4 @@
-"""The fixture ``record`` and what writes the pages; see `recorder`."""
+"""A plugin of pytest: the fixture ``record`` and what writes the pages; see `recorder`."""
 
 from __future__ import annotations
 
