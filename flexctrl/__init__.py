@@ -45,6 +45,7 @@ _HOMES = {
     "flexctrl.effects.coulomb_friction": ("Coulomb", "CoulombFriction"),
     "flexctrl.effects.lugre_friction": ("LuGre", "LuGreFriction"),
     "flexctrl.effects.motor_lag": ("MotorLag",),
+    "flexctrl.effects.backlash": ("Backlash",),
     "flexctrl.kernels.kernel": ("CasadiVM", "Compiled"),
     "flexctrl.model.assemble": ("assemble", "rigid"),
     "flexctrl.model.model": ("Model",),

@@ -101,7 +101,7 @@ class Crossing:
 
 @dataclass
 class Watch:
-    """All gauges of a run: the events asked for, then the switching functions of the machine's own physics.
+    """All gauges of a run: the events asked for, then laws of force that switch, then laws that have corners.
 
     Attributes
     ----------
@@ -112,6 +112,11 @@ class Watch:
         and starts anew where one falls to zero.
     names : tuple of str
         Of the switches.
+    corners : callable
+        State → values whose signs tell the sides of corners in laws of force; steps end where one changes.
+    corner_names : tuple of str
+    dust : numpy.ndarray
+        Values of corners below these are zero but for round-off.
     sides : numpy.ndarray
         The side each gauge is on: ±1; 0 while it has not left zero.
     """
@@ -120,9 +125,11 @@ class Watch:
     events: tuple[Event, ...]
     switches: Callable[[State, np.ndarray], np.ndarray]
     names: tuple[str, ...]
+    corners: Callable[[State], np.ndarray]
+    corner_names: tuple[str, ...]
+    dust: np.ndarray
     sides: np.ndarray = field(default_factory=lambda: np.zeros(0))
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    idle: bool = True
 
     def __post_init__(self) -> None:
         model = self.feed.model
@@ -132,7 +139,32 @@ class Watch:
                 hint = did_you_mean(event.of, known)
                 raise StructureError(f"event {event.name!r}: the model has no signal {event.of!r}{hint}")
 
-        self.idle = not self.events and not self.names
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing to look for."""
+        return self.quiet and not self.corner_names
+
+    @property
+    def quiet(self) -> bool:
+        """Whether there is nothing to look for but corners."""
+        return not self.events and not self.names
+
+    @property
+    def corner_sides(self) -> np.ndarray:
+        """The sides that corners are on."""
+        return self.sides[len(self.sides) - len(self.corner_names) :]
+
+    def corner_in(self, states: Sequence[State]) -> int:
+        """Return how many of some states come before the first one beyond a corner."""
+        for i, state in enumerate(states):
+            if not self._calm(state):
+                return i
+        return len(states)
+
+    def _calm(self, state: State) -> bool:
+        """Tell whether a state is on the same side of all corners."""
+        values = self.corners(state)
+        return bool(((np.sign(values) == self.corner_sides) | (np.abs(values) <= self.dust)).all())
 
     def stops(self, gauge: int) -> bool:
         """Tell whether a step has to end at a gauge's zero."""
@@ -150,20 +182,32 @@ class Watch:
         if self.events:
             signals = self.signals(state, u)
             found = [(signals[e.of] if isinstance(e.of, str) else float(e.of(signals))) - e.at for e in self.events]
-        return np.append(found, self.switches(state, u)) if self.names else np.array(found)
+        switches = self.switches(state, u) if self.names else np.zeros(0)
+        return np.concatenate([found, switches, self.corners(state)])
 
     def begin(self, point: Point) -> None:
         """Note the side that each gauge is on at the start."""
         values = self.values(point.state, point.supply.u)
         self.sides, self.sizes = np.sign(values), np.abs(values)
+        self.sides[np.abs(values) <= self._dusts()] = 0.0
         self.switched()
+
+    def _dusts(self) -> np.ndarray:
+        """What counts as zero of each gauge."""
+        dust = _DUST * self.sizes
+        if self.corner_names:
+            dust[-len(self.dust) :] = self.dust
+        return dust
 
     def switched(self) -> None:
         """Note that every switching law of force holds."""
-        self.sides[len(self.events) :] = 1.0
+        first = len(self.events)
+        self.sides[first : first + len(self.names)] = 1.0
 
     def crossings(self, curve: Curve, before: Point, after: Point) -> list[Crossing]:
         """Return where gauges cross zero over a step, in order; sides stay as they are."""
+        if self.quiet and self._calm(after.state):
+            return []
         t, h = before.state.t, after.state.t - before.state.t
         value = _Along(self, curve, before, after)
         last = self.values(before.state, before.supply.u)
@@ -189,7 +233,7 @@ class Watch:
 
     def _through(self, gauge: int, corners: Sequence[tuple[float, float]], value: _Along) -> list[Crossing]:
         side, found = self.sides[gauge], []
-        dust = _DUST * self.sizes[gauge]
+        dust = self._dusts()[gauge]
         direction = self.events[gauge].direction if gauge < len(self.events) else Direction.EITHER
         for (a, fa), (b, fb) in pairwise(corners):
             if abs(fb) <= dust or np.sign(fb) == side:
@@ -211,7 +255,7 @@ class Watch:
     def settle(self, after: Point) -> None:
         """Note the sides after a step."""
         values = self.values(after.state, after.supply.u)
-        clear = np.abs(values) > _DUST * self.sizes
+        clear = np.abs(values) > self._dusts()
         self.sides = np.where(clear, np.sign(values), self.sides)
 
     def cross(self, crossing: Crossing) -> None:
@@ -220,7 +264,7 @@ class Watch:
 
     def occurrence(self, crossing: Crossing, state: State, u: np.ndarray) -> Occurrence:
         """Return what is told of a crossing."""
-        named = [*(e.name for e in self.events), *self.names]
+        named = [*(e.name for e in self.events), *self.names, *self.corner_names]
         return Occurrence(named[crossing.gauge], crossing.t, crossing.rising, self.signals(state, u))
 
 

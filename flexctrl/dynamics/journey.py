@@ -196,11 +196,13 @@ class Journey:
 
     def _march(self, h: float, count: int, stop: float) -> int:
         """Take many steps at once, if the stepper can; return how many."""
-        if not isinstance(self.stepper, Marching) or self.plan.feed.continuous or not self.watch.idle:
+        if not isinstance(self.stepper, Marching) or self.plan.feed.continuous or not self.watch.quiet:
             return 0
         before = self.point
         count = max(1, min(count, int(_BLOCK_BYTES / (100.0 * len(before.state.x) + 32.0 * before.state.q.size))))
         block = self.stepper.march(before, h, count)
+        if self.watch.corner_names and (clear := self.watch.corner_in(block.states)) < len(block.times):
+            block = self.stepper.march(before, h, clear) if clear else replace(block, times=np.zeros(0))
         if not len(block.times):
             return 0
         self.books.enter_block(before, block)
@@ -276,8 +278,9 @@ class Journey:
         watch, curve = self.watch, self.track.curve(before, after)
         crossings = watch.crossings(curve, before, after)
         landing = next((c for c in crossings if watch.stops(c.gauge)), None)
-        if landing is not None and landing.gauge >= len(watch.events) and self.mark.stuck >= _CHATTER:
-            name = watch.names[landing.gauge - len(watch.events)]
+        switch = -1 if landing is None else landing.gauge - len(watch.events)
+        if 0 <= switch < len(watch.names) and self.mark.stuck >= _CHATTER:
+            name = watch.names[switch]
             raise StepError(self.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
         if landing is None or self.mark.stuck >= _CHATTER:
             self._note(crossings, curve, before)
@@ -294,13 +297,14 @@ class Journey:
             return after
         short = landing.t - before.state.t < 1e-6 * self.mark.size
         self.mark.stuck = self.mark.stuck + 1 if short else 0
-        return self._switched(after, landing.gauge - len(watch.events))
+        return self._anew(after, switch)
 
-    def _switched(self, at: Point, switch: int) -> Point:
+    def _anew(self, at: Point, switch: int) -> Point:
         """Start anew under the law of force that holds from now on."""
-        supply = self.plan.feed.restart(at.state, at.supply)
-        state = self.plan.model.switches.after(at.state, supply.u, switch)
-        self.watch.switched()
+        supply, state = self.plan.feed.restart(at.state, at.supply), at.state
+        if switch < len(self.watch.names):
+            state = self.plan.model.switches.after(state, supply.u, switch)
+            self.watch.switched()
         return self.stepper.renew(replace(at, state=state), supply, self.mark.size)
 
     def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:

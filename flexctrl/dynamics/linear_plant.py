@@ -113,6 +113,22 @@ class _Smooth:
         return state
 
 
+@dataclass(frozen=True)
+class _Straight:
+    """What a run asks of corners in laws of force: there are none."""
+
+    names: tuple[str, ...] = ()
+
+    @property
+    def dust(self) -> np.ndarray:
+        """Nothing."""
+        return np.zeros(0)
+
+    def values(self, state: State) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros(0)
+
+
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
     """M q̈ + C q̇ + K q = B u as a machine to be run: a state's ``q`` are the coordinates, it has no nodes.
@@ -130,6 +146,7 @@ class LinearPlant:
     notes: tuple[str, ...] = ()
     effects: tuple[Any, ...] = ()
     switches = _Smooth()
+    kinks = _Straight()
 
     @property
     def n(self) -> int:

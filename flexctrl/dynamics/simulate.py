@@ -155,8 +155,8 @@ def _run(
 
 
 def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:
-    switches = plan.model.switches
-    return Watch(plan.feed, events, switches.gaps, switches.names)
+    switches, kinks = plan.model.switches, plan.model.kinks
+    return Watch(plan.feed, events, switches.gaps, switches.names, kinks.values, kinks.names, kinks.dust)
 
 
 def _begun(

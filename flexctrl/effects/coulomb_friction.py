@@ -92,8 +92,7 @@ class CoulombFriction(Effect):
         """A phase each."""
         return (Inner(""),) * len(self.laws)
 
-    @property
-    def notes(self) -> tuple[str, ...]:
+    def left_out(self, structure: Structure, beside: Sequence[Effect]) -> tuple[str, ...]:
         """What equilibria and linear models leave out."""
         places = ", ".join(where for where, law in self.laws if law.static)
         note = f"dry friction at {places} acts in simulations only, not in equilibria and linear models"

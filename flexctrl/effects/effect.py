@@ -98,9 +98,8 @@ class Effect:
         """Freedoms of its own that no node has."""
         return ()
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a model under the effect leaves out, and where."""
+    def left_out(self, structure: Structure, beside: Sequence[Effect]) -> tuple[str, ...]:
+        """Return what a model under the effect and those beside it leaves out, in words."""
         return ()
 
     def bends(self, part: Part | Drive) -> bool:

@@ -103,8 +103,7 @@ class LuGreFriction(Effect):
         """A bristle each."""
         return tuple(Inner(f"{identifier(w)}_bristle", law.static / law.stiffness, True) for w, law in self.laws)
 
-    @property
-    def notes(self) -> tuple[str, ...]:
+    def left_out(self, structure: Structure, beside: Sequence[Effect]) -> tuple[str, ...]:
         """What linear models leave out."""
         places = ", ".join(where for where, _ in self.laws)
         note = f"of the friction at {places}, equilibria and linear models hold the viscous part only"

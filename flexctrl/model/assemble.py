@@ -70,7 +70,9 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     left_out = tuple(
         f"output {name} is left out: a rope that does not stretch measures no tension" for name in unmeasured
     )
-    motion = replace(motion, notes=motion.notes + left_out + tuple(note for e in parts for note in e.notes))
+    motion = replace(
+        motion, notes=motion.notes + left_out + tuple(note for e in parts for note in e.left_out(structure, parts))
+    )
     empty = sp.csr_matrix((motion.n, motion.n))
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]

@@ -40,7 +40,7 @@ def stiffness_blocks(
             matrix = to_space(beam_stiffness(part.section, part.length / part.elements), part.axes)
             for places in _elements(s, part):
                 yield part.name, (places, matrix)
-        elif isinstance(part, Spring) or (isinstance(part, Rope) and bends(part)):
+        elif isinstance(part, Spring | Rope) and bends(part):
             yield part.name, _line_stiffness(s, part)
     for i, drive in enumerate(s.drives):
         if bends(drive):

@@ -60,23 +60,30 @@ def _rows(table: np.ndarray) -> np.ndarray:
     return table.reshape(len(table), table.shape[1] * table.shape[2])
 
 
-def families_of(structure: Structure, effects: tuple[Effect, ...], rigid: frozenset[str]) -> tuple[Family, ...]:
-    """Return the families of a structure under some effects; a rigid beam is one piece, a rigid rope none."""
+def families_of(
+    structure: Structure, effects: tuple[Effect, ...], rigid: frozenset[str], loose: frozenset[str] = frozenset()
+) -> tuple[Family, ...]:
+    """Return the families of a structure under some effects; a rigid beam is one piece, a rigid rope none.
+
+    ``loose`` names the springs and drives that have play, and families of their own.
+    """
     parts, effects = structure.elements, tuple(e.everywhere() for e in effects if not e.apart)
     beams = [p for p in parts if isinstance(p, Beam)]
     bent = [b for b in beams if b.name not in rigid]
     stiff = tuple(e for e in effects if not isinstance(e, BeamFlexibility))
-    lines = [p for p in parts if isinstance(p, Spring) or (isinstance(p, Rope) and p.name not in rigid)]
+    springs = [p for p in parts if isinstance(p, Spring) and p.name not in loose]
+    ropes = [p for p in parts if isinstance(p, Rope) and p.name not in rigid]
+    tight = [d for d in structure.drives if d.name not in loose]
     made = [
         _beams(kinds.BEAM, structure, effects, [b for b in bent if not b.section.shears], rigid),
         _beams(kinds.SHEARING_BEAM, structure, effects, [b for b in bent if b.section.shears], rigid),
         _beams(kinds.BEAM, structure, stiff, [b for b in beams if b.name in rigid], rigid),
-        _lines(kinds.SPRING, structure, effects, [p for p in lines if isinstance(p, Spring)]),
-        _lines(kinds.ROPE, structure, effects, [p for p in lines if isinstance(p, Rope)]),
+        lines_family(kinds.SPRING, structure, effects, springs),
+        lines_family(kinds.ROPE, structure, effects, ropes),
         _bodies(kinds.POINT, structure, effects, [p for p in parts if isinstance(p, PointMass)]),
         _bodies(kinds.BODY, structure, effects, [p for p in parts if isinstance(p, RigidBody)]),
-        _drives(kinds.ROTARY_DRIVE, structure, effects, RotaryDrive),
-        _drives(kinds.LINEAR_DRIVE, structure, effects, LinearDrive),
+        drives_family(kinds.ROTARY_DRIVE, structure, effects, [d for d in tight if isinstance(d, RotaryDrive)]),
+        drives_family(kinds.LINEAR_DRIVE, structure, effects, [d for d in tight if isinstance(d, LinearDrive)]),
     ]
     return tuple(f for f in made if f.count)
 
@@ -94,7 +101,7 @@ def _family(
         tuple(parts),
         np.array(nodes, dtype=int).reshape(len(parts), kind.nodes),
         np.array(drives, dtype=int).reshape(len(parts), kind.drives),
-        np.array(parameters, dtype=float).reshape(-1, kind.parameters),
+        np.array(parameters, dtype=float).reshape(len(parts), len(parameters[0]) if parameters else kind.parameters),
     )
 
 
@@ -120,7 +127,8 @@ def _beam_parameters(b: Beam, length: float) -> list[float]:
     return [*plain, *ratios, *coupling(s, length)[np.triu_indices(6)].tolist()]
 
 
-def _lines(kind: Kind, s: Structure, effects: tuple[Effect, ...], lines: Sequence[Rope | Spring]) -> Family:
+def lines_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], lines: Sequence[Rope | Spring]) -> Family:
+    """Return the family of some ropes or springs."""
     nodes = [[s.number(line.start), s.number(line.end)] for line in lines]
     parameters = [[line.stiffness, line.length, line.damping] for line in lines]
     return _family(kind, effects, [line.name for line in lines], nodes, parameters)
@@ -134,12 +142,12 @@ def _bodies(kind: Kind, s: Structure, effects: tuple[Effect, ...], bodies: Seque
     return _family(kind, effects, [b.name for b in bodies], [[s.number(b.node)] for b in bodies], rows)
 
 
-def _drives(kind: Kind, s: Structure, effects: tuple[Effect, ...], of: type[Drive]) -> Family:
-    chosen = [(i, d) for i, d in enumerate(s.drives) if isinstance(d, of)]
-    ground = len(s.nodes)
-    sides = [[s.number(d.node), ground if d.against is None else s.number(d.against)] for _, d in chosen]
-    parameters = [_drive_parameters(d) for _, d in chosen]
-    return _family(kind, effects, [d.name for _, d in chosen], sides, parameters, [i for i, _ in chosen])
+def drives_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], drives: Sequence[Drive]) -> Family:
+    """Return the family of some drives."""
+    ground, places = len(s.nodes), {d.name: i for i, d in enumerate(s.drives)}
+    sides = [[s.number(d.node), ground if d.against is None else s.number(d.against)] for d in drives]
+    names = [d.name for d in drives]
+    return _family(kind, effects, names, sides, [_drive_parameters(d) for d in drives], [places[n] for n in names])
 
 
 def _drive_parameters(d: Drive) -> list[float]:

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.effects.backlash import gaps_of
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, rope_pull, spring_pull
+from flexctrl.model.loose_kinds import loose_spring
 from flexctrl.model.model import Model
 from flexctrl.structure.elements import Rope, Spring
 from flexctrl.structure.signals import (
@@ -147,7 +149,8 @@ class _Builder:
         self.angles: list[tuple[int, int, int]] = []
         self.turns: list[tuple[int, int, int, int]] = []
         self.axes: list[np.ndarray] = []
-        self.lines: dict[type, list[tuple[int, Rope | Spring]]] = {}
+        self.gaps = gaps_of(model.effects)
+        self.lines: dict[tuple[type, bool], list[tuple[int, Rope | Spring]]] = {}
         self.moving = False
 
     def add(self, i: int, output: Output) -> None:
@@ -163,7 +166,7 @@ class _Builder:
         elif isinstance(output, Tension):
             line = self.s.part(output.line)
             assert isinstance(line, Rope | Spring)
-            self.lines.setdefault(type(line), []).append((i, line))
+            self.lines.setdefault((type(line), self.gaps.get(line.name, 0.0) > 0.0), []).append((i, line))
             self.moving = True
         elif isinstance(output, Rotation):
             self._rotation(i, output)
@@ -195,7 +198,7 @@ class _Builder:
 
     def made(self) -> Gauges:
         empty = np.zeros(0)
-        runs = tuple(self._tensions(of, lines) for of, lines in self.lines.items())
+        runs = tuple(self._tensions(of, loose, lines) for (of, loose), lines in self.lines.items())
         return Gauges(
             outputs=len(self.s.outputs),
             rows=len(self.sums),
@@ -215,21 +218,24 @@ class _Builder:
             tensions=runs,
         )
 
-    def _tensions(self, of: type, lines: list[tuple[int, Rope | Spring]]) -> Run:
+    def _tensions(self, of: type, loose: bool, lines: list[tuple[int, Rope | Spring]]) -> Run:
         slots = [(NODE_SLOT * self.s.number(line.end), NODE_SLOT * self.s.number(line.start)) for _, line in lines]
         gather = [np.concatenate([k + np.arange(3) for k in (a, b, a + 12, b + 12)]) for a, b in slots]
-        parameters = [[line.stiffness, line.length, line.damping] for _, line in lines]
-        kernel = _pull(of, self.model.effects)
+        gaps = [[self.gaps[line.name]] if loose else [] for _, line in lines]
+        parameters = [[p.stiffness, p.length, p.damping, *gap] for (_, p), gap in zip(lines, gaps, strict=True)]
+        kernel = _pull(of, loose, self.model.effects)
         scatter = np.array([[i] for i, _ in lines])
         return self.model.backend.bind(kernel, np.array(gather), np.array(parameters), scatter)
 
 
-def _pull(of: type, effects: tuple[Effect, ...]) -> Kernel:
+def _pull(of: type, loose: bool, effects: tuple[Effect, ...]) -> Kernel:
     """Tension from places and velocities of end and start (12)."""
     import casadi as ca
 
-    z, p, still = ca.SX.sym("z", 12), ca.SX.sym("p", len(LINE_PARAMETERS)), ca.SX(3, 1)
+    z, p, still = ca.SX.sym("z", 12), ca.SX.sym("p", len(LINE_PARAMETERS) + loose), ca.SX(3, 1)
     end, start = (NodeMotion(z[k : k + 3], ca.SX.eye(3), z[6 + k : 9 + k], still, still, still) for k in (0, 3))
+    if loose:
+        return Kernel("tension", z, p, loose_spring(effects, start, end, p)[1])
     m = line_motion(start, end, p)
     tension = ca.fmax(rope_pull(effects, m), 0.0) if of is Rope else spring_pull(effects, m)
     return Kernel("tension", z, p, tension)

@@ -301,14 +301,15 @@ def _point(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX
 
 
 def _rotary(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
-    return _drive(effects, pieces.rotary_motion(nodes[0], nodes[1], slot[:3], slot[3], parameters))
+    return drive_shares(effects, pieces.rotary_motion(nodes[0], nodes[1], slot[:3], slot[3], parameters))
 
 
 def _linear(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
-    return _drive(effects, pieces.linear_motion(nodes[0], nodes[1], slot[:3], parameters))
+    return drive_shares(effects, pieces.linear_motion(nodes[0], nodes[1], slot[:3], parameters))
 
 
-def _drive(effects: tuple[Effect, ...], m: pieces.DriveMotion) -> Shares:
+def drive_shares(effects: tuple[Effect, ...], m: pieces.DriveMotion) -> Shares:
+    """Return what acts on a drive."""
     import casadi as ca
 
     force = sum((e.drive(m) for e in effects), ca.SX(13, 1))

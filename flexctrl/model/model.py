@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
@@ -20,12 +20,14 @@ from flexctrl.model.assembly import assembled, mass_blocks, stiffness_blocks
 from flexctrl.model.families import families_of
 from flexctrl.model.forces import Forces
 from flexctrl.model.frictions import friction_families, lag_blocks
+from flexctrl.model.kinks import Kinks
+from flexctrl.model.loose_kinds import loose_families, loose_names
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import Motion, State
 from flexctrl.model.signals import Signals, signals_of
 from flexctrl.model.switches import Switches
 from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Part
+from flexctrl.structure.elements import Part, Spring
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
@@ -117,13 +119,20 @@ class Model:
     def forces(self) -> Forces:
         """All kernels of the model, bound to their tables."""
         rigid = frozenset(p.name for p in self.structure.elements if not self.bends(p))
-        families = families_of(self.structure, self.effects, rigid) + friction_families(self.structure, self.effects)
-        return Forces(self.motion, families, self.backend)
+        machine, effects = self.structure, self.effects
+        families = families_of(machine, effects, rigid, loose_names(machine, effects))
+        more = loose_families(machine, effects) + friction_families(machine, effects)
+        return Forces(self.motion, families + more, self.backend)
 
     @cached_property
     def switches(self) -> Switches:
         """Laws of force that switch while the machine runs."""
         return Switches(self)
+
+    @cached_property
+    def kinks(self) -> Kinks:
+        """Where laws of force have corners."""
+        return Kinks(self)
 
     def bends(self, part: Part | Drive) -> bool:
         """Tell whether some effect lets a part deform.
@@ -155,8 +164,13 @@ class Model:
 
     @cached_property
     def _stiffness(self) -> sp.csc_matrix:
-        parts = stiffness_blocks(self.structure, self.motion, self.bends)
+        loose = loose_names(self.structure, self.effects)
+        parts = stiffness_blocks(self.structure, self.motion, self._stiff_but(loose))
         return assembled(self.motion, chain(parts, lag_blocks(self.structure, self.effects, self.motion)))
+
+    def _stiff_but(self, loose: frozenset[str]) -> Callable[[Part | Drive], bool]:
+        """Which parts resist deformation at rest."""
+        return lambda part: (isinstance(part, Spring) or self.bends(part)) and part.name not in loose
 
     @cached_property
     def _small(self) -> Small:

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.effects.backlash import gaps_of
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import line_motion
 from flexctrl.model.frictions import lag_compliance
 from flexctrl.model.kinds import rope_pull, spring_pull
+from flexctrl.model.loose_kinds import loose_spring
 from flexctrl.model.motion import Motion, State
 from flexctrl.structure.elements import Rope, Spring
 from flexctrl.structure.signals import (
@@ -253,8 +255,11 @@ def _pull(line: Rope | Spring, effects: tuple[Effect, ...]) -> ca.Function:
 
     z, still = ca.SX.sym("z", 12), ca.SX(3, 1)
     end, start = (NodeMotion(z[k : k + 3], ca.SX.eye(3), z[6 + k : 9 + k], still, still, still) for k in (0, 3))
-    m = line_motion(start, end, ca.SX([line.stiffness, line.length, line.damping]))
+    p, gap = [line.stiffness, line.length, line.damping], gaps_of(effects).get(line.name, 0.0)
+    m = line_motion(start, end, ca.SX(p))
     tension = rope_pull(effects, m) if isinstance(line, Rope) else spring_pull(effects, m)
+    if gap:
+        tension = loose_spring(effects, start, end, ca.SX([*p, gap]))[1]
     return ca.Function("pull", [z], [ca.vertcat(tension, ca.densify(ca.gradient(tension, z)))])
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexctrl.effects.automatic import Automatic
+from flexctrl.effects.backlash import Backlash
 from flexctrl.effects.coulomb_friction import Coulomb, CoulombFriction
 from flexctrl.effects.damping import ModalDamping, RayleighDamping
 from flexctrl.effects.effect import Effect
@@ -72,6 +73,7 @@ EFFECTS: dict[str, Kind] = {
     "viscous_friction": Placed(ViscousFriction, {"coefficients": mapping(number)}),
     "coulomb_friction": Placed(CoulombFriction, {"laws": mapping(_dry)}),
     "lugre_friction": Placed(LuGreFriction, {"laws": mapping(_LUGRE.read)}),
+    "backlash": Placed(Backlash, {"gaps": mapping(number)}),
     "motor_lag": Placed(MotorLag, {"time_constants": mapping(number)}),
 }
 """Effects by the name they have in a scene file."""

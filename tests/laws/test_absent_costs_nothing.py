@@ -93,3 +93,4 @@ def test_zero_strength_is_absence():
     """Not only the answer: a damping of zero leaves no instruction behind."""
     effects = [*BARE, fc.Gravity(), fc.Flexible()]
     assert counted(machine(), effects) == counted(machine(), [*effects, fc.RayleighDamping(0.0, 0.0)])
+    assert counted(machine(), effects) == counted(machine(), [*effects, fc.Backlash({"motor": 0.0})])

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
+    CORNER,
     DONE,
     FAILED,
     FIXED,
@@ -71,6 +73,9 @@ def fixed(m: March) -> int:
         if status != DONE:
             return status
         judge(m)
+        place(m.flat)
+        if m.watching == 1 and passes(m.corners, m.flat):
+            return CORNER
         accept(m)
     return DONE
 
@@ -100,6 +105,9 @@ def controlled(m: March) -> int:
             again = True
             continue
         again = False
+        place(m.flat)
+        if m.watching == 1 and passes(m.corners, m.flat):
+            return CORNER
         factor = 0.9 * growth(error)
         if factor > 1.3 and m.h > 0.5 * m.size:
             m.size = m.h * min(2.5, factor)
@@ -134,9 +142,8 @@ def judge(m: March) -> None:
 
 
 def accept(m: March) -> None:
-    """Go on to the end of the step; enter it in the books and records."""
+    """Go on to the end of the step, where the nodes have been placed; enter it in the books and records."""
     f = m.flat
-    place(f)
     keep(f)
     zero = 0.0 * eight(m.weight)
     still = zero

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.loops import run
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
@@ -240,6 +241,12 @@ class Marcher:
         m = self.march
         m.keeping, m.due, m.spacing = int(all_states), due, spacing
 
+    def watch(self, sides: np.ndarray) -> None:
+        """End before steps that pass corners of laws of force; ``sides`` are those they are on (none: do not)."""
+        m = self.march
+        m.corners.sides[:] = sides if sides.size else 0.0
+        m.watching = int(sides.size > 0)
+
     def books(self) -> tuple[float, float, np.ndarray, float]:
         """Return work, losses, how far degrees of freedom have been, and the power dissipated now."""
         m = self.march
@@ -310,6 +317,7 @@ def _march(F: Flattened, method: Method) -> March:
     return March(
         flat=flat,
         gauges=F.gauges,
+        corners=corners_of(F.model),
         fronts=F.plan.fronts,
         axes=F.axes,
         tangent=_factors(F),

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flexctrl.dynamics.march.corners import Corners
 from flexctrl.kernels.native import Reals
 from flexctrl.model.axes import Axes
 from flexctrl.model.flat import Flat
 from flexctrl.model.fronts import Fronts
 from flexctrl.model.gauges import Gauges
 
-DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT = 0, 1, 2, 3, 4, 5
-"""How a call ends: with all done; before it can go on; at a step that does not converge, or cannot be shorter."""
+DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT, CORNER = 0, 1, 2, 3, 4, 5, 6
+"""How a call ends: with all done; before it can go on; at a step that does not converge, or cannot be shorter; before
+one that passes a corner of a law of force."""
 
 FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED = 0, 1, 2, 3, 4, 5, 6, 7
 """What to do."""
@@ -54,6 +56,7 @@ class March:
     ----------
     flat : Flat
     gauges : Gauges
+    corners : Corners
     fronts : Fronts
     axes : Axes
     tangent, mass : Factors
@@ -81,8 +84,8 @@ class March:
     made_for, mass_for : float
         Step for which the tangent was made; 1 once the mass has been.
     newton, factorisations, weighings, worst : int
-    losing, asking : int
-        Whether power is dissipated; whether tangents are asked for.
+    losing, asking, watching : int
+        Whether power is dissipated; whether tangents are asked for; whether steps end before corners.
     keeping, due, spacing, kept : int, float
         Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many.
     power, gained, lost : float
@@ -103,6 +106,7 @@ class March:
 
     flat: Flat
     gauges: Gauges
+    corners: Corners
     fronts: Fronts
     axes: Axes
     tangent: Factors
@@ -159,6 +163,7 @@ class March:
     weighings: int = 0
     worst: int = 0
     losing: int = 0
+    watching: int = 0
     keeping: int = 1
     due: float = 0.0
     spacing: float = 0.0

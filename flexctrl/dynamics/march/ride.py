@@ -30,7 +30,7 @@ _SECONDS = 0.1
 def ride(journey: Journey) -> bool:
     """Take as many steps of a run as can be marched, for about a tenth of a second; tell whether there were any."""
     stepper = journey.stepper
-    if not isinstance(stepper, MarchingStepper) or not journey.watch.idle:
+    if not isinstance(stepper, MarchingStepper) or not journey.watch.quiet:
         return False
     return _Ride(journey, stepper).go()
 
@@ -46,6 +46,7 @@ class _Ride:
         sums = j.books.sums
         self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved)
         self.marcher.open(j.books.first, sums.moved, j.books.dissipates)
+        self.marcher.watch(j.watch.corner_sides)
         self.marcher.keep(not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time), *j.rows.due())
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
 
@@ -114,12 +115,15 @@ class _Ride:
         """Hand over to the journey; tell whether there were any steps."""
         j, m, legs = self.journey, self.marcher.march, self.legs.legs
         self.stepper.count()
+        self.marcher.watch(np.zeros(0))
         j.mark.rejected += m.rejected - self.rejected
         if not legs:
             return False
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.enter_ride(sum(leg.count for leg in legs), self.marcher.books(), j.point)
         j.track.remember(self.legs)
+        if not j.watch.idle:
+            j.watch.settle(j.point)
         if not self.jumped:
             j.point = self.stepper.plain.renew(j.point, self.supply, j.mark.size)
         return True
