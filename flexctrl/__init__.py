@@ -50,6 +50,7 @@ _HOMES = {
     "flexctrl.model.assemble": ("assemble", "rigid"),
     "flexctrl.model.model": ("Model",),
     "flexctrl.model.motion": ("State",),
+    "flexctrl.model.project": ("Projection", "project"),
     "flexctrl.model.equilibrium": ("Rest", "equilibrium"),
     "flexctrl.model.path": (
         "BranchPoint",

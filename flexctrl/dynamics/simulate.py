@@ -26,6 +26,7 @@ from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.linear.model import LinearModel
+from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
@@ -89,7 +90,8 @@ def simulate(
     Raises
     ------
     StructureError
-        For an end that is not positive, an unknown input, or a checkpoint of another run.
+        For an end that is not positive, an unknown input, a start that the machine cannot be in (see `project`), or
+        a checkpoint of another run.
     ControllerError
         If the controller's names are not the model's.
     MechanismError
@@ -103,6 +105,8 @@ def simulate(
     if isinstance(model, LinearModel):
         method = method or Exact(every or until / _ROWS)
         model = cast(Model, _plant(model, method))
+    elif isinstance(start, State):
+        check_state(model, start, "simulate: start")
     feed = feed_of(model, controller, _base(model, start, inputs))
     spacing = every if record.every is None else record.every
     tell = progress or _untold

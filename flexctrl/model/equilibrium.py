@@ -11,6 +11,7 @@ import numpy as np
 from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.balance import Balance
 from flexctrl.model.certify import whole_body
+from flexctrl.model.consistent import check_state
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.pivots import holds, negative_pivots
@@ -117,6 +118,8 @@ def equilibrium(
     if not isinstance(model, Model):
         raise StructureError(f"equilibrium: {model!r} is no Model; give what flexctrl.assemble returns")
     held = {model.coordinate(name): float(value) for name, value in (hold or {}).items()}
+    if start is not None:
+        check_state(model, start, "equilibrium: start")
     begin = (start or model.rest).loose
     held |= {i: float(begin.q[i]) for i in model.motion.frozen}
     balance = Balance(model, model.input_vector(inputs or {}), held)

@@ -12,6 +12,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.model.balance import Balance
 from flexctrl.model.certify import certify, taylor_slope
+from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
@@ -56,6 +57,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
         )
     rest = equilibrium(model, inputs=inputs) if at is None else at
     state = (rest.state if isinstance(rest, Rest) else rest).loose
+    check_state(model, state, "linearize: at")
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
     free = _free(model, rest)
     held = set(range(model.n)) - set(free.tolist())

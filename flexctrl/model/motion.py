@@ -212,6 +212,10 @@ class Motion:
     def rotary(self) -> np.ndarray:
         return np.array([isinstance(d, RotaryDrive) for d in self.drives], dtype=bool)
 
+    def pose(self, state: State) -> np.ndarray:
+        """Return places and rotations of the linkage's nodes, shape (count, 12)."""
+        return self._pose(state.x, state.R)
+
     def _pose(self, x: np.ndarray, R: np.ndarray) -> np.ndarray:
         return np.hstack([x[self.nodes], R[self.nodes].reshape(-1, 9)])
 
