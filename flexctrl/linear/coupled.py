@@ -6,16 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg as la
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.modal import ModalSystem
+from flexctrl.linear.resolvent import resolvent
 from flexctrl.linear.statespace import FirstOrder, first_order
 
 __all__ = ["coupled_transfer"]
 
-WORST_BASIS = 1e3
-BLOCK = 32
 CHUNK = 512
 
 
@@ -94,26 +92,17 @@ def _resolvent(A: np.ndarray, B: np.ndarray, wanted: np.ndarray) -> Callable[[np
     """s ↦ wanted (s I - A)⁻¹ B, shape (rows, n_inputs, N)."""
     if not A.size:
         return lambda s: np.zeros((len(wanted), B.shape[1], s.size), dtype=complex)
-    poles, vectors = la.eig(A)
-    if np.linalg.cond(vectors) < WORST_BASIS:
-        start = np.linalg.solve(vectors, B.astype(complex))
-        residues = np.einsum("pk,km->kpm", wanted @ vectors, start).reshape(len(A), -1)
-        return lambda s: ((1.0 / _nonzero(s[:, None] - poles, s)) @ residues).T.reshape(len(wanted), B.shape[1], s.size)
-    T, Q = la.schur(A, output="complex")
-    return lambda s: np.einsum("pi,imn->pmn", wanted @ Q, _substituted(T, Q.conj().T @ B, s))
+    form = resolvent(A)
+    if form.T.ndim == 1:
+        residues = np.einsum("pk,km->kpm", wanted @ form.Q, form.inverse @ B).reshape(len(A), -1)
+        shape = (len(wanted), B.shape[1])
+        return lambda s: ((1.0 / _nonzero(s[:, None] - form.T, s)) @ residues).T.reshape(*shape, s.size)
 
+    def substituted(s: np.ndarray) -> np.ndarray:
+        _nonzero(s[:, None] - form.poles, s)
+        return np.einsum("pi,imn->pmn", wanted, form.solve(np.repeat(B[:, :, None], s.size, axis=2), s))
 
-def _substituted(T: np.ndarray, start: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """(s I - T)⁻¹ start for upper triangular T and all s together, block row by block row."""
-    n, m = start.shape
-    x = np.zeros((n, m * s.size), dtype=complex)
-    for high in range(n, 0, -BLOCK):
-        low = max(0, high - BLOCK)
-        pull = T[low:high, high:] @ x[high:] + np.repeat(start[low:high], s.size, axis=1)
-        for i in range(high - 1, low - 1, -1):
-            total = pull[i - low] + T[i, i + 1 : high] @ x[i + 1 : high]
-            x[i] = total / np.tile(_nonzero(s - T[i, i], s), m)
-    return x.reshape(n, m, s.size)
+    return substituted
 
 
 def _nonzero(below: np.ndarray, s: np.ndarray) -> np.ndarray:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.linalg as sla
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.condense import Scaled, scaled
 from flexctrl.linear.coupled import coupled_transfer
+from flexctrl.linear.direct import direct_transfer, infinite
 from flexctrl.linear.modal import ModalSystem, rayleigh
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes, modes_of
 from flexctrl.linear.pencil import Pencil
+from flexctrl.linear.sampled import sampled_transfer
 
 __all__ = ["Transfer", "direct_transfer", "modal_transfer", "residual_transfer", "routed", "transfer"]
 
@@ -22,6 +23,9 @@ Transfer = Callable[[np.ndarray], np.ndarray]
 """s, shape (N,), 1/s ↦ H, shape (n_outputs, n_inputs, N)."""
 
 MOST_MODES = 400
+MOST_COUPLED = 150
+FURTHER = 1.5
+UNSYMMETRIC = 1e-9
 COUPLED = 250
 CACHED = 8192
 
@@ -31,8 +35,9 @@ def transfer(linear: LinearModel, top: float) -> Transfer:
 
     Up to 1000 freedoms with classical damping: poles and residues of all modes. Up to 250 with damping that
     couples the modes: a Schur form of the modal equations. Larger ones with Rayleigh or no damping: the modes
-    up to twice `top`, and the others by a power series that converges at least as 4⁻ʲ. Everything else: one
-    sparse factorisation for each s.
+    up to twice `top`, and the others by a power series that converges at least as 4⁻ʲ. With any other damping: a
+    projection whose error is bounded at each s. With follower loads, or hundreds of modes below `top`: one sparse
+    factorisation for each s.
 
     Parameters
     ----------
@@ -62,24 +67,20 @@ def routed(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
     evaluator : callable
     cheap : bool
     """
+    base = scaled(linear)
     if len(linear.coordinates) <= COMPLETE:
         system = linear._modal
         if system.classical:
             return modal_transfer(system), True
         if len(system.modes) <= COUPLED:
             return coupled_transfer(system), True
-        return direct_transfer(scaled(linear)), False
-    return _routed_large(linear, top)
-
-
-def _routed_large(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
-    base = scaled(linear)
     fit = rayleigh(base.model)
+    reach, most = (FURTHER, MOST_COUPLED) if fit is None else (2.0, MOST_MODES)
+    count = _modes_below(base, (reach * top) ** 2)
+    if count > most or base.stiffness[1] > UNSYMMETRIC:
+        return direct_transfer(base), False
     if fit is None:
-        return direct_transfer(base), False
-    count = _modes_below(base, (2.0 * top) ** 2)
-    if count > MOST_MODES:
-        return direct_transfer(base), False
+        return sampled_transfer(base, cache(lambda: modes_of(linear, base, count + 2)), top), True
     return residual_transfer(base, modes_of(linear, base, count + 2), fit, top), False
 
 
@@ -108,38 +109,6 @@ def modal_transfer(system: ModalSystem) -> Transfer:
             flat += _divided(still, moving, s, s[:, None] + relax.rates, "a creeping freedom")
         H = flat.T.reshape(*shape, s.size)
         return H + system.feedthrough[:, :, None] + system.jump[:, :, None] * s
-
-    return evaluate
-
-
-def direct_transfer(base: Scaled) -> Transfer:
-    """One sparse LU with a step of refinement for each s.
-
-    Parameters
-    ----------
-    base : Scaled
-
-    Returns
-    -------
-    callable
-    """
-    model = base.model
-    M, C, K = (sp.csc_matrix(A, dtype=complex) for A in (model.M, model.C, model.K))
-    B = model.B.astype(complex)
-
-    def one(s: complex) -> np.ndarray:
-        A = sp.csc_matrix(K + s * C + s * s * M)
-        try:
-            lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1)
-        except RuntimeError as error:
-            raise _infinite(s, "the model") from error
-        x = lu.solve(B)
-        x += lu.solve(B - A @ x)
-        return np.asarray(model.D + (model.Cq + s * model.Cv) @ x)
-
-    def evaluate(s: np.ndarray) -> np.ndarray:
-        values = [one(complex(value)) for value in np.asarray(s)]
-        return np.stack(values, axis=-1) if values else np.zeros((*model.D.shape, 0), dtype=complex)
 
     return evaluate
 
@@ -245,7 +214,7 @@ def _divided(still: np.ndarray, moving: np.ndarray, s: np.ndarray, below: np.nda
         where, mode = np.argwhere(hit).T
         residue = np.abs(still[mode]).max(axis=1) + np.abs(s[where] * moving[mode].max(axis=1, initial=0.0))
         if residue.any():
-            raise _infinite(complex(s[where[int(np.argmax(residue))]]), who)
+            raise infinite(complex(s[where[int(np.argmax(residue))]]), who)
         below = np.where(hit, 1.0, below)
     inverse = 1.0 / below
     result = inverse @ still
@@ -279,10 +248,3 @@ def _modes_below(base: Scaled, value: float) -> int:
 def _check_top(s: np.ndarray, top: float) -> None:
     if s.size and np.abs(s).max() > 1.0001 * top:
         raise LinearizationError(f"this evaluator holds up to |s| = {top:.6g} rad/s; ask transfer() for more")
-
-
-def _infinite(s: complex, who: str) -> LinearizationError:
-    return LinearizationError(
-        f"the response at s = {s:.6g} is infinite: {who} has an undamped pole there; leave that frequency out"
-        + (" (an integrator: start above 0)" if s == 0 else " or give damping")
-    )

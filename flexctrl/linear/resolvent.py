@@ -1,0 +1,87 @@
+"""(μ − A)⁻¹ for many μ: by eigenvectors where these are well conditioned, else by a Schur form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+__all__ = ["Resolvent", "resolvent"]
+
+WORST_BASIS = 1e3
+BLOCK = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Resolvent:
+    """A = Q T Q⁻¹ with T diagonal or upper triangular.
+
+    Attributes
+    ----------
+    T : numpy.ndarray, shape (n,) or (n, n)
+    Q, inverse : numpy.ndarray, shape (n, n)
+    """
+
+    T: np.ndarray
+    Q: np.ndarray
+    inverse: np.ndarray
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Eigenvalues of A, shape (n,)."""
+        return self.T if self.T.ndim == 1 else self.T.diagonal()
+
+    def largest(self, mu: np.ndarray) -> np.ndarray:
+        """max |μ/(μ − pole)|, at least 1; shape (N,)."""
+        nearest = np.abs(mu[:, None] - self.poles).min(axis=1, initial=np.inf)
+        return np.maximum(1.0, np.abs(mu) / np.maximum(nearest, np.finfo(float).tiny))
+
+    def solve(self, rhs: np.ndarray, mu: np.ndarray) -> np.ndarray:
+        """(μ − A)⁻¹ rhs for each μ.
+
+        Parameters
+        ----------
+        rhs : numpy.ndarray, shape (n, m, N)
+        mu : numpy.ndarray, shape (N,)
+
+        Returns
+        -------
+        numpy.ndarray, shape (n, m, N)
+        """
+        n, m, N = rhs.shape
+        start = (self.inverse @ rhs.reshape(n, m * N)).reshape(n, m, N)
+        diagonal = self.T.ndim == 1
+        x = start / (mu - self.T[:, None])[:, None, :] if diagonal else _substituted(self.T, start, mu)
+        return np.asarray((self.Q @ x.reshape(n, m * N)).reshape(n, m, N))
+
+
+def resolvent(A: np.ndarray) -> Resolvent:
+    """Prepare (μ − A)⁻¹.
+
+    Parameters
+    ----------
+    A : numpy.ndarray, shape (n, n)
+
+    Returns
+    -------
+    Resolvent
+    """
+    poles, vectors = la.eig(A, check_finite=False)
+    if np.linalg.cond(vectors) < WORST_BASIS:
+        return Resolvent(poles, vectors, np.linalg.inv(vectors))
+    T, Q = la.schur(A, output="complex", check_finite=False)
+    return Resolvent(T, Q, Q.conj().T)
+
+
+def _substituted(T: np.ndarray, start: np.ndarray, mu: np.ndarray) -> np.ndarray:
+    """(μ − T)⁻¹ start for upper triangular T, block row by block row."""
+    n, m, N = start.shape
+    x = np.zeros((n, m, N), dtype=complex)
+    for high in range(n, 0, -BLOCK):
+        low = max(0, high - BLOCK)
+        pull = start[low:high] + (T[low:high, high:] @ x[high:].reshape(n - high, m * N)).reshape(high - low, m, N)
+        for i in range(high - 1, low - 1, -1):
+            total = pull[i - low] + np.tensordot(T[i, i + 1 : high], x[i + 1 : high], axes=1)
+            x[i] = total / (mu - T[i, i])
+    return x
