@@ -7,7 +7,7 @@ before it. The table is that of Dormand & Prince, order 8 with an error estimate
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -128,8 +128,8 @@ class _Stepper:
         return _Point(state, rate, supply, np.zeros((0, 0)))
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
-        """Return the point under other inputs."""
-        return self.start(point.state, supply, step)
+        """Return the point under other inputs; the motion of the step before stays known."""
+        return replace(self.start(point.state, supply, step), slopes=point.slopes)
 
     def _slope(self, point: _Point, y: np.ndarray, t: float, guess: np.ndarray) -> np.ndarray:
         xi, v, x = self._split(y)

@@ -207,9 +207,9 @@ class Difference:
             return other.q - one.q
         motion = self.model.motion
         turned = logarithm(other.R @ np.swapaxes(one.R, 1, 2))
-        sources = np.append(other.q - one.q, 0.0)[motion.sources]
-        driven = np.where(motion.rigid, motion.ratios * (other.driven - one.driven), sources)
-        raw = np.append(np.hstack([other.x - one.x, turned]).ravel(), driven)
+        own = np.append(other.q - one.q, 0.0)
+        driven = np.where(motion.rigid, motion.ratios * (other.driven - one.driven), own[motion.sources])
+        raw = np.concatenate([np.hstack([other.x - one.x, turned]).ravel(), driven, own[motion.inner]])
         if motion.plain:
             return motion.collect(other, raw) / motion.collect(other, np.ones(motion.raw))
         T = motion.jacobian(other)

@@ -332,6 +332,20 @@ def test_lugre_sticks_elastically_and_slides_at_its_level():
     assert np.polyfit(loose.t[late], loose["v"][late], 1)[0] == pytest.approx((9.0 - 3.0) / 2.0, rel=1e-3)
 
 
+def test_extrapolation_knows_bristles():
+    """Two runs of an explicit order more than one: nearer to the explicit method than the finer of the two."""
+    law = fc.LuGre(100.0, kinetic=3.0, damping=2.0)
+    model = fc.assemble(pulled(2.0), [LARGE, fc.LuGreFriction({"block.u": law})])
+
+    def end(method):
+        return fc.simulate(model, until=0.5, inputs={"pull": 5.0}, method=method, tolerance=fc.Tolerance(0.0, 1e-8))[
+            "x"
+        ][-1]
+
+    exact, fine = end(fc.GeneralizedAlpha(1e-4)), end(fc.GeneralizedAlpha(5e-3))
+    assert abs(end(fc.Richardson(fc.GeneralizedAlpha(1e-2))) - exact) < 0.1 * abs(fine - exact)
+
+
 def test_the_rigid_twin_rubs_as_the_machine_does():
     effects = [LARGE, fc.Flexible(), fc.ViscousFriction({"motor": 0.1}), fc.CoulombFriction({"arm": 0.2})]
     model = fc.rigid(fc.assemble(turntable(), effects))

@@ -1,0 +1,100 @@
+"""B18, dry friction: a spring pulled over LuGre's bristles, and an oscillator that Coulomb's friction stops.
+
+Canudas de Wit et al. (1995): 1 kg on a spring of 2 N/m whose other end goes on at 0.1 m/s sticks and slips. The moving
+end of the spring is a force that grows by 0.2 N/s beside a spring to the ground. Coulomb's friction takes 4 F/k from
+the swing in each period, exactly, and at the end the mass stands still.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorder import Absolute
+
+import flexctrl as fc
+from flexctrl.design import PiecewisePolynomial
+
+PAGE = "dynamics"
+LUGRE = {10: 0.62758313, 20: 1.27259641, 25: 1.9088391992}
+STOPS = {0.3: (-0.02, 7), 0.31: (-0.01, 8), 0.095: (0.015, 2)}
+"""Start → where it stops, and after how many half periods."""
+
+
+def oscillator(stiffness: float, friction: fc.LuGreFriction | fc.CoulombFriction) -> fc.Model:
+    """1 kg on a spring along x."""
+    block = fc.RigidBody("block", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
+    spring = fc.Spring("spring", (-10, 0, 0), (0, 0, 0), stiffness)
+    joints = [fc.Support(block.node, "v w rx ry rz"), fc.Support(spring.start), fc.Pin(spring.end, block.node)]
+    outputs = [fc.Position("x", block.node, "x"), fc.Velocity("v", block.node, "x")]
+    structure = fc.Structure([block, spring], joints, inputs=[fc.Force("pull", block.node, "x")], outputs=outputs)
+    return fc.assemble(structure, [fc.LargeRotation(), fc.Flexible(), friction])
+
+
+@pytest.mark.slow
+def test_lugre_sticks_and_slips(record):
+    law = fc.LuGre(1e5, kinetic=1.0, static=1.5, stribeck=1e-3, damping=np.sqrt(1e5), viscous=0.4)
+    model = oscillator(2.0, fc.LuGreFriction({"block.u": law}))
+    pull = fc.OpenLoop({"pull": PiecewisePolynomial((0.0,), ((0.0, 0.2),))})
+    run = fc.simulate(model, pull, until=25.0, tolerance=fc.Tolerance(1e-7, 1e-10))
+    source = "EXUDYN Examples/lugreFrictionTest.py; high-order integration"
+    record(
+        "B18 LuGre, place at 10, 20, 25 s [m]",
+        ours=[run.at(t)["x"] for t in LUGRE],
+        reference=list(LUGRE.values()),
+        source=source,
+        tolerance=1e-4,
+    )
+    end = run.at(25.0)
+    record(
+        "B18 LuGre, creep and bristle at 25 s [µm/s, µm]",
+        ours=[1e6 * end["v"], 1e6 * end.state.q[model.coordinate("block_u_bristle")]],
+        reference=[9.42415, 11.816795],
+        source=source,
+        tolerance=2e-3,
+    )
+    v = run["v"]
+    slips = [np.interp(0.05, v[i : i + 2], run.t[i : i + 2]) for i in np.flatnonzero((v[1:] > 0.05) & (v[:-1] <= 0.05))]
+    record(
+        "B18 LuGre, first two slips (0.05 m/s reached) [s], first peak [m/s]",
+        ours=[*slips[:2], v[run.t < 10.0].max()],
+        reference=[7.5404, 13.9032, 0.36982],
+        source=source,
+        tolerance=1e-4,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", STOPS)
+def test_coulomb_friction_stops_an_oscillator(start, record):
+    """k = 100 N/m, F = 2 N, to break loose 2.001 N: from 0.3 m the spring ends up pulling with just 2 N."""
+    model = oscillator(100.0, fc.CoulombFriction({"block.u": fc.Coulomb(2.0, static=2.001)}))
+    stop, halves = STOPS[start]
+    drawn = model.displace({"block_0_u": start})
+    run = fc.simulate(
+        model,
+        until=0.1 * np.pi * halves + 1.0,
+        start=drawn,
+        method=fc.ExplicitRungeKutta(),
+        tolerance=fc.Tolerance(1e-9, 1e-9),
+    )
+    record(
+        f"B18 Coulomb from {start:g} m: where it stops [m]",
+        ours=run["x"][-1],
+        reference=stop,
+        source="closed form",
+        tolerance=Absolute(1e-6),
+    )
+    record(
+        f"B18 Coulomb from {start:g} m: when [s]",
+        ours=run.events[-1].t,
+        reference=0.1 * np.pi * halves,
+        source="closed form",
+        tolerance=1e-6,
+    )
+    record(
+        f"B18 Coulomb from {start:g} m: creep afterwards [m/s]",
+        ours=np.abs(run["v"][run.t > run.events[-1].t + 1e-9]).max(),
+        reference=0.0,
+        source="it sticks",
+        tolerance=Absolute(1e-9),
+    )
