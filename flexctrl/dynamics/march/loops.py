@@ -67,8 +67,8 @@ def made_again(m: March) -> int:
 
 
 def fixed(m: March) -> int:
-    """Take steps of one length until all wanted are done, or one needs a tangent or fails."""
-    while m.done < m.wanted:
+    """Take steps of one length until all wanted are done or no state can be kept; or one needs a tangent or fails."""
+    while m.done < m.wanted and m.kept < m.shelf:
         status = step(m)
         if status != DONE:
             return status
@@ -83,7 +83,7 @@ def fixed(m: March) -> int:
 def controlled(m: March) -> int:
     """Take steps of controlled error until all wanted are done, the stop is reached or the end would be passed."""
     again = False
-    while m.done < m.wanted and m.stop - m.t > 1e-12 * m.until:
+    while m.done < m.wanted and m.kept < m.shelf and m.stop - m.t > 1e-12 * m.until:
         if m.phase == FRESH:
             m.h = m.size if again else fitted(min(m.size, m.largest), m.stop - m.t)
             if m.t + m.h > m.until * (1.0 + 1e-12):

@@ -162,7 +162,7 @@ class Marcher:
     @property
     def room(self) -> int:
         """How many steps can be taken in one call."""
-        return len(self.march.states) // self._state_width if self.march.keeping else _CAPACITY
+        return self.march.shelf if self.march.keeping else _CAPACITY
 
     @cached_property
     def _state_width(self) -> int:
@@ -314,6 +314,7 @@ def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, lead, b, pulled, reach, first = np.zeros((9, flat.padded))
     state = 12 * flat.nodes + 2 * flat.padded + flat.drives + 1
+    shelf = int(min(_CAPACITY, max(1, _BYTES // (8 * state))))
     return March(
         flat=flat,
         gauges=F.gauges,
@@ -334,7 +335,8 @@ def _march(F: Flattened, method: Method) -> March:
         reach=reach,
         first=first,
         rows=np.zeros((1 + F.gauges.outputs) * _CAPACITY),
-        states=np.zeros(state * int(min(_CAPACITY, max(1, _BYTES // (8 * state))))),
+        states=np.zeros(state * shelf),
+        shelf=shelf,
         alpha_m=c.alpha_m,
         alpha_f=c.alpha_f,
         beta=c.beta,

@@ -86,8 +86,9 @@ class March:
     newton, factorisations, weighings, worst : int
     losing, asking, watching : int
         Whether power is dissipated; whether tangents are asked for; whether steps end before corners.
-    keeping, due, spacing, kept : int, float
-        Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many.
+    keeping, due, spacing, kept, shelf : int, float
+        Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many
+        there are, and how many there is room for.
     power, gained, lost : float
         Dissipated power; work of the inputs and energy dissipated.
     v, rate, algorithmic, trend : Reals
@@ -132,6 +133,7 @@ class March:
     loosest: float
     share: float
     asking: int
+    shelf: int
     tolerance: float = 0.0
     error: float = 0.0
     h: float = 0.0
