@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.design.controller import Controller, as_controller
+from flexctrl.errors import ControllerError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
@@ -63,9 +64,9 @@ class Feed:
         return np.array([self.model.outputs.index(name) for name in self.controller.inputs], dtype=int)
 
     @cached_property
-    def _writes(self) -> np.ndarray:
+    def _writes(self) -> tuple[int, ...]:
         assert self.controller is not None
-        return np.array([self.model.inputs.index(name) for name in self.controller.outputs], dtype=int)
+        return tuple(self.model.inputs.index(name) for name in self.controller.outputs)
 
     def measured(self, state: State) -> np.ndarray:
         """What the controller reads of a state."""
@@ -113,7 +114,13 @@ class Feed:
 
     def _total(self, command: Any) -> np.ndarray:
         u = self.base.copy()
-        u[self._writes] += np.asarray(command, dtype=float).reshape(-1)
+        values, writes = np.asarray(command, dtype=float).ravel().tolist(), self._writes
+        if len(values) != len(writes):
+            raise ControllerError(
+                f"the controller's command has {len(values)} values; expected one for each of its {len(writes)} outputs"
+            )
+        for i, value in zip(writes, values, strict=True):  # a few numbers: quicker than indexing by arrays
+            u[i] += value
         return u
 
     def at(self, state: State, before: Supply, h: float) -> Supply:

@@ -155,8 +155,8 @@ class _Stream:
         self.ends = [self.ends[0] if self.ends else values, values]
 
     def rows(self, table: np.ndarray, u: np.ndarray) -> None:
-        for row in table:
-            self.row(row[0], row[1:], u)
+        for row, now in zip(table, np.broadcast_to(u, (len(table), u.shape[-1])), strict=True):
+            self.row(row[0], row[1:], now)
 
     def table(self) -> np.ndarray:
         return np.array(self.ends).reshape(-1, self.width)

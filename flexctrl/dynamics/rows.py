@@ -110,6 +110,18 @@ class Rows:
         self.count += len(chosen)
         self.recorder.rows(chosen, supply.u)
 
+    def sampled(self, table: np.ndarray, commands: np.ndarray, states: list[State], slack: float) -> None:
+        """Write the rows of many steps with inputs of their own, and keep the states due for drawing."""
+        self.frames += states
+        if self.every is not None:
+            times = table[:, 0]
+            ahead = int((times[-1] + slack) / self.every) + 1
+            found = np.searchsorted(times, self.every * np.arange(self.count, ahead) - slack)
+            chosen = found[found < len(times)]
+            table, commands = table[chosen], commands[chosen]
+        self.count += len(table)
+        self.recorder.rows(table, commands)
+
     def row(self, t: float, y: np.ndarray, u: np.ndarray, slack: float) -> bool:
         """Write the row of an instant whose outputs are known, if one is due within some slack; tell whether it was."""
         due = self.every is None or abs(self.count * self.every - t) <= slack

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -30,6 +30,7 @@ Runs: TypeAlias = Sequence[Run]
 """Compiled kernels bound to their tables, called as ``runs[i](z, r)``."""
 
 _WHOLE = np.dtype(np.int64)
+_libraries: list[object] = []  # owners of the memory of what `compiled` returns, which keeps it for good
 _ENTRY = """\
 define i64 @entry(ptr %record) {{
   %status = call i64 @{name}(ptr %record)
@@ -88,11 +89,14 @@ class Packed:
         i, kind = self._places[name]
         (self._reals if kind == "float" else self._words)[i] = value
 
+    def cell(self, name: str) -> np.ndarray:
+        """Return the place of a number, shape (1,): quicker where it is read or written often."""
+        i, kind = self._places[name]
+        return (self._reals if kind == "float" else self._words)[i : i + 1]
+
     def bound(self, function: Callable[[Any], int]) -> Callable[[], int]:
         """Return a function of such records, compiled, on this one."""
-        code = compiled(function)
-        address = ctypes.c_void_p(self._words.ctypes.data)
-        return lambda: code(address)
+        return partial(compiled(function), ctypes.c_void_p(self._words.ctypes.data))
 
 
 def assembly(function: Callable[..., int]) -> str:
@@ -120,8 +124,5 @@ def compiled(function: Callable[[Any], int]) -> Callable[[ctypes.c_void_p], int]
 
     library = link(assembly(function), 2, ("entry",), passes=True)
     code = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library["entry"])
-
-    def call(address: ctypes.c_void_p, keep: object = library) -> int:
-        return code(address)
-
-    return call
+    _libraries.append(library)
+    return code

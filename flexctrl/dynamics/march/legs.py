@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,11 +16,15 @@ from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.steps import Point
 from flexctrl.model.motion import State
 
-__all__ = ["Leg", "Legs", "Span"]
+__all__ = ["Leg", "Legs", "Span", "same"]
 
 
-@dataclass(frozen=True)
-class Leg:
+def same(u: np.ndarray, v: np.ndarray) -> bool:
+    """Tell whether inputs are the same to the last bit."""
+    return u.tobytes() == v.tobytes()
+
+
+class Leg(NamedTuple):
     """Steps under the same inputs.
 
     Attributes
@@ -90,7 +95,7 @@ class Legs:
         u, found = self.start.supply.u, []
         for leg in self.legs:
             marcher.march.t = leg.t
-            if not np.array_equal(leg.supply.u, u):
+            if not same(leg.supply.u, u):
                 u = leg.supply.u
                 marcher.jump(u)
             found.append(marcher.travelled(leg.pacing, leg.count))

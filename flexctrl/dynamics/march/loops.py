@@ -34,11 +34,13 @@ from flexctrl.model.gauges import read
 __all__ = ["run"]
 
 _SMALLEST = 1e-12
-_MASS_TURNED = 0.05
+_MASS_TURNED = 0.1
 _SOLUTIONS = 8
 _EXACT = 1e-13
 _NEAR = 1e-9
+_CONTRACTING = 0.5
 _TINY = 1e-300
+_LEFT = 0.1
 _MASSLESS = 1e-14
 
 
@@ -67,7 +69,15 @@ def made_again(m: March) -> int:
 
 
 def fixed(m: March) -> int:
-    """Take steps of one length until all wanted are done or no state can be kept; or one needs a tangent or fails."""
+    """Take steps of one length until all wanted are done or no state can be kept; or one needs a tangent or fails.
+
+    Inputs that are told to jump do so first.
+    """
+    if m.jumping == 1:
+        status = jump(m)
+        if status != DONE:
+            return status
+        m.jumping = 0
     while m.done < m.wanted and m.kept < m.shelf:
         status = step(m)
         if status != DONE:
@@ -258,53 +268,102 @@ def jump(m: March) -> int:
     load(f)
     clear(f.padded, f.step)
     copy(f.padded, m.v, f.v)
-    copy(f.padded, m.rate, f.rate)
-    copy(f.padded, m.rate, m.lead)
     if m.mass_for != 1.0 or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
-        if m.asking == 1:
-            return WANTS_MASS
-        drive(f)
-        tangent(f, 0.0, 0.0, 1.0, m.mass.entries)
-        if weighed(m) != DONE:
-            return SINGULAR
-    last = math.inf
-    for _k in range(_SOLUTIONS):
-        drive(f)
-        push(f)
-        size = accelerate(m)
-        if not math.isfinite(size) or (size > last and last > _NEAR):
-            return FAILED
-        if size <= _EXACT or size > last:
-            break
-        last = size
+        status = massed(m)
+        if status != DONE:
+            return status
+    if m.attempt == 1 or not small(m):
+        status = solved_for(m)
+        if status != DONE:
+            return status
     for i in range(0, f.padded, 8):
-        put(m.algorithmic[i:], eight(m.algorithmic[i:]) + eight(f.rate[i:]) - eight(m.lead[i:]))
+        change = eight(f.rate[i:]) - eight(m.rate[i:])
+        put(m.algorithmic[i:], eight(m.algorithmic[i:]) + change)
         put(m.rate[i:], eight(f.rate[i:]))
     pull(f)
     copy(f.padded, f.force, m.pulled)
     return DONE
 
 
-def accelerate(m: March) -> float:
-    """Correct the accelerations by what is out of balance; return the share of the correction."""
+def small(m: March) -> bool:
+    """Add what the change of the inputs gives; tell whether that is so small that it is right within tolerance."""
     f = m.flat
+    pull(f)
     for i in range(0, f.padded, 8):
-        put(m.b[i:], -eight(f.force[i:]))
+        put(m.b[i:], eight(m.pulled[i:]) - eight(f.force[i:]))
+        put(f.rate[i:], eight(m.rate[i:]))
     m.b[f.n] = 0.0
     solved(m.axes, m.mass, m.fronts, m.b)
+    most = added(m)
+    return m.made_for > 0.0 and m.made_for * m.made_for * m.beta * _LEFT * most <= m.tolerance
+
+
+def solved_for(m: March) -> int:
+    """Solve for the accelerations, once more with the mass made anew if need be."""
+    while not balanced(m):
+        if m.attempt == 1:
+            m.attempt = 0
+            return FAILED
+        m.attempt = 1
+        m.mass_for = 0.0
+        status = massed(m)
+        if status != DONE:
+            return status
+    m.attempt = 0
+    return DONE
+
+
+def massed(m: March) -> int:
+    """Make the mass for the present shape, or ask for it."""
+    if m.asking == 1:
+        return WANTS_MASS
+    drive(m.flat)
+    tangent(m.flat, 0.0, 0.0, 1.0, m.mass.entries)
+    return weighed(m)
+
+
+def balanced(m: March) -> bool:
+    """Solve for the accelerations as exactly as steps are; tell whether the mass, of another shape maybe, was good."""
+    f = m.flat
+    share = m.made_for * m.made_for * m.beta if m.made_for > 0.0 else math.inf
+    copy(f.padded, m.rate, f.rate)
+    last = math.inf
+    for _k in range(_SOLUTIONS):
+        drive(f)
+        push(f)
+        for i in range(0, f.padded, 8):
+            put(m.b[i:], -eight(f.force[i:]))
+        m.b[f.n] = 0.0
+        solved(m.axes, m.mass, m.fronts, m.b)
+        change = added(m)
+        size = change / max(largest_rate(m), _TINY)
+        if size <= _EXACT or change * share <= m.tolerance:
+            return True
+        if not size < _CONTRACTING * last:
+            return size <= _NEAR
+        last = size
+    return last <= _NEAR
+
+
+def added(m: March) -> float:
+    """Add a correction to the accelerations; return its size, NaN where it is not finite."""
+    f = m.flat
     most = 0.0 * eight(m.weight)
     sums = most
-    size = most
     for i in range(0, f.padded, 8):
         change = eight(m.b[i:])
-        rate = eight(f.rate[i:]) + change
-        put(f.rate[i:], rate)
+        put(f.rate[i:], eight(f.rate[i:]) + change)
         most = larger(most, abs(change) * eight(m.weight[i:]))
         sums = sums + abs(change)
-        size = larger(size, abs(rate) * eight(m.weight[i:]))
-    if not math.isfinite(total(sums)):
-        return math.nan
-    return largest(most) / max(largest(size), _TINY)
+    return largest(most) if math.isfinite(total(sums)) else math.nan
+
+
+def largest_rate(m: March) -> float:
+    """Return the size of the largest acceleration."""
+    size = 0.0 * eight(m.weight)
+    for i in range(0, m.flat.padded, 8):
+        size = larger(size, abs(eight(m.flat.rate[i:])) * eight(m.weight[i:]))
+    return largest(size)
 
 
 def weighed(m: March) -> int:

@@ -40,8 +40,8 @@ from flexctrl.model.motion import State
 
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
-_SHARE = 1e-5
-_LOOSEST = 1e-7
+_SHARE = 1e-3
+_LOOSEST = 1e-6
 _TIGHT = 0.99e-10
 _CAPACITY = 1024
 _BYTES = 16e6
@@ -128,6 +128,7 @@ class Marcher:
         self.march = Packed(_march(self.flattened, method))
         m = self.march
         self._run = m.bound(run)
+        self._task, self._h, self._wanted, self._done = (m.cell(name) for name in ("task", "h", "wanted", "done"))
         self._kept: tuple[tuple[int, int], np.ndarray, np.ndarray] = ((-1, -1), np.zeros(0), np.zeros(0))
         self.width = 1 + len(model.outputs)
         self.rows = m.rows.reshape(-1, self.width)
@@ -226,6 +227,20 @@ class Marcher:
             status = self._through(FIXED)
         return status, m.done
 
+    def begin(self) -> None:
+        """Begin rows and states anew."""
+        self.march.done = self.march.kept = 0
+
+    def on(self, h: float, wanted: int) -> tuple[int, int]:
+        """Go on with steps of one length until as many as wanted are done; return how it ended, and how many are."""
+        self._h[0], self._wanted[0] = h, wanted
+        return self._through(FIXED), int(self._done[0])
+
+    def jumps(self, u: np.ndarray) -> None:
+        """Let the inputs jump before the next step of one length."""
+        self.supply(u)
+        self.march.jumping = 1
+
     def travelled(self, pacing: float | Pacing, count: int) -> list[State]:
         """Take as many steps and return the states after them."""
         found: list[State] = []
@@ -258,7 +273,7 @@ class Marcher:
         return self._through(JUMP)
 
     def _do(self, task: int) -> int:
-        self.march.task = task
+        self._task[0] = task
         return self._run()
 
     def _through(self, task: int) -> int:

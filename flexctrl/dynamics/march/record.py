@@ -84,8 +84,12 @@ class March:
     made_for, mass_for : float
         Step for which the tangent was made; 1 once the mass has been.
     newton, factorisations, weighings, worst : int
-    losing, asking, watching : int
-        Whether power is dissipated; whether tangents are asked for; whether steps end before corners.
+    losing, asking, watching, jumping : int
+        Whether power is dissipated; whether tangents are asked for; whether steps end before corners;
+        whether inputs jump before the next step.
+    keeping, due, spacing, kept, shelf : int, float
+        Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many
+        there are, and how many there is room for.
     keeping, due, spacing, kept, shelf : int, float
         Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many
         there are, and how many there is room for.
@@ -166,6 +170,7 @@ class March:
     worst: int = 0
     losing: int = 0
     watching: int = 0
+    jumping: int = 0
     keeping: int = 1
     due: float = 0.0
     spacing: float = 0.0

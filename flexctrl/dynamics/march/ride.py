@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.march.legs import Leg, Legs
+from flexctrl.dynamics.march.legs import Leg, Legs, same
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper
-from flexctrl.dynamics.steps import Controlled
+from flexctrl.dynamics.steps import Controlled, Fixed
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -48,6 +48,8 @@ class _Ride:
         self.marcher.open(j.books.first, sums.moved, j.books.dissipates)
         self.marcher.watch(j.watch.corner_sides)
         self.marcher.keep(not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time), *j.rows.due())
+        pace = j.plan.method.pace
+        self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
 
     def go(self) -> bool:
@@ -56,7 +58,12 @@ class _Ride:
         well = True
         while well and m.t < self.until - self.tick and time.perf_counter() - began < _SECONDS:
             stop = self.journey.stops.next
-            well = self._leg(stop) if stop - m.t > self.tick else self._renew(stop)
+            if stop - m.t <= self.tick:
+                well = self._renew(stop)
+            elif self._even(stop):
+                well = self._samples(began + _SECONDS)
+            else:
+                well = self._leg(stop)
         return self._end()
 
     def _leg(self, stop: float) -> bool:
@@ -69,6 +76,59 @@ class _Ride:
         if done:
             self._passed(Leg(self.supply, t, pacing, done), stop)
         return status == DONE and done > 0
+
+    def _even(self, stop: float) -> bool:
+        """Tell whether steps of one length go to a sample from where the last one was taken."""
+        mark = self.journey.mark
+        if not self.pace or not self.journey.plan.feed.sample_time:
+            return False
+        fits = stop <= self.until + self.tick and (stop - self.marcher.march.t) / self.pace < self.marcher.room
+        return fits and mark.left == 0 and not self.marcher.march.keeping
+
+    def _samples(self, deadline: float) -> bool:
+        """Go from sample to sample while there is room for rows; tell whether all is well.
+
+        With a controller at every step this is most of a run, so what is done for a sample is done here at once.
+        """
+        marcher, m, stops, mark = self.marcher, self.marcher.march, self.journey.stops, self.journey.mark
+        feed, legs, y = self.journey.plan.feed, self.legs.legs, self.marcher.rows[:, 1:]
+        pace, reads, supply = self.pace, feed.reads, self.supply
+        commands = np.empty((marcher.room, len(supply.u)))
+        t, done, status = m.t, 0, DONE
+        marcher.begin()
+        while t < self.until - self.tick and time.perf_counter() < deadline:
+            stop = stops.next
+            wanted = done + max(1, math.ceil((stop - t) / pace - 1e-6))
+            if wanted > marcher.room or stop > self.until + self.tick:
+                break
+            mark.size, start = (stop - t) / (wanted - done), done
+            status, done = marcher.on(mark.size, wanted)
+            if done > start:
+                commands[start:done] = supply.u
+                legs.append(Leg(supply, t, mark.size, done - start))
+            if done < wanted:
+                mark.left = wanted - done
+                break
+            t = m.t = marcher.rows[done - 1, 0] = stop
+            stops.passed += 1
+            before, supply = supply, feed.sampled(stop, y[done - 1, reads], supply)
+            commands[done - 1] = supply.u
+            if not same(supply.u, before.u):
+                marcher.jumps(supply.u)
+        self.supply = supply
+        return self._sampled(commands[:done], status)
+
+    def _sampled(self, commands: np.ndarray, status: int) -> bool:
+        """Enter samples in marks and rows, and let the inputs jump if they are about to; tell whether all is well."""
+        marcher, m, mark = self.marcher, self.marcher.march, self.journey.mark
+        mark.steps += len(commands)
+        if len(commands):
+            self.journey.rows.sampled(marcher.rows[: len(commands)], commands, marcher.states(), 1e-6 * mark.size)
+        if m.jumping:
+            self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
+            m.jumping = 0
+            mark.left = 0
+        return status == DONE and self.jumped
 
     def _paced(self, t: float, stop: float) -> tuple[float | Pacing, int]:
         """How steps are taken from here, and how many at most."""
@@ -108,7 +168,7 @@ class _Ride:
         u = self.supply.u
         if j.rows.row(stop, y, u, 1e-6 * j.mark.size) and abs(self.last.t - stop) < self.tick:
             j.rows.frame(self.last)
-        self.jumped = np.array_equal(u, before.u) or self.marcher.jump(u) == DONE
+        self.jumped = same(u, before.u) or self.marcher.jump(u) == DONE
         return self.jumped
 
     def _end(self) -> bool:
