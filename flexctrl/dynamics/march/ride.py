@@ -96,7 +96,7 @@ class _Ride:
         commands = np.empty((marcher.room, len(supply.u)))
         t, done, status = m.t, 0, DONE
         marcher.begin()
-        while t < self.until - self.tick and time.perf_counter() < deadline:
+        while time.perf_counter() < deadline:
             stop = stops.next
             wanted = done + max(1, math.ceil((stop - t) / pace - 1e-6))
             if wanted > marcher.room or stop > self.until + self.tick:
@@ -106,7 +106,7 @@ class _Ride:
             if done > start:
                 commands[start:done] = supply.u
                 legs.append(Leg(supply, t, mark.size, done - start))
-            if done < wanted:
+            if done < wanted or stop >= self.until - self.tick:
                 mark.left = wanted - done
                 break
             t = m.t = marcher.rows[done - 1, 0] = stop
