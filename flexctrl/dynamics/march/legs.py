@@ -34,13 +34,13 @@ class Leg(NamedTuple):
         Where they start [s].
     pacing : float or Pacing
         Their length, or how it is controlled.
-    count : int
+    steps : int
     """
 
     supply: Supply
     t: float
     pacing: float | Pacing
-    count: int
+    steps: int
 
 
 @dataclass(eq=False)
@@ -98,7 +98,7 @@ class Legs:
             if not same(leg.supply.u, u):
                 u = leg.supply.u
                 marcher.jump(u)
-            found.append(marcher.travelled(leg.pacing, leg.count))
+            found.append(marcher.travelled(leg.pacing, leg.steps))
         return found
 
 

@@ -147,14 +147,14 @@ class _Ride:
         """Enter a leg in marks and rows."""
         marcher, mark, rows = self.marcher, self.journey.mark, self.journey.rows
         self.legs.legs.append(leg)
-        mark.steps += leg.count
-        mark.left -= leg.count if mark.left > 0 else 0
+        mark.steps += leg.steps
+        mark.left -= leg.steps if mark.left > 0 else 0
         if isinstance(leg.pacing, Pacing):
             mark.size = marcher.march.size
         states = marcher.states()
         to_jump = stop - marcher.march.t <= self.tick
-        rows.ridden(self.last, marcher.rows[: leg.count], states, leg.supply, to_jump)
-        self.last = states[-1] if len(states) == leg.count else self.last
+        rows.ridden(self.last, marcher.rows[: leg.steps], states, leg.supply, to_jump)
+        self.last = states[-1] if len(states) == leg.steps else self.last
 
     def _renew(self, stop: float) -> bool:
         """Take a sample and let the inputs jump."""
@@ -180,7 +180,7 @@ class _Ride:
         if not legs:
             return False
         self.legs.end = j.point = self.stepper.leave(self.supply)
-        j.books.enter_ride(sum(leg.count for leg in legs), self.marcher.books(), j.point)
+        j.books.enter_ride(sum(leg.steps for leg in legs), self.marcher.books(), j.point)
         j.track.remember(self.legs)
         if not j.watch.idle:
             j.watch.settle(j.point)
