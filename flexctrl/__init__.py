@@ -15,7 +15,7 @@ _HOMES = {
     "flexctrl.structure.elements": ("Beam", "Node", "PointMass", "RigidBody", "Rope", "Spring"),
     "flexctrl.structure.chains": ("BeamChain", "arc"),
     "flexctrl.structure.joints": ("Hinge", "Pin", "Slide", "Support", "Weld"),
-    "flexctrl.structure.drives": ("LinearDrive", "RotaryDrive"),
+    "flexctrl.structure.drives": ("LinearDrive", "RotaryDrive", "Winch"),
     "flexctrl.structure.signals": (
         "AngularVelocity",
         "DriveAngle",

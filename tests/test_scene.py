@@ -111,6 +111,7 @@ first = "line.end"
 second = "hook.eye"
 [drives]
 luff = { kind = "rotary", node = "jib.start", against = "mast.end", axis = "y", stiffness = 10.0, ratio = 50.0 }
+hoist = { kind = "winch", node = "hook", against = "jib.end", EA = 1e6, radius = 0.2, ratio = 9, shortest = 0.1 }
 [outputs]
 pull = { kind = "tension", line = "line" }
 tilt = { kind = "rotation", at = "hook", axis = [0, 1, 0], minus = "mast.1" }
@@ -127,6 +128,8 @@ tilt = { kind = "rotation", at = "hook", axis = [0, 1, 0], minus = "mast.1" }
     mast = found.part("mast")
     expected = fc.RotaryDrive("luff", found.part("jib").start, mast.end, axis="y", stiffness=10.0, ratio=50.0)
     assert found.part("luff") == expected
+    drum = found.part("jib").end
+    assert found.part("hoist") == fc.Winch("hoist", hook.node, drum, EA=1e6, radius=0.2, ratio=9, shortest=0.1)
     assert found.outputs[1] == fc.Rotation("tilt", hook.node, (0, 1, 0), minus=mast.node(1))
     assert found.join_table.columns("v rx rz") == ((0, 0, 0),) * len(found.nodes)
 

@@ -114,7 +114,8 @@ class Watch:
         Of the switches.
     corners : callable
         State → values whose signs tell the sides of corners in laws of force; steps end where one changes.
-    corner_names : tuple of str
+    corner_names, ends : tuple of str
+        Of the corners; what to say where a run cannot go on beyond one, empty where it can.
     dust : numpy.ndarray
         Values of corners below these are zero but for round-off.
     sides : numpy.ndarray
@@ -127,6 +128,7 @@ class Watch:
     names: tuple[str, ...]
     corners: Callable[[State], np.ndarray]
     corner_names: tuple[str, ...]
+    ends: tuple[str, ...]
     dust: np.ndarray
     sides: np.ndarray = field(default_factory=lambda: np.zeros(0))
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -169,6 +171,13 @@ class Watch:
     def stops(self, gauge: int) -> bool:
         """Tell whether a step has to end at a gauge's zero."""
         return gauge >= len(self.events) or self.events[gauge].terminal
+
+    def last_word(self, gauge: int) -> str:
+        """Return what is said where a run ends at a gauge's zero; empty where it goes on."""
+        if gauge < len(self.events):
+            return self.events[gauge].name
+        corner = gauge - len(self.events) - len(self.names)
+        return self.ends[corner] if corner >= 0 else ""
 
     def signals(self, state: State, u: np.ndarray) -> dict[str, float]:
         """Return all signals by name."""

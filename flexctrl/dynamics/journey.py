@@ -292,8 +292,8 @@ class Journey:
         watch.settle(after)
         watch.cross(landing)
         self.events.append(watch.occurrence(landing, after.state, after.supply.u))
-        if landing.gauge < len(watch.events):
-            self.status, self.message = Status.STOPPED, f"{self.events[-1].name} at t = {landing.t:.6g} s"
+        if end := watch.last_word(landing.gauge):
+            self.status, self.message = Status.STOPPED, f"{end} at t = {landing.t:.6g} s"
             return after
         short = landing.t - before.state.t < 1e-6 * self.mark.size
         self.mark.stuck = self.mark.stuck + 1 if short else 0

@@ -118,6 +118,7 @@ class _Straight:
     """What a run asks of corners in laws of force: there are none."""
 
     names: tuple[str, ...] = ()
+    ends: tuple[str, ...] = ()
 
     @property
     def dust(self) -> np.ndarray:

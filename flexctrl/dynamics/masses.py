@@ -95,6 +95,9 @@ class Masses:
             before, power = power, float(residual @ change)
             direction = change + (power / before) * direction
             pushed = gap(guess + direction) - start
-            share = power / float(direction @ pushed)
+            curvature = float(direction @ pushed)
+            if not curvature > 0.0:
+                break
+            share = power / curvature
             value, residual = value + share * direction, residual - share * pushed
         return value, False

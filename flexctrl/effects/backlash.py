@@ -9,6 +9,7 @@ from typing import ClassVar
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.places import by_place, check_large, not_negative
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.structure.drives import Winch
 from flexctrl.structure.elements import Spring
 from flexctrl.structure.structure import Structure
 
@@ -41,8 +42,9 @@ class Backlash(Effect):
 
     def check_on(self, structure: Structure) -> None:
         """Look for every drive and spring."""
+        gears = (d.name for d in structure.drives if not isinstance(d, Winch))
         springs = (p.name for p in structure.elements if isinstance(p, Spring))
-        known = (*(d.name for d in structure.drives), *springs)
+        known = (*gears, *springs)
         for name, _ in self.gaps:
             if name not in known:
                 raise StructureError(f"Backlash: there is no drive or spring {name!r}{did_you_mean(name, known)}")

@@ -11,7 +11,7 @@ from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.beam import BeamForce, BeamMotion, elastic_force, strain_energy, stresses
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion, rope_energy, shaft_energy, shaft_force, spring_tension
-from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
+from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, Part, Rope
 from flexctrl.structure.freedoms import listed
 
@@ -112,7 +112,7 @@ class RopeStretch(Deforming):
     Parameters
     ----------
     of : sequence of str
-        Names of the ropes that stretch; default: all.
+        Names of the ropes and winches that stretch; default: all.
     """
 
     def rope(self, m: LineMotion) -> ca.SX:
@@ -124,8 +124,8 @@ class RopeStretch(Deforming):
         return rope_energy(m)
 
     def acts_on(self, part: Part | Drive) -> bool:
-        """Ropes."""
-        return isinstance(part, Rope)
+        """Ropes, those of winches too."""
+        return isinstance(part, Rope | Winch)
 
 
 @dataclass(frozen=True)

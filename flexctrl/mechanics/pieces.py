@@ -173,6 +173,20 @@ def linear_motion(node: NodeMotion, base: NodeMotion, source: ca.SX, parameters:
     return DriveMotion(p, travel, rate, source[0], source[1], source[2], gradient)
 
 
+def hoist_motion(node: NodeMotion, base: NodeMotion, source: ca.SX, parameters: ca.SX) -> DriveMotion:
+    """Return the motion of a winch: s is the distance of its nodes less that at rest; parameters as `rotary_motion`."""
+    import casadi as ca
+
+    p = named(DRIVE_PARAMETERS, parameters)
+    rest = ca.vertcat(p["rest_x"], p["rest_y"], p["rest_z"])
+    arm = node.x - base.x
+    length = ca.sqrt(ca.dot(arm, arm))
+    along = arm / length
+    gradient = ca.vertcat(along, ca.SX(3, 1), -along, ca.SX(3, 1))
+    travel, rate = length - ca.sqrt(ca.dot(rest, rest)), ca.dot(along, node.v - base.v)
+    return DriveMotion(p, travel, rate, source[0], source[1], source[2], gradient)
+
+
 def shaft_torque(m: DriveMotion) -> ca.SX:
     """Return the torque in the shaft on the motor side [N m]: k_θ (R s − θ_d) and the damping on its rate."""
     twist = m.p["ratio"] * m.driven - m.source

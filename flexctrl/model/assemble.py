@@ -61,7 +61,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
     groups = tuple(Group(p.name, tuple(structure.number(n) for n in p.nodes), line=isinstance(p, Rope)) for p in rigid)
     elastic = tuple(d.name for d in structure.drives if any(e.bends(d) for e in parts))
-    stiff = {p.name for p in rigid if isinstance(p, Rope)}
+    stiff = {p.name for p in rigid if isinstance(p, Rope)} | {d.name for d in structure.drives} - set(elastic)
     unmeasured = tuple(o.name for o in structure.outputs if isinstance(o, Tension) and o.line in stiff)
     if unmeasured:
         structure = structure.with_(outputs=[o for o in structure.outputs if o.name not in unmeasured])

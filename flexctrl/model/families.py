@@ -12,7 +12,7 @@ from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.mechanics.matrices import bending, coupling, plane_masses
 from flexctrl.model import kinds
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
-from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
+from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, PointMass, RigidBody, Rope, Spring
 from flexctrl.structure.structure import Structure
 
@@ -84,6 +84,7 @@ def families_of(
         _bodies(kinds.BODY, structure, effects, [p for p in parts if isinstance(p, RigidBody)]),
         drives_family(kinds.ROTARY_DRIVE, structure, effects, [d for d in tight if isinstance(d, RotaryDrive)]),
         drives_family(kinds.LINEAR_DRIVE, structure, effects, [d for d in tight if isinstance(d, LinearDrive)]),
+        drives_family(kinds.WINCH, structure, effects, [d for d in tight if isinstance(d, Winch)]),
     ]
     return tuple(f for f in made if f.count)
 
@@ -151,6 +152,13 @@ def drives_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], drives:
 
 
 def _drive_parameters(d: Drive) -> list[float]:
+    if isinstance(d, Winch):
+        return winch_parameters(d)
     base = (0.0, 0.0, 0.0) if d.against is None else d.against.position
     rest = [a - b for a, b in zip(d.node.position, base, strict=True)]
     return [d.stiffness, d.damping, d.inertia, d.effective_ratio, *d.direction, *rest]
+
+
+def winch_parameters(d: Winch) -> list[float]:
+    """Return the parameters of a winch in the order of `WINCH_PARAMETERS`."""
+    return [d.EA, d.damping, d.inertia, d.effective_ratio, d.length, d.shortest]

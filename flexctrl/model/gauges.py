@@ -14,9 +14,13 @@ from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
+from flexctrl.mechanics.winch import WINCH_PARAMETERS
+from flexctrl.model.families import winch_parameters
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, rope_pull, spring_pull
 from flexctrl.model.loose_kinds import loose_spring
 from flexctrl.model.model import Model
+from flexctrl.model.signals import winch_tension
+from flexctrl.structure.drives import Winch
 from flexctrl.structure.elements import Rope, Spring
 from flexctrl.structure.signals import (
     AngularVelocity,
@@ -150,6 +154,7 @@ class _Builder:
         self.turns: list[tuple[int, int, int, int]] = []
         self.axes: list[np.ndarray] = []
         self.gaps = gaps_of(model.effects)
+        self.winches: list[tuple[int, Winch]] = []
         self.lines: dict[tuple[type, bool], list[tuple[int, Rope | Spring]]] = {}
         self.moving = False
 
@@ -164,10 +169,12 @@ class _Builder:
             across, down = (self._between(ends, 0, np.array(d)) for d in (output.direction, output.down))
             self.angles.append((i, across, down))
         elif isinstance(output, Tension):
-            line = self.s.part(output.line)
-            assert isinstance(line, Rope | Spring)
-            self.lines.setdefault((type(line), self.gaps.get(line.name, 0.0) > 0.0), []).append((i, line))
-            self.moving = True
+            line, self.moving = self.s.part(output.line), True
+            if isinstance(line, Winch):
+                self.winches.append((i, line))
+            else:
+                assert isinstance(line, Rope | Spring)
+                self.lines.setdefault((type(line), self.gaps.get(line.name, 0.0) > 0.0), []).append((i, line))
         elif isinstance(output, Rotation):
             self._rotation(i, output)
         else:
@@ -199,6 +206,7 @@ class _Builder:
     def made(self) -> Gauges:
         empty = np.zeros(0)
         runs = tuple(self._tensions(of, loose, lines) for (of, loose), lines in self.lines.items())
+        runs += (self._hoists(),) if self.winches else ()
         return Gauges(
             outputs=len(self.s.outputs),
             rows=len(self.sums),
@@ -218,6 +226,18 @@ class _Builder:
             tensions=runs,
         )
 
+    def _hoists(self) -> Run:
+        names = [d.name for d in self.s.drives]
+        gather = []
+        for _, winch in self.winches:
+            slots = [NODE_SLOT * self.s.number(n) + np.arange(3) for n in (winch.node, winch.against)]
+            source = self.drive_base + DRIVE_SLOT * names.index(winch.name)
+            gather.append(np.concatenate([*slots, [source], *(k + 12 for k in slots), [source + 1]]))
+        parameters = [winch_parameters(w) for _, w in self.winches]
+        scatter = np.array([[i] for i, _ in self.winches])
+        kernel = _hoist(self.model.effects)
+        return self.model.backend.bind(kernel, np.array(gather), np.array(parameters), scatter)
+
     def _tensions(self, of: type, loose: bool, lines: list[tuple[int, Rope | Spring]]) -> Run:
         slots = [(NODE_SLOT * self.s.number(line.end), NODE_SLOT * self.s.number(line.start)) for _, line in lines]
         gather = [np.concatenate([k + np.arange(3) for k in (a, b, a + 12, b + 12)]) for a, b in slots]
@@ -226,6 +246,14 @@ class _Builder:
         kernel = _pull(of, loose, self.model.effects)
         scatter = np.array([[i] for i, _ in lines])
         return self.model.backend.bind(kernel, np.array(gather), np.array(parameters), scatter)
+
+
+def _hoist(effects: tuple[Effect, ...]) -> Kernel:
+    """Tension of a winch from what `winch_tension` reads."""
+    import casadi as ca
+
+    z, p = ca.SX.sym("z", 14), ca.SX.sym("p", len(WINCH_PARAMETERS))
+    return Kernel("hoist", z, p, winch_tension(effects)(z, p)[0])
 
 
 def _pull(of: type, loose: bool, effects: tuple[Effect, ...]) -> Kernel:

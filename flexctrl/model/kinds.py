@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Kernel
-from flexctrl.mechanics import beam, pieces
+from flexctrl.mechanics import beam, pieces, winch
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.beam_tangent import beam_slope
 
@@ -318,6 +318,18 @@ def drive_shares(effects: tuple[Effect, ...], m: pieces.DriveMotion) -> Shares:
     return Shares(inertia, force, 0.5 * m.p["inertia"] * m.source_rate**2, stored)
 
 
+def _winch(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    m, motor = winch.paid_out(nodes[0], nodes[1], slot[:3], parameters), winch.motor(slot[:3], parameters)
+    stored = sum((e.rope_energy(m) for e in effects), ca.SX(1, 1))
+    force = winch.hoisting(m, rope_pull(effects, m), stored, motor.p["ratio"])
+    drag = sum((e.drive(motor)[12] for e in effects), ca.SX(1, 1))
+    inertia = ca.vertcat(ca.SX(6, 1), -motor.p["inertia"] * motor.source_acceleration)
+    kinetic = 0.5 * motor.p["inertia"] * motor.source_rate**2
+    return Shares(inertia, force + ca.vertcat(ca.SX(6, 1), drag), kinetic, stored)
+
+
 BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam, _beam_slope)
 SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(beam.PARAMETERS + beam.SHEARING), _beam, _beam_slope)
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
@@ -326,3 +338,4 @@ POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)
 BODY = Kind("body", 1, 6, 0, len(pieces.BODY_PARAMETERS), _body)
 ROTARY_DRIVE = Kind("rotary_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _rotary)
 LINEAR_DRIVE = Kind("linear_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _linear)
+WINCH = Kind("winch", 2, 3, 1, len(winch.WINCH_PARAMETERS), _winch)

@@ -14,6 +14,7 @@ import numpy as np
 from flexctrl.effects.backlash import gaps_of
 from flexctrl.model.loose_kinds import loose_names
 from flexctrl.model.motion import State
+from flexctrl.structure.drives import Winch
 from flexctrl.structure.elements import Rope, Spring
 
 if TYPE_CHECKING:
@@ -24,9 +25,32 @@ __all__ = ["Kinks"]
 _ROUND_OFF = 1e-12
 
 
+@dataclass(frozen=True)
+class Turn:
+    """A corner of a drive: where a sum of its driven coordinate and its source angle has a value.
+
+    Attributes
+    ----------
+    drive : int
+    on_driven, on_source : float
+        Weights.
+    at, dust : float
+        The value, and what is zero but for round-off.
+    end : str
+        What to say if a run cannot go on beyond; empty if it can.
+    """
+
+    drive: int
+    on_driven: float
+    on_source: float
+    at: float
+    dust: float
+    end: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Kinks:
-    """The corners of a model's laws of force: lengths of lines, then twists of shafts.
+    """The corners of a model's laws of force: lengths of lines, then turns of drives.
 
     Attributes
     ----------
@@ -44,11 +68,24 @@ class Kinks:
         return (*ropes, *((p, p.length + side * gaps[p.name]) for p in loose for side in (0.5, -0.5)))
 
     @cached_property
-    def _twists(self) -> tuple[tuple[int, float], ...]:
-        """Drives with play, and the twists at which they have corners."""
-        drives, gaps = self.model.structure.drives, gaps_of(self.model.effects)
-        loose = [(i, gaps[d.name]) for i, d in enumerate(drives) if d.name in self._loose]
-        return tuple((i, side * gap) for i, gap in loose for side in (0.5, -0.5))
+    def _turns(self) -> tuple[Turn, ...]:
+        """Corners of drives with play and of winches."""
+        gaps, found = gaps_of(self.model.effects), []
+        for i, d in enumerate(self.model.structure.drives):
+            if d.name in self._loose:
+                found += [Turn(i, d.effective_ratio, -1.0, side * gaps[d.name], _ROUND_OFF) for side in (0.5, -0.5)]
+            elif isinstance(d, Winch):
+                found += self._winch(i, d)
+        return tuple(found)
+
+    def _winch(self, i: int, d: Winch) -> list[Turn]:
+        """Where the rope goes slack, if it stretches, and where there is hardly any left."""
+        least, dust = d.shortest - d.length, _ROUND_OFF * d.length
+        message = f"the rope of {d.name} is down to its shortest, {d.shortest:.6g} m"
+        if not self.model.bends(d):
+            return [Turn(i, 1.0, 0.0, least, dust, message)]
+        slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, dust)
+        return [slack, Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, message)]
 
     @cached_property
     def _loose(self) -> frozenset[str]:
@@ -58,7 +95,12 @@ class Kinks:
     def names(self) -> tuple[str, ...]:
         """The parts, in the order of `values`; one with play has two flanks."""
         drives = self.model.structure.drives
-        return (*(p.name for p, _ in self._lines), *(drives[i].name for i, _ in self._twists))
+        return (*(p.name for p, _ in self._lines), *(drives[turn.drive].name for turn in self._turns))
+
+    @cached_property
+    def ends(self) -> tuple[str, ...]:
+        """What to say where a run cannot go on beyond a corner; empty where it can."""
+        return (*("" for _ in self._lines), *(turn.end for turn in self._turns))
 
     @cached_property
     def lines(self) -> tuple[np.ndarray, np.ndarray]:
@@ -69,16 +111,17 @@ class Kinks:
 
     @cached_property
     def shafts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the drives; the twists at which they have corners [rad of the motor]."""
-        return np.array([i for i, _ in self._twists], dtype=int), np.array([twist for _, twist in self._twists])
+        """Numbers of the drives; weights of driven coordinate and source angle and where their sum has a corner (3)."""
+        rows = [(turn.on_driven, turn.on_source, turn.at) for turn in self._turns]
+        return np.array([turn.drive for turn in self._turns], dtype=int), np.array(rows).reshape(-1, 3)
 
     @cached_property
     def dust(self) -> np.ndarray:
         """Values below these are zero but for round-off."""
-        return _ROUND_OFF * np.append(self.lines[1], np.ones(len(self._twists)))
+        return np.append(_ROUND_OFF * self.lines[1], [turn.dust for turn in self._turns])
 
     def values(self, state: State) -> np.ndarray:
-        """Return what changes its sign at the corners: stretch of ropes, strains from the flanks of gaps.
+        """Return what changes its sign at the corners: stretch of ropes, strains from flanks of gaps, rope left.
 
         Parameters
         ----------
@@ -89,8 +132,8 @@ class Kinks:
         numpy.ndarray, shape (corners,)
             [m], or [rad] of a motor.
         """
-        motion, (ends, lengths), (drives, twists) = self.model.motion, self.lines, self.shafts
+        motion, (ends, lengths), (drives, rows) = self.model.motion, self.lines, self.shafts
         arms = state.x[ends[:, 1]] - state.x[ends[:, 0]]
         strains = np.sqrt(np.einsum("ij,ij->i", arms, arms)) - lengths
-        turned = motion.ratios[drives] * state.driven[drives] - state.q[motion.sources[drives]]
-        return np.append(strains, turned - twists)
+        own = np.append(state.q, 0.0)[motion.sources[drives]]
+        return np.append(strains, rows[:, 0] * state.driven[drives] + rows[:, 1] * own - rows[:, 2])

@@ -16,9 +16,9 @@ import numpy as np
 
 from flexctrl.kernels.kernel import Kernel
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.mechanics.pieces import DriveMotion, linear_motion, rotary_motion
+from flexctrl.mechanics.pieces import DriveMotion, hoist_motion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
-from flexctrl.structure.drives import Drive, RotaryDrive
+from flexctrl.structure.drives import Drive, RotaryDrive, Winch
 from flexctrl.structure.freedoms import Vector
 from flexctrl.structure.relations import Copy, Fit, Follow, Ride, Turn
 
@@ -448,7 +448,8 @@ class Linkage:
         p = ca.SX([d.stiffness, d.damping, d.inertia, d.effective_ratio, *d.direction, *link.rest])
         if isinstance(d, RotaryDrive):
             return rotary_motion(node(link.node), node(link.base), ca.SX.zeros(3), ca.SX(0), p)
-        return linear_motion(node(link.node), node(link.base), ca.SX.zeros(3), p)
+        motion_of = hoist_motion if isinstance(d, Winch) else linear_motion
+        return motion_of(node(link.node), node(link.base), ca.SX.zeros(3), p)
 
 
 def _opening(loop: Loop | Fit, pose: ca.SX, motion: Sequence[tuple[ca.SX, ca.SX]]) -> ca.SX:

@@ -14,10 +14,13 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import line_motion
+from flexctrl.mechanics.winch import WINCH_PARAMETERS, paid_out
+from flexctrl.model.families import winch_parameters
 from flexctrl.model.frictions import lag_compliance
 from flexctrl.model.kinds import rope_pull, spring_pull
 from flexctrl.model.loose_kinds import loose_spring
 from flexctrl.model.motion import Motion, State
+from flexctrl.structure.drives import Winch
 from flexctrl.structure.elements import Rope, Spring
 from flexctrl.structure.signals import (
     AngularVelocity,
@@ -169,7 +172,8 @@ def _measure(s: Structure, effects: tuple[Effect, ...], motion: Motion, output: 
     if isinstance(output, SwayAngle):
         return _sway(s, output)
     if isinstance(output, Tension):
-        return _tension(s, effects, output)
+        line = s.part(output.line)
+        return _hoist(s, effects, motion, line) if isinstance(line, Winch) else _tension(s, effects, output)
     if isinstance(output, Rotation):
         return _rotation(s, motion, output)
     return _linear(s, output)
@@ -247,6 +251,34 @@ def _tension(s: Structure, effects: tuple[Effect, ...], output: Tension) -> Meas
         return (cells, g[:6], cells, g[6:])
 
     return Measure(value, slope)
+
+
+def _hoist(s: Structure, effects: tuple[Effect, ...], motion: Motion, winch: Winch) -> Measure:
+    """The tension in the rope of a winch."""
+    pair, drive = _pair(s.number(winch.against), s.number(winch.node)), _drive(s, winch.name)
+    cells, number = np.append(pair, motion.source_base + drive), motion.sources[drive]
+    kernel, parameters = winch_tension(effects), winch_parameters(winch)
+
+    def evaluated(state: State, rates: np.ndarray) -> np.ndarray:
+        places = state.x[[s.number(winch.node), s.number(winch.against)]].ravel()
+        z = np.concatenate([places, state.q[[number]], rates[cells]])
+        return kernel(z, parameters).full().ravel()
+
+    def slope(state: State, rates: np.ndarray) -> tuple:
+        g = evaluated(state, rates)[1:]
+        return (cells, g[:7], cells, g[7:])
+
+    return Measure(lambda state, rates: float(evaluated(state, rates)[0]), slope)
+
+
+def winch_tension(effects: tuple[Effect, ...]) -> ca.Function:
+    """Return a winch's tension and its slope: from place, place, angle of load, drum and motor, and their rates."""
+    import casadi as ca
+
+    z, p, still = ca.SX.sym("z", 14), ca.SX.sym("p", len(WINCH_PARAMETERS)), ca.SX(3, 1)
+    node, base = (NodeMotion(z[k : k + 3], ca.SX.eye(3), z[7 + k : 10 + k], still, still, still) for k in (0, 3))
+    tension = ca.fmax(rope_pull(effects, paid_out(node, base, ca.vertcat(z[6], z[13], 0.0), p)), 0.0)
+    return ca.Function("hoist", [z, p], [ca.vertcat(tension, ca.densify(ca.gradient(tension, z)))])
 
 
 def _pull(line: Rope | Spring, effects: tuple[Effect, ...]) -> ca.Function:

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
 
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
-from flexctrl.structure.drives import RotaryDrive
+from flexctrl.structure.drives import RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, Part, PointMass, RigidBody, Rope, Spring
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Hinge, Joint, Pin, Slide, Support, Weld, main_axis
@@ -200,6 +200,10 @@ def draw_machine(
             pen.line(curve, color=ROPE if symbols and not callable(color) else tint, linewidth=0.55 * width, zorder=2)
         else:
             _draw_body(pen, part, shown.x[nodes], _heaviest(structure), tint)
+    for drive in structure.drives:
+        if isinstance(drive, Winch):
+            ends = [structure.number(n) for n in (drive.against, drive.node)]
+            pen.line(shown.x[ends], color=ROPE if symbols and not callable(color) else INK, linewidth=0.55 * width)
     if symbols:
         _draw_symbols(pen, structure, shown)
     if numbers:

@@ -18,7 +18,7 @@ from flexctrl.design.shaping import Shaped
 from flexctrl.design.tracking import Together, Tracking
 from flexctrl.errors import SceneError, StructureError, did_you_mean
 from flexctrl.scene.scene import Plan, Scene
-from flexctrl.structure.drives import LinearDrive, RotaryDrive
+from flexctrl.structure.drives import Drive
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def _gear(scene: Scene, drive: str) -> float:
     if not drive:
         return 1.0
     found = scene.structure.part(drive)
-    if not isinstance(found, LinearDrive | RotaryDrive):
+    if not isinstance(found, Drive):
         known = [d.name for d in scene.structure.drives]
         raise StructureError(f"reference through {drive!r}: that is no drive{did_you_mean(drive, known)}")
     return found.effective_ratio

@@ -26,7 +26,7 @@ from flexctrl.scene.reading import (
     vector,
     whole,
 )
-from flexctrl.structure.drives import LinearDrive, RotaryDrive
+from flexctrl.structure.drives import LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, Node, Part, PointMass, RigidBody, Rope, Spring
 from flexctrl.structure.joints import Hinge, Pin, Slide, Support, Weld
 from flexctrl.structure.naming import node_of
@@ -241,9 +241,11 @@ def _joint_kinds(node: Reader) -> dict[str, Kind]:
 def _drive_kinds(node: Reader) -> dict[str, Kind]:
     sides = {"node": node, "against": node}
     shaft = dict.fromkeys(("stiffness", "ratio", "inertia", "damping"), number)
+    winch = ("EA", "radius", "ratio", "inertia", "damping", "shortest")
     return {
         "rotary": Kind(RotaryDrive, {**sides, "axis": direction, **shaft}),
         "linear": Kind(LinearDrive, {**sides, "direction": direction, "radius": number, **shaft}),
+        "winch": Kind(Winch, {**sides, **dict.fromkeys(winch, number)}),
     }
 
 

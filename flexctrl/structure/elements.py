@@ -111,7 +111,7 @@ class Beam:
             raise StructureError(f"{owner}: section = {section!r}; expected a flexctrl.Section")
         count = check_whole(elements, "elements", owner, least=1, most=10**6)
         a, b = _position(start, owner), _position(end, owner)
-        _check_length(a, b, owner)
+        check_length(a, b, owner)
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "section", section)
         object.__setattr__(self, "elements", count)
@@ -279,7 +279,8 @@ class Spring:
         return (self.start, self.end)
 
 
-def _check_length(a: Vector, b: Vector, owner: str) -> None:
+def check_length(a: Vector, b: Vector, owner: str) -> None:
+    """Raise StructureError for ends that coincide."""
     if math.dist(a, b) <= 1e-12 * (1.0 + max(map(abs, (*a, *b)))):
         raise StructureError(f"{owner}: start {a} and end {b} coincide; a part needs a length > 0")
 
@@ -294,7 +295,7 @@ def _set_line(
     owner: str,
 ) -> None:
     a, b = _position(start, owner), _position(end, owner)
-    _check_length(a, b, owner)
+    check_length(a, b, owner)
     rest = math.dist(a, b) if length is None else check_finite(length, "length", owner, above=0.0)
     check_finite(damping, "damping", owner, least=0.0)
     object.__setattr__(line, "name", name)

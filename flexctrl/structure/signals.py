@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
+from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Node, Rope, Spring, check_node
 from flexctrl.structure.freedoms import ROTATIONS, Vector, check_signal, parse_direction
 
-_DRIVES = (RotaryDrive, LinearDrive)
+_DRIVES = (RotaryDrive, LinearDrive, Winch)
 
 
 def _node(node: Node, owner: str, rotations: bool) -> Node:
@@ -138,7 +138,7 @@ class MotorTorque:
     Parameters
     ----------
     name : str
-    drive : RotaryDrive, LinearDrive or str
+    drive : RotaryDrive, LinearDrive, Winch or str
         The drive or its name.
     """
 
@@ -263,7 +263,7 @@ class DriveAngle:
     Parameters
     ----------
     name : str
-    drive : RotaryDrive, LinearDrive or str
+    drive : RotaryDrive, LinearDrive, Winch or str
     """
 
     name: str
@@ -281,7 +281,7 @@ class DriveSpeed:
     Parameters
     ----------
     name : str
-    drive : RotaryDrive, LinearDrive or str
+    drive : RotaryDrive, LinearDrive, Winch or str
     """
 
     name: str
@@ -337,21 +337,21 @@ class SwayAngle:
 
 @dataclass(frozen=True)
 class Tension:
-    """Output: the tensile force in a rope or spring [N].
+    """Output: the tensile force in a rope, the rope of a winch, or a spring [N].
 
     Parameters
     ----------
     name : str
-    line : Rope, Spring or str
-        The rope or spring, or its name.
+    line : Rope, Spring, Winch or str
+        What is under tension, or its name.
     """
 
     name: str
     line: str
 
-    def __init__(self, name: str, line: Rope | Spring | str) -> None:
+    def __init__(self, name: str, line: Rope | Spring | Winch | str) -> None:
         object.__setattr__(self, "name", check_signal(name, "Tension"))
-        object.__setattr__(self, "line", _name_of(line, (Rope, Spring), f"Tension {name!r}: line"))
+        object.__setattr__(self, "line", _name_of(line, (Rope, Spring, Winch), f"Tension {name!r}: line"))
 
 
 Input: TypeAlias = Force | Torque | FollowerForce | FollowerTorque | MotorTorque

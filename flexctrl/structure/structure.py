@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.structure.drives import Drive, RotaryDrive
+from flexctrl.structure.drives import Drive, RotaryDrive, Winch
 from flexctrl.structure.elements import Node, Part, RigidBody, Rope, Spring, check_node
 from flexctrl.structure.freedoms import FREEDOMS, check_name, listed, parse_direction
 from flexctrl.structure.join_table import JoinTable, Row, drive_row, join
@@ -51,7 +51,7 @@ class Structure:
         The parts; their nodes are numbered in this order.
     joints : sequence of Support, Weld, Pin, Hinge or Slide, or a JoinTable
         How nodal freedoms are tied. A `JoinTable` made from rows may stand in place of joints.
-    drives : sequence of RotaryDrive or LinearDrive
+    drives : sequence of RotaryDrive, LinearDrive or Winch
     inputs : sequence of Force, Torque, FollowerForce, FollowerTorque or MotorTorque
     outputs : sequence of Position, Velocity, Rotation, …
     name : str
@@ -301,7 +301,8 @@ def _check_part(s: Structure, signal: Input | Output, who: str) -> None:
     if isinstance(signal, MotorTorque | DriveAngle | DriveSpeed):
         known, wanted = tuple(d.name for d in s.drives), signal.drive
     elif isinstance(signal, Tension):
-        known, wanted = tuple(p.name for p in s.elements if isinstance(p, Rope | Spring)), signal.line
+        lines = (p for p in (*s.elements, *s.drives) if isinstance(p, Rope | Spring | Winch))
+        known, wanted = tuple(p.name for p in lines), signal.line
     else:
         return
     if wanted not in known:
@@ -387,7 +388,8 @@ def _held(s: Structure, drive: Drive) -> bool:
                 return abs(sum(a * b for a, b in zip(axis, drive.direction, strict=True))) < 1.0 - 1e-9
     apart = drive.against is None or drive.node.part != drive.against.part
     told = _told(s, drive, columns) if apart else columns
-    return any(mine[c] == other[c] for c in told if abs(drive.direction[c % 3]) > 1e-9)
+    held = [mine[c] == other[c] for c in told if abs(drive.direction[c % 3]) > 1e-9]
+    return all([*held, len(told) == 3]) if isinstance(drive, Winch) else any(held)
 
 
 def _told(s: Structure, drive: Drive, columns: Iterable[int]) -> list[int]:

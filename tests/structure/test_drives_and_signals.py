@@ -78,7 +78,7 @@ def test_drives_and_lines_may_be_named_or_given():
         (lambda: fc.Force("push", [BEAM.end, BEAM.end], "x"), "node 1 of beam is given twice"),
         (lambda: fc.Force("push", BEAM.end, None), "expected three finite numbers"),
         (lambda: fc.Torque("twist", ROPE.end, "x"), "Torque 'twist': node 1 of rope has no rotations"),
-        (lambda: fc.MotorTorque("torque", BEAM), "expected a RotaryDrive or LinearDrive, or the name of one"),
+        (lambda: fc.MotorTorque("torque", BEAM), "expected a RotaryDrive or LinearDrive or Winch, or the name of one"),
         (lambda: fc.MotorTorque("torque", None), "MotorTorque 'torque': drive = None"),
         (lambda: fc.DriveAngle("angle", 5), "DriveAngle 'angle': drive = 5"),
         (lambda: fc.Tension("pull", MOTOR), "expected a Rope or Spring"),

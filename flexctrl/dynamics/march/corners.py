@@ -21,19 +21,22 @@ class Corners:
 
     Attributes
     ----------
-    lines, twists : int
+    lines, turns : int
     ends : Wholes
         Slots of the nodes at the ends of each line.
     drives : Wholes
-    at, dust, sides : Reals
-        Length or twist of each corner; what is zero but for round-off; the sides the motion is on, 0: not yet known.
+    lengths, sums : Reals
+        Where lines have corners; weights of driven coordinates and source angles, and where their sums have (3 each).
+    dust, sides : Reals
+        What is zero but for round-off; the sides the motion is on, 0: not yet known.
     """
 
     lines: int
-    twists: int
+    turns: int
     ends: Wholes
     drives: Wholes
-    at: Reals
+    lengths: Reals
+    sums: Reals
     dust: Reals
     sides: Reals
 
@@ -41,34 +44,36 @@ class Corners:
 def corners_of(model: Model) -> Corners:
     """Return the corners of a model."""
     kinks = model.kinks
-    (ends, lengths), (drives, twists) = kinks.lines, kinks.shafts
-    at = np.append(lengths, twists)
-    return Corners(len(lengths), len(twists), NODE_SLOT * ends.ravel(), drives, at, kinks.dust, np.zeros(len(at)))
+    (ends, lengths), (drives, sums) = kinks.lines, kinks.shafts
+    sides = np.zeros(len(kinks.names))
+    counts = len(lengths), len(drives)
+    return Corners(*counts, NODE_SLOT * ends.ravel(), drives, lengths, sums.ravel(), kinks.dust, sides)
 
 
 def passes(c: Corners, f: Flat) -> bool:
     """Tell whether the step under way passes a corner."""
-    for k in range(c.lines + c.twists):
-        value = length(c, f, k) if k < c.lines else twist(c, f, k - c.lines)
-        if not within(c, k, value - c.at[k]):
+    for k in range(c.lines + c.turns):
+        value = stretch(c, f, k) if k < c.lines else turn(c, f, k - c.lines)
+        if not within(c, k, value):
             return True
     return False
 
 
-def length(c: Corners, f: Flat, k: int) -> float:
-    """Return the length of a line."""
+def stretch(c: Corners, f: Flat, k: int) -> float:
+    """Return how far a line is beyond its corner."""
     start = f.z[c.ends[2 * k] :]
     end = f.z[c.ends[2 * k + 1] :]
     square = 0.0
     for j in range(3):
         square += (end[j] - start[j]) * (end[j] - start[j])
-    return math.sqrt(square)
+    return math.sqrt(square) - c.lengths[k]
 
 
-def twist(c: Corners, f: Flat, k: int) -> float:
-    """Return how far a shaft's ends have turned against each other, on the motor side."""
+def turn(c: Corners, f: Flat, k: int) -> float:
+    """Return how far a drive is beyond its corner."""
     i = c.drives[k]
-    return f.ratios[i] * f.found[i] - f.z[f.drive_base + DRIVE_SLOT * i]
+    own = f.z[f.drive_base + DRIVE_SLOT * i]
+    return c.sums[3 * k] * f.found[i] + c.sums[3 * k + 1] * own - c.sums[3 * k + 2]
 
 
 def within(c: Corners, k: int, value: float) -> bool:
