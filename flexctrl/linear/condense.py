@@ -254,8 +254,8 @@ def scaled_any(linear: LinearModel) -> Scaled:
 
 
 def _moving(basis: sp.csc_matrix, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    motions = []
-    for column in np.abs(basis.toarray()).T:
+    motions: list[tuple[str, ...]] = []
+    for column in np.abs(basis.toarray()).T if basis.shape[1] else ():
         order = np.argsort(-column, kind="stable")[:6]
         motions.append(tuple(names[i] for i in order if column[i] > 0.1 * column.max()))
     return tuple(motions)

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.modal import ModalSystem
+from flexctrl.linear.modal_sum import divided, pole_sum
 from flexctrl.linear.resolvent import resolvent
 from flexctrl.linear.statespace import FirstOrder, first_order
 
@@ -95,14 +96,28 @@ def _resolvent(A: np.ndarray, B: np.ndarray, wanted: np.ndarray) -> Callable[[np
     form = resolvent(A)
     if form.T.ndim == 1:
         residues = np.einsum("pk,km->kpm", wanted @ form.Q, form.inverse @ B).reshape(len(A), -1)
-        shape = (len(wanted), B.shape[1])
-        return lambda s: ((1.0 / _nonzero(s[:, None] - form.T, s)) @ residues).T.reshape(*shape, s.size)
+        return _summed(form.T, residues, (len(wanted), B.shape[1]))
 
     def substituted(s: np.ndarray) -> np.ndarray:
         _nonzero(s[:, None] - form.poles, s)
         return np.einsum("pi,imn->pmn", wanted, form.solve(np.repeat(B[:, :, None], s.size, axis=2), s))
 
     return substituted
+
+
+def _summed(poles: np.ndarray, residues: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
+    """Σ R/(s − p) of a real system, its conjugate pairs together."""
+    turning, real = poles.imag > 0, poles.imag == 0
+    pairs, own, rates = pole_sum(poles[turning], residues[turning]), residues[real].real, poles[real].real
+    still = np.zeros_like(own)
+
+    def evaluate(s: np.ndarray) -> np.ndarray:
+        values = pairs(s)
+        if rates.size:
+            values = values + divided(own, still, s, s[:, None] - rates, "the model")
+        return values.T.reshape(*shape, s.size)
+
+    return evaluate
 
 
 def _nonzero(below: np.ndarray, s: np.ndarray) -> np.ndarray:

@@ -306,6 +306,12 @@ class LinearModel:
 
         return modal_system(self)
 
+    @cached_property
+    def _coupled(self) -> Callable[[np.ndarray], np.ndarray]:
+        from flexctrl.linear.coupled import coupled_transfer
+
+        return coupled_transfer(self._modal)
+
 
 def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, int]) -> None:
     if value.shape != shape:

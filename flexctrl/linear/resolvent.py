@@ -68,8 +68,12 @@ def resolvent(A: np.ndarray) -> Resolvent:
     Resolvent
     """
     poles, vectors = la.eig(A, check_finite=False)
-    if np.linalg.cond(vectors) < WORST_BASIS:
-        return Resolvent(poles, vectors, np.linalg.inv(vectors))
+    try:
+        inverse = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(vectors, np.inf)
+    if np.linalg.norm(vectors) * np.linalg.norm(inverse) < WORST_BASIS * max(len(A), 1):
+        return Resolvent(poles, vectors, inverse)
     T, Q = la.schur(A, output="complex", check_finite=False)
     return Resolvent(T, Q, Q.conj().T)
 

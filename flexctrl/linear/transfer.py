@@ -9,9 +9,9 @@ import numpy as np
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.condense import Scaled, scaled
-from flexctrl.linear.coupled import coupled_transfer
-from flexctrl.linear.direct import direct_transfer, infinite
+from flexctrl.linear.direct import direct_transfer
 from flexctrl.linear.modal import ModalSystem, rayleigh
+from flexctrl.linear.modal_sum import divided, modal_sum, outer
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes, modes_of
 from flexctrl.linear.pencil import Pencil
@@ -27,7 +27,6 @@ MOST_COUPLED = 150
 FURTHER = 1.5
 UNSYMMETRIC = 1e-9
 COUPLED = 250
-CACHED = 8192
 
 
 def transfer(linear: LinearModel, top: float) -> Transfer:
@@ -73,7 +72,7 @@ def routed(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
         if system.classical:
             return modal_transfer(system), True
         if len(system.modes) <= COUPLED:
-            return coupled_transfer(system), True
+            return linear._coupled, True
     fit = rayleigh(base.model)
     reach, most = (FURTHER, MOST_COUPLED) if fit is None else (2.0, MOST_MODES)
     count = _modes_below(base, (reach * top) ** 2)
@@ -97,16 +96,16 @@ def modal_transfer(system: ModalSystem) -> Transfer:
     callable
     """
     modes, relax = system.modes, system.relaxation
-    series = _ModalSum(modes, np.diag(system.damping))
-    still = _outer(relax.output, relax.input)
-    moving = _outer(relax.output_rate, relax.input)
+    series = modal_sum(modes, np.diag(system.damping))
+    still = outer(relax.output, relax.input)
+    moving = outer(relax.output_rate, relax.input)
     shape = system.feedthrough.shape
 
     def evaluate(s: np.ndarray) -> np.ndarray:
         s = np.asarray(s, dtype=complex)
         flat = series(s)
         if relax.rates.size:
-            flat += _divided(still, moving, s, s[:, None] + relax.rates, "a creeping freedom")
+            flat += divided(still, moving, s, s[:, None] + relax.rates, "a creeping freedom")
         H = flat.T.reshape(*shape, s.size)
         return H + system.feedthrough[:, :, None] + system.jump[:, :, None] * s
 
@@ -135,7 +134,7 @@ def residual_transfer(base: Scaled, modes: Modes, fit: tuple[float, float], top:
     """
     alpha, beta = fit
     model, phi = base.model, modes.shapes / base.scales[:, None]
-    series = _ModalSum(modes, alpha + beta * modes.omega_squared)
+    series = modal_sum(modes, alpha + beta * modes.omega_squared)
     sigma = -max(0.01 * top**2, 1e-3 * float(np.abs(modes.omega_squared).max(initial=1.0)))
     pencil = Pencil(model.K, model.M).at(sigma)
     MPhi = model.M @ phi
@@ -158,72 +157,6 @@ def residual_transfer(base: Scaled, modes: Modes, fit: tuple[float, float], top:
         return flat.T.reshape(*model.D.shape, s.size) + model.D[:, :, None]
 
     return evaluate
-
-
-class _ModalSum:
-    """Σ (c0 + s c1) b / (s² + d s + λ), as matrix products."""
-
-    def __init__(self, modes: Modes, damping: np.ndarray) -> None:
-        self.values, self.damping, self.omega = modes.omega_squared, damping, modes.omega
-        self.growth_squared = modes.growth**2
-        self.still = _outer(modes.output_gain, modes.input_gain)
-        self.moving = _outer(modes.output_rate_gain, modes.input_gain)
-        self.moves = bool(self.moving.any())
-        self.still_damped, self.moving_damped = damping[:, None] * self.still, damping[:, None] * self.moving
-
-    def __call__(self, s: np.ndarray) -> np.ndarray:
-        """Shape (N, n_outputs · n_inputs)."""
-        if s.real.any():
-            turning = s[:, None] ** 2 + self.values + self.damping * s[:, None]
-            return _divided(self.still, self.moving, s, turning, "a mode")
-        result = np.empty((s.size, self.still.shape[1]), dtype=complex)
-        # pieces that stay in the cache: three times faster than all at once
-        step = max(1, min(s.size, CACHED // max(1, self.values.size)))
-        room = np.empty((2, step, self.values.size))
-        for i in range(0, s.size, step):
-            piece = s.imag[i : i + step, None]
-            self._on_the_axis(piece, result[i : i + step], room[:, : len(piece)])
-        return result
-
-    def _on_the_axis(self, omega: np.ndarray, result: np.ndarray, room: np.ndarray) -> None:
-        """With 1/(g + i d ω) = (g - i d ω)/(g² + d² ω²); g = (ω_i - ω)(ω_i + ω) keeps the difference to a near pole."""
-        gap, size = room
-        np.add(self.omega, omega, out=size)
-        np.subtract(self.omega, omega, out=gap)
-        gap *= size
-        gap -= self.growth_squared
-        np.multiply(self.damping, omega, out=size)
-        size *= size
-        size += gap * gap
-        if not size.all():
-            below = gap + 1j * self.damping * omega
-            result[:] = _divided(self.still, self.moving, 1j * omega[:, 0], below, "a mode")
-            return
-        np.reciprocal(size, out=size)
-        gap *= size
-        result.real, result.imag = gap @ self.still, -omega * (size @ self.still_damped)
-        if self.moves:
-            result.real += omega**2 * (size @ self.moving_damped)
-            result.imag += omega * (gap @ self.moving)
-
-
-def _divided(still: np.ndarray, moving: np.ndarray, s: np.ndarray, below: np.ndarray, who: str) -> np.ndarray:
-    """Σ_k (still_k + s moving_k) / below_k; a pole without residue counts nothing, another is an error."""
-    hit = below == 0
-    if hit.any():
-        where, mode = np.argwhere(hit).T
-        residue = np.abs(still[mode]).max(axis=1) + np.abs(s[where] * moving[mode].max(axis=1, initial=0.0))
-        if residue.any():
-            raise infinite(complex(s[where[int(np.argmax(residue))]]), who)
-        below = np.where(hit, 1.0, below)
-    inverse = 1.0 / below
-    result = inverse @ still
-    return result + (s[:, None] * inverse) @ moving if moving.any() else result
-
-
-def _outer(output: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """c_k b_k for every pair of signals, shape (k, n_outputs · n_inputs)."""
-    return np.einsum("pk,km->kpm", output, gain).reshape(gain.shape[0], output.shape[0] * gain.shape[1])
 
 
 def _horner(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
