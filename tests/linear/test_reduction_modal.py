@@ -204,3 +204,43 @@ def test_models_say_in_a_line_what_they_are():
     reduced = linear.reduce(ModalTruncation(2))
     assert str(reduced).startswith(f"{linear.name}: 2 of 6 coordinates by ModalTruncation")
     assert str(linear).splitlines()[0].startswith(f"{linear.name}: 6 degrees of freedom, ")
+
+
+def nearly_free(stiffness: float):
+    """A damped cantilever whose tip moves against a heavy mass on a faint spring and a damper: a mode near 0."""
+    arm = s.cantilever(6, alpha=0.02, beta=1e-4)
+    n = len(arm.coordinates)
+    tip = arm.coordinates.index("w6")
+    M, C, K = (la.block_diag(A.toarray(), x) for A, x in ((arm.M, 3.0), (arm.C, 0.02), (arm.K, stiffness)))
+    pull = np.r_[arm.B[:, 0], 0.3][:, None]
+    seen = np.zeros((2, n + 1))
+    seen[0, tip], seen[1, n - 1], seen[:, n] = 1.0, 1.0, 0.2
+    return s.model(M, K, C, B=pull, Cq=seen)
+
+
+@pytest.mark.parametrize("rule", [4, DCGain(4), Participation(4, outputs=("position2",))])
+@pytest.mark.parametrize("correction", [False, True])
+def test_a_nearly_free_mode_is_kept(rule, correction):
+    full = nearly_free(1e-9)
+    reduced = full.reduce(ModalTruncation(rule, correction))
+    assert reduced.linear.coordinates[0] == "mode1"
+    assert reduced.order == 4
+    omega = np.geomspace(1e-5, 3e3, 3000)
+    gap = abs(dense_response(full, 1j * omega) - reduced.frequency_response(omega).values).max(axis=-1)
+    assert (gap <= 1.01 * reduced.error.absolute).all()
+    assert reduced.error.worst < 1e-6  # of the slow mode's swing
+
+
+def test_static_correction_does_not_spread_a_nearly_free_mode_that_is_left_out():
+    """A free mass beside it takes the whole order: the correction is what the bent arm alone would have."""
+    full = nearly_free(1e-9)
+    rigid = np.zeros((1, 1))
+    M, K = la.block_diag(full.M.toarray(), 1.0), la.block_diag(full.K.toarray(), rigid)
+    C = la.block_diag(full.C.toarray(), rigid)
+    both = s.model(M, K, C, B=np.vstack([full.B, [[1.0]]]), Cq=np.hstack([full.Cq, np.ones((2, 1))]))
+    reduced = both.reduce(ModalTruncation(1, static_correction=True))
+    assert reduced.linear.coordinates == ("rigid1",)
+    arm = s.cantilever(6)
+    still = la.solve(arm.K.toarray(), arm.B, assume_a="pos")
+    tip, slope = still[arm.coordinates.index("w6"), 0], still[-1, 0]
+    np.testing.assert_allclose(reduced.linear.D[:, 0], [tip, slope], rtol=1e-6)

@@ -24,7 +24,8 @@ POOL = 8
 class ModalTruncation:
     """Keep some undamped modes: q = Φ η, η̈ + ΦᵀCΦ η̇ + Ω² η = Φᵀ B u.
 
-    Rigid-body and unstable modes are always kept, exactly. With static correction, the feedthrough
+    Rigid-body and unstable modes are always kept, exactly, and next to them modes 300 times slower than any other (a
+    girder that spins about its own axis, free but for its mesh). With static correction, the feedthrough
     D = G(0) − G_kept(0) of the modes left out is added, so that the DC gain (with rigid-body modes: the
     constant term of the expansion at s = 0, the elastic part) is exact.
 
@@ -64,23 +65,25 @@ class ModalTruncation:
         chosen = _chosen(modes, rule)
         reduced = modal_model(full, modes, chosen)
         if self.static_correction:
-            zero = slice(modes.unstable, modes.unstable + modes.rigid + _soft(modes, chosen))
-            reduced = corrected(full, reduced, modes.shapes[:, zero], np.eye(len(chosen))[:, zero])
+            free = np.arange(modes.unstable, modes.unstable + modes.rigid + _soft(modes))
+            with_free = np.union1d(chosen, free)
+            zero = np.searchsorted(with_free, free)
+            wider = modal_model(full, modes, with_free)
+            D = corrected(full, wider, modes.shapes[:, free], np.eye(len(with_free))[:, zero]).D
+            reduced = replace(reduced, D=D)
         bound = _bound(full, modes, chosen, self.static_correction)
         return ReducedModel(full, self, reduced, modes.shapes[:, chosen], modes.rigid, bound)
 
 
-def _soft(modes: Modes, chosen: np.ndarray) -> int:
-    """Count flexible modes, all kept, that lie so far below the next that K⁻¹ would drown the others in their rounding.
+def _soft(modes: Modes) -> int:
+    """Count flexible modes that lie so far below the next that K⁻¹ would drown the others in their rounding.
 
-    A bent girder that spins about its own axis is one: free but for its mesh. They count as free motion here; the
-    full and the reduced model share what that leaves out.
+    A bent girder that spins about its own axis is one: free but for its mesh. They count as free motion here: kept
+    before all others, and never part of the static correction, which would give their slow swing to all frequencies.
     """
-    first = modes.unstable + modes.rigid
-    squared = modes.omega_squared[first:]
+    squared = modes.omega_squared[modes.unstable + modes.rigid :]
     gaps = np.flatnonzero(squared[:-1] < GAP * squared[1:])
-    count = int(gaps[-1]) + 1 if gaps.size else 0
-    return count if np.array_equal(chosen[first : first + count], np.arange(first, first + count)) else 0
+    return int(gaps[-1]) + 1 if gaps.size else 0
 
 
 def _enough_modes(full: LinearModel, rule: Selection) -> Modes:
@@ -102,6 +105,7 @@ def _chosen(modes: Modes, rule: Selection) -> np.ndarray:
             f"{order} modes asked for, but {modes.rigid} rigid-body and {modes.unstable} unstable modes are "
             f"always kept: ask for at least {max(always, 1)}"
         )
+    always += min(_soft(modes), order - always)
     flexible = modes.select(np.arange(always, len(modes)))
     return np.concatenate([np.arange(always), always + rule.choose(flexible, order - always)])
 
