@@ -46,6 +46,7 @@ _HOMES = {
     "flexctrl.effects.lugre_friction": ("LuGre", "LuGreFriction"),
     "flexctrl.effects.motor_lag": ("MotorLag",),
     "flexctrl.effects.backlash": ("Backlash",),
+    "flexctrl.effects.wind": ("Wind",),
     "flexctrl.kernels.kernel": ("CasadiVM", "Compiled"),
     "flexctrl.model.assemble": ("assemble", "rigid"),
     "flexctrl.model.model": ("Model",),

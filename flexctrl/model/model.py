@@ -26,6 +26,7 @@ from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import Motion, State
 from flexctrl.model.signals import Signals, signals_of
 from flexctrl.model.switches import Switches
+from flexctrl.model.wind_kinds import wind_families
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part, Spring
 from flexctrl.structure.freedoms import check_finite
@@ -121,7 +122,7 @@ class Model:
         rigid = frozenset(p.name for p in self.structure.elements if not self.bends(p))
         machine, effects = self.structure, self.effects
         families = families_of(machine, effects, rigid, loose_names(machine, effects))
-        more = loose_families(machine, effects) + friction_families(machine, effects)
+        more = loose_families(machine, effects) + friction_families(machine, effects) + wind_families(machine, effects)
         return Forces(self.motion, families + more, self.backend)
 
     @cached_property

@@ -19,6 +19,7 @@ from flexctrl.effects.lugre_friction import LuGre, LuGreFriction
 from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.viscous_friction import ViscousFriction
+from flexctrl.effects.wind import Wind
 from flexctrl.errors import did_you_mean
 from flexctrl.scene.reading import (
     Kind,
@@ -74,6 +75,7 @@ EFFECTS: dict[str, Kind] = {
     "coulomb_friction": Placed(CoulombFriction, {"laws": mapping(_dry)}),
     "lugre_friction": Placed(LuGreFriction, {"laws": mapping(_LUGRE.read)}),
     "backlash": Placed(Backlash, {"gaps": mapping(number)}),
+    "wind": Kind(Wind, {"areas": mapping(number), "speed": vector, "density": number}),
     "motor_lag": Placed(MotorLag, {"time_constants": mapping(number)}),
 }
 """Effects by the name they have in a scene file."""

@@ -46,6 +46,7 @@ ADDED = [
     (fc.BeamFlexibility(), 12, {"beam"}),
     (fc.ShaftElasticity(), 1, {"rotary_drive"}),
     (fc.RopeStretch(), 1, {"rope"}),
+    (fc.Wind({"load": 1.0}, (10, 0, 0)), 0, {"wind"}),
     (fc.RayleighDamping(alpha=0.1), 0, {"beam", "point", "rotary_drive"}),
 ]
 
@@ -94,3 +95,4 @@ def test_zero_strength_is_absence():
     effects = [*BARE, fc.Gravity(), fc.Flexible()]
     assert counted(machine(), effects) == counted(machine(), [*effects, fc.RayleighDamping(0.0, 0.0)])
     assert counted(machine(), effects) == counted(machine(), [*effects, fc.Backlash({"motor": 0.0})])
+    assert counted(machine(), effects) == counted(machine(), [*effects, fc.Wind({"load": 0.0}, (10, 0, 0))])

@@ -1,0 +1,56 @@
+"""Nodes in the wind: their kind, and families of them in a structure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from flexctrl.effects.effect import Effect
+from flexctrl.effects.wind import Wind
+from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.model.families import Family
+from flexctrl.model.frictions import pieces
+from flexctrl.model.kinds import Kind, Shares
+from flexctrl.structure.structure import Structure
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+__all__ = ["wind_families"]
+
+_CALM = 1e-40
+
+
+def _wind(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, p: ca.SX) -> Shares:
+    """½ ρ c_d A and w are the parameters."""
+    import casadi as ca
+
+    past = p[1:4] - nodes[0].v
+    force = p[0] * ca.sqrt(ca.dot(past, past) + _CALM) * past
+    return Shares(ca.SX(3, 1), force, ca.SX(1, 1), ca.SX(1, 1), -ca.dot(force, nodes[0].v))
+
+
+_WIND = Kind("wind", 1, 3, 0, 4, _wind)
+
+
+def wind_families(structure: Structure, effects: Sequence[Effect]) -> tuple[Family, ...]:
+    """Return the families of nodes in the wind.
+
+    Parameters
+    ----------
+    structure : Structure
+    effects : sequence of Effect
+
+    Returns
+    -------
+    tuple of Family
+    """
+    return tuple(_family(structure, e) for e in effects if isinstance(e, Wind) and e.density and e.shares(structure))
+
+
+def _family(s: Structure, effect: Wind) -> Family:
+    shares = effect.shares(s)
+    rows = [[0.5 * effect.density * area, *effect.speed] for _, area in shares]
+    return pieces(
+        _WIND, [node.part for node, _ in shares], [[s.number(n)] for n, _ in shares], [[]] * len(shares), rows
+    )
