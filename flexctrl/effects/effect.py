@@ -29,11 +29,14 @@ class Inner:
         What an error of 1 is in it; infinite where the motion that it brings about is judged instead.
     frozen : bool
         Whether it stays as it is in equilibria and linear models.
+    order : int
+        Of its equation: 1 for one without inertia, 2 for one that has it.
     """
 
     name: str
     scale: float = math.inf
     frozen: bool = False
+    order: int = 1
 
 
 class Effect:

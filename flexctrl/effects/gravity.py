@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.effects.effect import Effect
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, height_energy, weight
+from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion
+from flexctrl.mechanics.beam_inertia import height_energy, weight
 from flexctrl.structure.freedoms import Vector, parse_point
 
 if TYPE_CHECKING:

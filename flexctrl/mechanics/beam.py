@@ -8,11 +8,11 @@ matrix (Crisfield, Galvanetto & Jelenić 1997). At rest the tangents are the tex
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from flexctrl.mechanics import component_modes
 from flexctrl.mechanics.matrices import PlaneMass
 from flexctrl.mechanics.rotation import inverse_tangent, rotation_vector
 
@@ -55,17 +55,21 @@ class BeamForce:
         Works on the spin of the frame, in the frame.
     nodal : casadi.SX, 12
         Forces and moments on the nodes, in the frame.
+    modal : casadi.SX or float
+        Forces on the element's own modes; 0 where it has none.
     """
 
     deformation: ca.SX
     torque: ca.SX
     nodal: ca.SX
+    modal: ca.SX | float = 0.0
 
     def __add__(self, other: BeamForce) -> BeamForce:
-        return BeamForce(self.deformation + other.deformation, self.torque + other.torque, self.nodal + other.nodal)
+        sums = (self.deformation + other.deformation, self.torque + other.torque, self.nodal + other.nodal)
+        return BeamForce(*sums, self.modal + other.modal)
 
     def __mul__(self, factor: float) -> BeamForce:
-        return BeamForce(self.deformation * factor, self.torque * factor, self.nodal * factor)
+        return BeamForce(self.deformation * factor, self.torque * factor, self.nodal * factor, self.modal * factor)
 
 
 def no_force() -> BeamForce:
@@ -99,6 +103,8 @@ class BeamMotion:
         Spin of the frame.
     rates, accelerations : tuple of four casadi.SX
         v₁, ω₁, v₂, ω₂ and their rates, absolute, resolved in the frame.
+    modal : tuple of three casadi.SX, or of none
+        Amplitudes of the element's own modes with their rates and accelerations (see `component_modes`).
     """
 
     p: dict[str, ca.SX]
@@ -112,6 +118,7 @@ class BeamMotion:
     spin: ca.SX
     rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
     accelerations: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
+    modal: tuple[ca.SX, ...] = ()
 
 
 def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
@@ -130,7 +137,7 @@ def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     return ca.vertcat(*[m.frame @ block for block in blocks])
 
 
-def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> BeamMotion:
+def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal: tuple[ca.SX, ...] = ()) -> BeamMotion:
     """Return the motion of an element from that of its nodes.
 
     Parameters
@@ -138,6 +145,8 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Bea
     first, second : NodeMotion
     parameters : casadi.SX
         In the order of `PARAMETERS`.
+    modal : tuple of casadi.SX
+        Amplitudes, rates and accelerations of the element's own modes; empty: it has none.
 
     Returns
     -------
@@ -167,6 +176,7 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Bea
         tuple(rotation_vector(frame.T @ (node.R @ rest)) for node in (first, second)),
         tuple(frame.T @ v for v in rates),
         tuple(frame.T @ a for a in accelerations),
+        modal,
     )
 
 
@@ -179,6 +189,7 @@ def framed_motion(
     theta: tuple[ca.SX, ...],
     rates: tuple[ca.SX, ...],
     accelerations: tuple[ca.SX, ...],
+    modal: tuple[ca.SX, ...] = (),
 ) -> BeamMotion:
     """Return the motion of an element from what is seen in its frame; ``sides`` are the nodes' second axes."""
     import casadi as ca
@@ -201,13 +212,15 @@ def framed_motion(
         spin=ca.vertcat((twist + spin_y * normal[0]) / normal[1], spin_y, spin_z),
         rates=rates,  # type: ignore[arg-type]
         accelerations=accelerations,  # type: ignore[arg-type]
+        modal=modal,
     )
 
 
 def bowing(m: BeamMotion) -> ca.SX:
     """Return the strain from bending of the axis between the nodes, ∫½(v'² + w'²)/L for the cubic shape."""
-    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
-    return (2.0 * (y1 * y1 + y2 * y2 + z1 * z1 + z2 * z2) - y1 * y2 - z1 * z2) / 30.0
+    (_, y1, z1), (_, y2, z2) = (components(t) for t in m.theta)
+    cubic = (2.0 * (y1 * y1 + y2 * y2 + z1 * z1 + z2 * z2) - y1 * y2 - z1 * z2) / 30.0
+    return cubic + component_modes.bowing(m) if m.modal else cubic
 
 
 def deformations(m: BeamMotion) -> ca.SX:
@@ -219,7 +232,7 @@ def deformations(m: BeamMotion) -> ca.SX:
     """
     import casadi as ca
 
-    (x1, y1, z1), (x2, y2, z2) = (_components(t) for t in m.theta)
+    (x1, y1, z1), (x2, y2, z2) = (components(t) for t in m.theta)
     L = m.p["L"]
     if SHEARING[0] not in m.p:
         return ca.vertcat(m.stretch + L * bowing(m), x2 - x1, y1, y2, z1, z2)
@@ -275,12 +288,9 @@ def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
     """Return the force of given `stresses`: minus them times the gradients of their `deformations`."""
     import casadi as ca
 
-    if SHEARING[0] in m.p:
-        seen = ca.SX.sym("seen", 7)
-        local = replace(m, stretch=seen[0], theta=(seen[1:4], seen[4:7]))
-        gradient = ca.jtimes(deformations(local), seen, stress, True)
-        return BeamForce(-ca.substitute(gradient, seen, ca.vertcat(m.stretch, *m.theta)), ca.SX(3, 1), ca.SX(12, 1))
-    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
+    if SHEARING[0] in m.p or m.modal:
+        return work_of(m, lambda local: ca.dot(deformations(local), stress)) * -1.0
+    (_, y1, z1), (_, y2, z2) = (components(t) for t in m.theta)
     N, torque = stress[0], stress[1]
     s = N * m.p["L"] / 30.0
     m1 = ca.vertcat(-torque, stress[2] + s * (4.0 * y1 - y2), stress[4] + s * (4.0 * z1 - z2))
@@ -288,9 +298,34 @@ def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
     return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
 
 
+def work_of(m: BeamMotion, of: Callable[[BeamMotion], ca.SX]) -> BeamForce:
+    """Return the gradient of a function of what deforms: stretch, end rotations, modes."""
+    import casadi as ca
+
+    seen, local = seen_deformed(m)
+    now = ca.vertcat(m.stretch, *m.theta, *m.modal[:1])
+    gradient = ca.substitute(ca.gradient(of(local), seen), seen, now)
+    return BeamForce(gradient[:7], ca.SX(3, 1), ca.SX(12, 1), gradient[7:] if m.modal else 0.0)
+
+
+def seen_deformed(m: BeamMotion) -> tuple[ca.SX, BeamMotion]:
+    """Return symbols of stretch, end rotations and modal amplitudes, and the motion that has them."""
+    import casadi as ca
+
+    seen = ca.SX.sym("seen", 7 + sum(eta.numel() for eta in m.modal[:1]))
+    modal = (seen[7:], *m.modal[1:]) if m.modal else ()
+    return seen, replace(m, stretch=seen[0], theta=(seen[1:4], seen[4:7]), modal=modal)
+
+
 def elastic_force(m: BeamMotion) -> BeamForce:
     """Return minus the gradient of `strain_energy`."""
-    return stress_force(m, stresses(m))
+    force = stress_force(m, stresses(m))
+    return force + _modal(-component_modes.stiffness(m) * m.modal[0]) if m.modal else force
+
+
+def _modal(force: ca.SX) -> BeamForce:
+    """Return a force on the element's own modes."""
+    return replace(no_force(), modal=force)
 
 
 def strain_energy(m: BeamMotion) -> ca.SX:
@@ -298,7 +333,8 @@ def strain_energy(m: BeamMotion) -> ca.SX:
     import casadi as ca
 
     d = deformations(m)
-    return 0.5 * ca.dot(d, stiffened(m, d))
+    cubic = 0.5 * ca.dot(d, stiffened(m, d))
+    return cubic + 0.5 * ca.dot(component_modes.stiffness(m), m.modal[0] ** 2) if m.modal else cubic
 
 
 def deformation_rates(m: BeamMotion) -> ca.SX:
@@ -317,109 +353,9 @@ def viscous_force(m: BeamMotion) -> BeamForce:
     stretching, x1, y1, z1, x2, y2, z2 = ca.vertsplit(deformation_rates(m))
     d = ca.vertcat(stretching, x2 - x1, y1, y2, z1, z2)
     N, torque, y1, y2, z1, z2 = ca.vertsplit(stiffened(m, d))
-    return BeamForce(-ca.vertcat(N, -torque, y1, z1, torque, y2, z2), ca.SX(3, 1), ca.SX(12, 1))
+    force = BeamForce(-ca.vertcat(N, -torque, y1, z1, torque, y2, z2), ca.SX(3, 1), ca.SX(12, 1))
+    return force + _modal(-component_modes.stiffness(m) * m.modal[1]) if m.modal else force
 
 
-def momentum(m: BeamMotion, rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return M_e applied to nodal velocities (or accelerations) in the frame: four blocks."""
-    import casadi as ca
-
-    (vx1, vy1, vz1), (wx1, wy1, wz1), (vx2, vy2, vz2), (wx2, wy2, wz2) = (_components(r) for r in rates)
-    mass, polar = m.p["mass"], m.p["polar"]
-    py1, lz1, py2, lz2 = _bending_momentum(m, (vy1, wz1, vy2, wz2), "z")
-    pz1, ly1, pz2, ly2 = _bending_momentum(m, (vz1, -wy1, vz2, -wy2), "y")
-    return (
-        ca.vertcat(mass / 6.0 * (2.0 * vx1 + vx2), py1, pz1),
-        ca.vertcat(polar / 6.0 * (2.0 * wx1 + wx2), -ly1, lz1),
-        ca.vertcat(mass / 6.0 * (vx1 + 2.0 * vx2), py2, pz2),
-        ca.vertcat(polar / 6.0 * (wx1 + 2.0 * wx2), -ly2, lz2),
-    )
-
-
-def _bending_momentum(m: BeamMotion, rates: tuple, about: str) -> tuple:
-    """Consistent mass in one plane on the rates of (v₁, θ₁, v₂, θ₂)."""
-    v1, w1, v2, w2 = rates
-    vv, tv, tt, other_vv, other_tv, other_tt = (m.p[f"{about}_{entry}"] for entry in PlaneMass._fields)
-    return (
-        vv * v1 + tv * w1 + other_vv * v2 - other_tv * w2,
-        tv * v1 + tt * w1 + other_tv * v2 + other_tt * w2,
-        other_vv * v1 + other_tv * w1 + vv * v2 - tv * w2,
-        -other_tv * v1 + other_tt * w1 - tv * v2 + tt * w2,
-    )
-
-
-def inertial_force(m: BeamMotion) -> BeamForce:
-    """Return the force of inertia.
-
-    Lagrange's equations of T = ½ Vᵀ M_e V, V the nodal velocities in the frame:
-    d/dt(R_E p) − (ω × on the rotations) − ∂T/∂q, with R_E changing by the frame's spin.
-    """
-    import casadi as ca
-
-    p = momentum(m, m.rates)
-    turning = tuple(ca.cross(m.spin, v) for v in m.rates)
-    rate = momentum(m, tuple(a - t for a, t in zip(m.accelerations, turning, strict=True)))  # type: ignore[arg-type]
-    frame_torque = sum((ca.cross(v, q) for v, q in zip(m.rates, p, strict=True)), ca.SX.zeros(3))
-    blocks = [r + ca.cross(m.spin, q) for r, q in zip(rate, p, strict=True)]
-    for i in (1, 3):
-        blocks[i] = blocks[i] - ca.cross(m.rates[i], p[i])
-    return BeamForce(ca.SX(7, 1), -frame_torque, -ca.vertcat(*blocks))
-
-
-def kinetic_energy(m: BeamMotion) -> ca.SX:
-    """Return ½ Vᵀ M_e V [J]."""
-    import casadi as ca
-
-    p = momentum(m, m.rates)
-    return 0.5 * ca.dot(ca.vertcat(*m.rates), ca.vertcat(*p))
-
-
-def drag(m: BeamMotion) -> BeamForce:
-    """Return −M_e V, the force of a damping equal to the mass on the nodal velocities."""
-    import casadi as ca
-
-    return BeamForce(ca.SX(7, 1), ca.SX(3, 1), -ca.vertcat(*momentum(m, m.rates)))
-
-
-def weight(m: BeamMotion, g: np.ndarray) -> BeamForce:
-    """Return the force of gravity g [m/s²], minus the gradient of `height_energy`."""
-    import casadi as ca
-
-    local = m.p["mass"] * (m.frame.T @ g)
-    none = ca.SX(3, 1)
-    halves = ca.vertcat(0.5 * local, none, 0.5 * local, none)
-    return offset_force(m, local) + BeamForce(ca.SX(7, 1), none, halves)
-
-
-def height_energy(m: BeamMotion, g: np.ndarray, middle: ca.SX) -> ca.SX:
-    """Return −∫ρA g·x ds [J], with ``middle`` the mean of the nodal positions in space."""
-    import casadi as ca
-
-    return -m.p["mass"] * ca.dot(ca.DM(g), middle + m.frame @ offset(m))
-
-
-def offset(m: BeamMotion) -> ca.SX:
-    """Return how far the mean of the axis lies off the middle of the chord, in the frame.
-
-    Across, the deflection of the cubic; along, what the bending of the more bent half draws in: ∫½(v'² + w'²)(ξ − ½).
-    """
-    import casadi as ca
-
-    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
-    along = (y2 * y2 + z2 * z2 - y1 * y1 - z1 * z1) / 60.0
-    return m.p["L"] * ca.vertcat(along, (z1 - z2) / 12.0, (y2 - y1) / 12.0)
-
-
-def offset_force(m: BeamMotion, force: ca.SX) -> BeamForce:
-    """Return a force that acts on the `offset`, given in the frame."""
-    import casadi as ca
-
-    (_, y1, z1), (_, y2, z2) = (_components(t) for t in m.theta)
-    along, c = m.p["L"] * force[0] / 30.0, m.p["L"] / 12.0
-    m1 = ca.vertcat(0, -c * force[2] - along * y1, c * force[1] - along * z1)
-    m2 = ca.vertcat(0, c * force[2] + along * y2, along * z2 - c * force[1])
-    return BeamForce(ca.vertcat(0, m1, m2), ca.cross(offset(m), force), ca.SX(12, 1))
-
-
-def _components(v: ca.SX) -> tuple:
+def components(v: ca.SX) -> tuple:
     return v[0], v[1], v[2]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.effects.component_modes import ComponentModes
+from flexctrl.effects.effect import Effect
 from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, to_space
+from flexctrl.mechanics.modal_matrices import modal_matrices
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.motion import Motion
 from flexctrl.structure.drives import Drive, RotaryDrive
@@ -45,6 +48,25 @@ def stiffness_blocks(
     for i, drive in enumerate(s.drives):
         if bends(drive):
             yield drive.name, _drive_stiffness(s, motion, i, drive)
+
+
+def modal_blocks(
+    s: Structure, effects: Sequence[Effect], motion: Motion
+) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray, np.ndarray]]]:
+    """Yield what component modes add: the beam's name, raw places, mass and stiffness."""
+    place = motion.inner_base
+    for effect in effects:
+        for part in s.elements:
+            if isinstance(effect, ComponentModes) and isinstance(part, Beam) and effect.modes(part):
+                mass, stiffness = modal_matrices(part.section, part.length / part.elements, effect.count)
+                turn = np.eye(len(mass))
+                turn[:12, :12] = np.kron(np.eye(4), part.axes)
+                for i, places in enumerate(_elements(s, part)):
+                    own = place + 2 * effect.count * i + np.arange(2 * effect.count)
+                    yield part.name, (np.append(places, own), turn @ mass @ turn.T, stiffness)
+                place += 2 * effect.count * part.elements
+        if not isinstance(effect, ComponentModes):
+            place += len(effect.inner(s))
 
 
 def assembled(motion: Motion, blocks: Iterator[tuple[str, Block]]) -> sp.csc_matrix:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.mechanics.matrices import bending, coupling, plane_masses
@@ -67,9 +68,10 @@ def families_of(
 
     ``loose`` names the springs and drives that have play, and families of their own.
     """
-    parts, effects = structure.elements, tuple(e.everywhere() for e in effects if not e.apart)
+    parts, modal = structure.elements, _modal_beams(structure, effects)
+    effects = _kernel_effects(effects)
     beams = [p for p in parts if isinstance(p, Beam)]
-    bent = [b for b in beams if b.name not in rigid]
+    bent = [b for b in beams if b.name not in rigid and b.name not in {name for f in modal for name in f.parts}]
     stiff = tuple(e for e in effects if not isinstance(e, BeamFlexibility))
     springs = [p for p in parts if isinstance(p, Spring) and p.name not in loose]
     ropes = [p for p in parts if isinstance(p, Rope) and p.name not in rigid]
@@ -77,6 +79,7 @@ def families_of(
     made = [
         _beams(kinds.BEAM, structure, effects, [b for b in bent if not b.section.shears], rigid),
         _beams(kinds.SHEARING_BEAM, structure, effects, [b for b in bent if b.section.shears], rigid),
+        *modal,
         _beams(kinds.BEAM, structure, stiff, [b for b in beams if b.name in rigid], rigid),
         lines_family(kinds.SPRING, structure, effects, springs),
         lines_family(kinds.ROPE, structure, effects, ropes),
@@ -89,13 +92,32 @@ def families_of(
     return tuple(f for f in made if f.count)
 
 
+def _kernel_effects(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """What kernels are made for: each effect everywhere; modes of an element bend as the rest of it does."""
+    bending = any(type(e) is BeamFlexibility for e in effects)
+    acting = [e for e in effects if not e.apart and not (bending and isinstance(e, ComponentModes))]
+    return tuple(BeamFlexibility() if isinstance(e, ComponentModes) else e.everywhere() for e in acting)
+
+
+def _modal_beams(s: Structure, effects: tuple[Effect, ...]) -> list[Family]:
+    """Families of elements with modes of their own, whose amplitudes are inner freedoms."""
+    found, inner = [], len(s.drives)
+    for effect in effects:
+        chosen = [p for p in s.elements if isinstance(effect, ComponentModes) and effect.modes(p)]
+        if isinstance(effect, ComponentModes) and chosen:
+            kind = kinds.modal_beam(effect.count)
+            found.append(_beams(kind, s, _kernel_effects(effects), chosen, frozenset(), inner))
+        inner += len(effect.inner(s))
+    return found
+
+
 def _family(
     kind: Kind,
     effects: tuple[Effect, ...],
     parts: Sequence[str],
     nodes: list[list[int]],
     parameters: Sequence[Sequence[float]],
-    drives: Sequence[int] = (),
+    drives: Sequence[int] | np.ndarray = (),
 ) -> Family:
     return Family(
         kernels_of(kind, effects),
@@ -106,14 +128,22 @@ def _family(
     )
 
 
-def _beams(kind: Kind, s: Structure, effects: tuple[Effect, ...], beams: list[Beam], rigid: frozenset[str]) -> Family:
+def _beams(
+    kind: Kind,
+    s: Structure,
+    effects: tuple[Effect, ...],
+    beams: list[Beam],
+    rigid: frozenset[str],
+    first: int = 0,
+) -> Family:
     spans = []
     for b in beams:
         ends = [(0, b.elements)] if b.name in rigid else [(i, i + 1) for i in range(b.elements)]
         spans += [(b, i, j) for i, j in ends]
     nodes = [[s.number(b.start) + i, s.number(b.start) + j] for b, i, j in spans]
     parameters = [_beam_parameters(b, b.length * (j - i) / b.elements)[: kind.parameters] for b, i, j in spans]
-    return _family(kind, effects, [b.name for b, _, _ in spans], nodes, parameters)
+    numbers = first + np.arange(len(spans) * kind.drives)
+    return _family(kind, effects, [b.name for b, _, _ in spans], nodes, parameters, numbers)
 
 
 def _beam_parameters(b: Beam, length: float) -> list[float]:

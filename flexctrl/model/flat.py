@@ -50,7 +50,7 @@ class Flat:
     slots, sources : Wholes
         Velocities among the slots, and the degrees of freedom they are.
     shafts, rigid, rotary : Wholes
-        Source angles' degrees of freedom; which shafts are rigid; which joints turn.
+        Degrees of freedom of source angles, then of modes; which shafts are rigid; which joints turn.
     ratios : Reals
     inputs : Wholes
         Where unit loads act, then the inputs they are of.
@@ -77,6 +77,7 @@ class Flat:
     linking: int
     rates: int
     drives: int
+    inner: int
     pieces: int
     unit_loads: int
     following: int
@@ -142,6 +143,8 @@ def place(f: Flat) -> None:
         f.linkage[0](f.z, f.z)
     if f.drives > 0:
         wind(f)
+    for i in range(f.drives, f.drives + f.inner):
+        f.z[f.drive_base + DRIVE_SLOT * i] = f.q[f.shafts[i]] + f.step[f.shafts[i]]
 
 
 def clear(n: int, x: Reals) -> None:
@@ -171,7 +174,7 @@ def drive(f: Flat) -> None:
     for k in range(f.rates):
         f.z[f.slots[k]] = f.v[f.sources[k]]
         f.z[f.slots[k] + 6] = f.rate[f.sources[k]]
-    for i in range(f.drives):
+    for i in range(f.drives + f.inner):
         slot = f.z[f.drive_base + DRIVE_SLOT * i :]
         slot[1] = f.v[f.shafts[i]]
         slot[2] = f.rate[f.shafts[i]]

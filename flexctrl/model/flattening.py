@@ -25,9 +25,9 @@ _ALIGNED = 64
 
 
 def can_be_flat(model: Model) -> bool:
-    """Tell whether `flatten` covers a model: large motion; no rigid loops, modal damping or inner freedoms."""
+    """Tell whether `flatten` covers a model: large motion; no rigid loops, modal damping, nothing of first order."""
     motion = model.motion
-    left_out = len(motion.linkage.loops) + model.viscous.nnz + motion.inner.size
+    left_out = len(motion.linkage.loops) + model.viscous.nnz + sum(i.order == 1 for i in motion.effects)
     return model.large and model.n > 0 and not left_out
 
 
@@ -85,7 +85,7 @@ class Flattened:
         """Return the state of a pose (12 a node) and values in the order of elimination."""
         rows = pose.reshape(-1, 12)
         x, R = rows[:, :3].copy(), rows[:, 3:].reshape(-1, 3, 3).copy()
-        return State(x, R, self.own(q), self.own(v), driven.copy(), t)
+        return State(x, R, self.own(q), self.own(v), driven.copy(), t, self.model.rest.dry)
 
 
 def flatten(model: Model) -> Flattened:
@@ -212,7 +212,7 @@ class _Layout:
             "cells": self.position[m.place].ravel(),
             "slots": NODE_SLOT * own[nodes] + 12 + freedoms,
             "sources": cells[nodes, freedoms],
-            "shafts": self.position[m.sources],
+            "shafts": self.position[np.concatenate([m.sources, m.inner])],
             "rigid": m.rigid.astype(np.int64),
             "rotary": m.rotary.astype(np.int64),
             "ratios": m.ratios,
@@ -235,6 +235,7 @@ class _Layout:
             "linking": len(tables["linked"]),
             "rates": len(tables["slots"]),
             "drives": len(m.drives),
+            "inner": m.inner.size,
             "pieces": len(self.forces.families),
             "unit_loads": len(tables["unit"]),
             "following": len(self.model.signals.follows),

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Kernel
-from flexctrl.mechanics import beam, pieces, winch
+from flexctrl.mechanics import beam, beam_inertia, pieces, winch
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.beam_tangent import beam_slope
 
@@ -217,7 +217,8 @@ def kernels_of(kind: Kind, effects: tuple[Effect, ...]) -> Kernels:
 def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
     import casadi as ca
 
-    m = beam.beam_motion(nodes[0], nodes[1], parameters)
+    modal = modes_in(slot)
+    m = beam.beam_motion(nodes[0], nodes[1], parameters, modal)
     force, middle = beam.no_force(), 0.5 * (nodes[0].x + nodes[1].x)
     for effect in effects:
         force = force + effect.beam(m)
@@ -225,16 +226,30 @@ def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     felt, carried = m, ca.SX(1, 1)
     if _turning(effects):
         first, second = nodes
-        felt = beam.beam_motion(_inertial(effects, first), _inertial(effects, second), parameters)
+        felt = beam.beam_motion(_inertial(effects, first), _inertial(effects, second), parameters, modal)
         parked = (_inertial(effects, _still(first)), _inertial(effects, _still(second)))
-        carried = beam.kinetic_energy(beam.beam_motion(*parked, parameters))
-    inertia = beam.nodal_force(felt, beam.inertial_force(felt))
-    return Shares(inertia, beam.nodal_force(m, force), beam.kinetic_energy(m), stored - carried)
+        still = tuple(0.0 * eta if k else eta for k, eta in enumerate(modal))
+        carried = beam_inertia.kinetic_energy(beam.beam_motion(*parked, parameters, still))
+    inertia = whole_force(felt, beam_inertia.inertial_force(felt))
+    return Shares(inertia, whole_force(m, force), beam_inertia.kinetic_energy(m), stored - carried)
+
+
+def modes_in(slot: ca.SX) -> tuple[ca.SX, ...]:
+    """Return amplitudes, rates and accelerations of an element's own modes; nothing where it has none."""
+    return tuple(slot[k::DRIVE_SLOT] for k in range(3)) if slot.numel() else ()
+
+
+def whole_force(m: beam.BeamMotion, force: beam.BeamForce) -> ca.SX:
+    """Return a force on the nodes of an element and then on its own modes."""
+    import casadi as ca
+
+    nodal = beam.nodal_force(m, force)
+    return ca.vertcat(nodal, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else nodal
 
 
 def _beam_slope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], parameters: ca.SX, seeds: ca.SX) -> ca.SX:
     def force(m: beam.BeamMotion) -> beam.BeamForce:
-        return sum((e.beam(m) for e in effects), beam.inertial_force(m))
+        return sum((e.beam(m) for e in effects), beam_inertia.inertial_force(m))
 
     return beam_slope(nodes[0], nodes[1], parameters, seeds, force)
 
@@ -332,6 +347,14 @@ def _winch(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX
 
 BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam, _beam_slope)
 SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(beam.PARAMETERS + beam.SHEARING), _beam, _beam_slope)
+
+
+@cache
+def modal_beam(count: int) -> Kind:
+    """Return the kind of beam elements with some of their own modes in each plane."""
+    return Kind(f"beam_with_{count}_modes", 2, 6, 2 * count, len(beam.PARAMETERS), _beam)
+
+
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
 ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
 POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)

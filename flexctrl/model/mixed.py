@@ -9,7 +9,7 @@ Newton method (Magisano, Leonetti & Garcea 2017). The equations and their soluti
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
@@ -50,11 +50,11 @@ def _beam_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parame
     import casadi as ca
 
     first, second = kinds.moved(kind, symbols, ca.SX(kind.width, 1), ca.SX(3, 1))
-    m = beam.beam_motion(first, second, parameters)
-    seen, now = ca.SX.sym("seen", 7), ca.vertcat(m.stretch, *m.theta)
-    local = replace(m, stretch=seen[0], theta=(seen[1:4], seen[4:7]))
+    m = beam.beam_motion(first, second, parameters, kinds.modes_in(symbols[kinds.NODE_SLOT * kind.nodes :]))
+    seen, local = beam.seen_deformed(m)
+    now = ca.vertcat(m.stretch, *m.theta, *m.modal[:1])
     stress = sum((e.beam_stress(local) for e in effects), ca.SX(6, 1))
-    change = ca.jtimes(stress, seen, beam.deformation_rates(m))
+    change = ca.jtimes(stress, seen, ca.vertcat(beam.deformation_rates(m), *m.modal[1:2]))
     return ca.substitute(ca.vertcat(stress, change), seen, now)
 
 
@@ -63,10 +63,24 @@ def _beam_geometric(
 ) -> tuple[ca.SX, ca.SX]:
     import casadi as ca
 
+    if kind.drives:
+        return _modal_geometric(kind, symbols, parameters, stress)
     first, second = _still(kind, symbols, ca.SX(kind.width, 1))
     slope = beam_slope(first, second, parameters, ca.SX([1, 0, 0]), lambda m: beam.stress_force(m, stress))
     m = beam.beam_motion(first, second, parameters)
     return slope, beam.nodal_force(m, beam.stress_force(m, stress))
+
+
+def _modal_geometric(kind: Kind, symbols: ca.SX, parameters: ca.SX, stress: ca.SX) -> tuple[ca.SX, ca.SX]:
+    import casadi as ca
+
+    increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
+    amplitudes = symbols[kinds.NODE_SLOT * kind.nodes :: kinds.DRIVE_SLOT] + increment[-kind.drives :]
+    still = ca.SX.zeros(kind.drives)
+    first, second = _still(kind, symbols, increment)
+    m = beam.beam_motion(first, second, parameters, (amplitudes, still, still))
+    force = kinds.whole_force(m, beam.stress_force(m, stress))
+    return ca.substitute(ca.jacobian(force, increment), increment, zero), ca.substitute(force, increment, zero)
 
 
 def _line_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX) -> ca.SX:
@@ -92,8 +106,8 @@ def _line_geometric(
 
 
 _BEAM, _LINE = _Elastic(6, _beam_stress, _beam_geometric), _Elastic(1, _line_stress, _line_geometric)
-_ELASTIC = {kinds.BEAM: _BEAM, kinds.SHEARING_BEAM: _BEAM, kinds.SPRING: _LINE, kinds.ROPE: _LINE}
-"""The kinds that strain."""
+_ELASTIC = {kinds.BEAM.physics: _BEAM, kinds.SPRING.physics: _LINE, kinds.ROPE.physics: _LINE}
+"""The physics of pieces that strain."""
 
 
 @cache
@@ -101,7 +115,7 @@ def _stress_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     import casadi as ca
 
     symbols, parameters = kinds.symbols_of(kind)
-    outputs = _ELASTIC[kind].stress(kind, effects, symbols, parameters)
+    outputs = _ELASTIC[kind.physics].stress(kind, effects, symbols, parameters)
     return Kernel(f"{kind.name}_stress", symbols, parameters, ca.cse(ca.densify(outputs)))
 
 
@@ -111,8 +125,8 @@ def _geometric_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     import casadi as ca
 
     symbols, parameters = kinds.symbols_of(kind)
-    stress = ca.SX.sym("stress", _ELASTIC[kind].count)
-    slope, force = _ELASTIC[kind].geometric(kind, effects, symbols, parameters, stress)
+    stress = ca.SX.sym("stress", _ELASTIC[kind.physics].count)
+    slope, force = _ELASTIC[kind.physics].geometric(kind, effects, symbols, parameters, stress)
     outputs = ca.cse(ca.vertcat(ca.vec(ca.densify(slope)), ca.densify(force)))
     return Kernel(f"{kind.name}_geometric", ca.vertcat(symbols, stress), parameters, outputs)
 
@@ -185,7 +199,7 @@ class Mixed:
 
     @cached_property
     def _families(self) -> tuple[Family, ...]:
-        return tuple(f for f in self.forces.families if f.kernels.kind in _ELASTIC)
+        return tuple(f for f in self.forces.families if f.kernels.kind.physics in _ELASTIC)
 
     @cached_property
     def _ropes(self) -> np.ndarray:
@@ -200,7 +214,7 @@ class Mixed:
         """Where the stresses of each family stand."""
         found, start = [], 0
         for f in self._families:
-            size = _ELASTIC[f.kernels.kind].count
+            size = _ELASTIC[f.kernels.kind.physics].count
             found.append(start + np.arange(f.count * size).reshape(f.count, size))
             start += f.count * size
         return found

@@ -16,7 +16,7 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import exponential
-from flexctrl.model.assembly import assembled, mass_blocks, stiffness_blocks
+from flexctrl.model.assembly import assembled, mass_blocks, modal_blocks, stiffness_blocks
 from flexctrl.model.families import families_of
 from flexctrl.model.forces import Forces
 from flexctrl.model.frictions import friction_families, lag_blocks
@@ -161,13 +161,17 @@ class Model:
 
     @cached_property
     def _mass(self) -> sp.csc_matrix:
-        return assembled(self.motion, mass_blocks(self.structure, self.motion))
+        modal = modal_blocks(self.structure, self.effects, self.motion)
+        own = ((name, (places, mass)) for name, (places, mass, _) in modal)
+        return assembled(self.motion, chain(mass_blocks(self.structure, self.motion), own))
 
     @cached_property
     def _stiffness(self) -> sp.csc_matrix:
         loose = loose_names(self.structure, self.effects)
         parts = stiffness_blocks(self.structure, self.motion, self._stiff_but(loose))
-        return assembled(self.motion, chain(parts, lag_blocks(self.structure, self.effects, self.motion)))
+        modal = modal_blocks(self.structure, self.effects, self.motion)
+        own = ((name, (places, stiffness)) for name, (places, _, stiffness) in modal)
+        return assembled(self.motion, chain(parts, own, lag_blocks(self.structure, self.effects, self.motion)))
 
     def _stiff_but(self, loose: frozenset[str]) -> Callable[[Part | Drive], bool]:
         """Which parts resist deformation at rest."""

@@ -15,7 +15,7 @@ import numpy as np
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.model.kinds import NODE_SLOT, Kind, moved, symbols_of
+from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kind, moved, symbols_of
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
@@ -101,14 +101,15 @@ def _kernel_of(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     shares = kind.physics(effects, still, _accelerated(slot, 0.0), parameters)
     pushed = kind.physics(effects, along, _accelerated(slot, 1.0), parameters)
     momenta = shares.inertia - pushed.inertia
-    rates = ca.vertcat(*[ca.vertcat(m.v, m.w)[: kind.freedoms] for m in nodes], *([slot[1]] if kind.drives else []))
+    rates = ca.vertcat(*[ca.vertcat(m.v, m.w)[: kind.freedoms] for m in nodes], slot[1::DRIVE_SLOT])
     change = shares.force + shares.inertia + ca.jtimes(momenta, step, rates)
     both = ca.substitute(ca.vertcat(momenta, change), step, ca.SX.zeros(kind.width))
     return Kernel(f"{kind.name}_momenta", symbols, parameters, ca.cse(ca.densify(both)))
 
 
 def _accelerated(slot: ca.SX, share: float) -> ca.SX:
-    """A drive's slot with its source's acceleration replaced by a share of its rate."""
+    """The slots of drives and inner freedoms with accelerations replaced by a share of their rates."""
     import casadi as ca
 
-    return ca.vertcat(slot[0], slot[1], share * slot[1], slot[3]) if slot.numel() else slot
+    columns = ca.reshape(slot, DRIVE_SLOT, slot.numel() // DRIVE_SLOT)
+    return ca.vec(ca.vertcat(columns[0, :], columns[1, :], share * columns[1, :], columns[3, :]))

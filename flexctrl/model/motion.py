@@ -174,8 +174,9 @@ class Motion:
 
     @cached_property
     def flows(self) -> np.ndarray:
-        """Inner degrees of freedom: first-order states."""
-        return self.inner[self.inner < self.n]
+        """Inner degrees of freedom of first order."""
+        first = np.array([i.order == 1 for i in self.effects], dtype=bool)
+        return self.inner[first & (self.inner < self.n)]
 
     @property
     def frozen(self) -> tuple[int, ...]:

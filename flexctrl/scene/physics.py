@@ -8,6 +8,7 @@ from typing import Any
 
 from flexctrl.effects.automatic import Automatic
 from flexctrl.effects.backlash import Backlash
+from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.coulomb_friction import Coulomb, CoulombFriction
 from flexctrl.effects.damping import ModalDamping, RayleighDamping
 from flexctrl.effects.effect import Effect
@@ -33,6 +34,7 @@ from flexctrl.scene.reading import (
     table,
     text,
     vector,
+    whole,
 )
 
 
@@ -64,6 +66,7 @@ EFFECTS: dict[str, Kind] = {
     "gravity": Kind(Gravity, {"g": vector}),
     "flexible": Kind(Flexible),
     "beam_flexibility": Kind(BeamFlexibility, {"of": several(text)}),
+    "component_modes": Kind(ComponentModes, {"count": whole, "of": several(text)}),
     "shaft_elasticity": Kind(ShaftElasticity, {"of": several(text)}),
     "rope_stretch": Kind(RopeStretch, {"of": several(text)}),
     "large_rotation": Kind(LargeRotation),

@@ -1,11 +1,13 @@
-"""The same machine on a finer mesh."""
+"""The same machine on a finer or a coarser mesh."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from math import gcd
 from typing import Any, TypeVar
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.elements import Beam, Node
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.structure import Structure
@@ -35,22 +37,91 @@ def refine(structure: Structure, factor: int) -> Structure:
     """
     if factor != int(factor) or factor < 1:
         raise StructureError(f"refine: factor = {factor!r}; expected a whole number ≥ 1")
+    _check_joints(structure, "refine")
+    return _meshed(structure, {b.name: factor * b.elements for b in _beams(structure)})
+
+
+def coarsen(structure: Structure, of: Sequence[str] = ()) -> Structure:
+    """Return a structure whose beams have as few elements as the nodes in use allow.
+
+    A node is in use if something is joined to it, held, driven, loaded or measured there. Elements of a beam stay of
+    one length, so that nodes in use at 2 and 6 of 8 elements leave 4. For `ComponentModes`, which needs few.
+
+    Parameters
+    ----------
+    structure : Structure
+    of : sequence of str
+        Names of the beams; default: all.
+
+    Returns
+    -------
+    Structure
+
+    Raises
+    ------
+    StructureError
+        For a name that is no beam of the structure, or a structure tied by a table of numbers.
+    """
+    beams = {b.name: b for b in _beams(structure)}
+    for name in of:
+        if name not in beams:
+            raise StructureError(
+                f"coarsen: structure {structure.name!r} has no beam {name!r}{did_you_mean(name, list(beams))}"
+            )
+    _check_joints(structure, "coarsen")
+    used = [n for group in _users(structure) for value in group for n in _nodes_in(value)]
+    wanted = {
+        name: b.elements // gcd(b.elements, *(n.index for n in used if n.part == name))
+        for name, b in beams.items()
+        if not of or name in of
+    }
+    return _meshed(structure, wanted)
+
+
+def _beams(structure: Structure) -> list[Beam]:
+    return [e for e in structure.elements if isinstance(e, Beam)]
+
+
+def _users(structure: Structure) -> tuple[Any, ...]:
+    others = [e for e in structure.elements if not isinstance(e, Beam)]
+    return others, structure.joints, structure.drives, structure.inputs, structure.outputs
+
+
+def _nodes_in(value: Any) -> Iterator[Node]:
+    if isinstance(value, Node):
+        yield value
+    elif isinstance(value, tuple):
+        for v in value:
+            yield from _nodes_in(v)
+    elif is_dataclass(value):
+        yield from _nodes_in(tuple(getattr(value, f.name) for f in fields(value)))
+
+
+def _check_joints(structure: Structure, verb: str) -> None:
     if isinstance(structure.joints, JoinTable):
         raise StructureError(
-            f"refine: structure {structure.name!r} is tied by a join table of numbers, with no rows for new nodes; "
+            f"{verb}: structure {structure.name!r} is tied by a join table of numbers, with no rows for other nodes; "
             "give it joints"
         )
-    finer = {
-        e.name: Beam(e.name, e.start.position, e.end.position, e.section, elements=factor * e.elements, up=e.up)
-        for e in structure.elements
-        if isinstance(e, Beam)
+
+
+def _meshed(structure: Structure, elements: Mapping[str, int]) -> Structure:
+    """Return a structure with some beams of other numbers of elements, multiples or divisors of those they had."""
+    old = {b.name: b for b in _beams(structure)}
+    new = {
+        name: Beam(name, b.start.position, b.end.position, b.section, elements=elements[name], up=b.up)
+        for name, b in old.items()
+        if name in elements
     }
 
     def moved(node: Node) -> Node:
-        return finer[node.part].node(factor * node.index) if node.part in finer else node
+        if node.part not in new:
+            return node
+        return new[node.part].node(node.index * new[node.part].elements // old[node.part].elements)
 
+    assert not isinstance(structure.joints, JoinTable)
     return structure.with_(
-        elements=[finer.get(e.name, e) for e in structure.elements],
+        elements=[new.get(e.name) or e for e in structure.elements],
         joints=[_with_nodes(j, moved) for j in structure.joints],
         drives=[_with_nodes(d, moved) for d in structure.drives],
         inputs=[_with_nodes(i, moved) for i in structure.inputs],
@@ -73,4 +144,4 @@ def _replaced(value: Any, moved: Any) -> Any:
     return tuple(_replaced(v, moved) for v in value) if isinstance(value, tuple) else value
 
 
-__all__ = ["refine"]
+__all__ = ["coarsen", "refine"]

@@ -148,7 +148,8 @@ def _stiffened_part(kind: type[Deforming], name: str, scene: Subject) -> Subject
     parts = [p.name for p in (*scene.structure.elements, *scene.structure.drives) if effect.bends(p) and p.name != name]
     if not parts:
         return _without_effect(kind, scene)
-    return scene.with_(effects=[kind(parts) if type(e) is kind else e for e in _flat(scene)])
+    fewer = replace(effect, of=tuple(parts))
+    return scene.with_(effects=[fewer if type(e) is kind else e for e in _flat(scene)])
 
 
 def _stiffened_section(name: str, scene: Subject) -> Subject:

@@ -9,15 +9,19 @@ from enum import Enum
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
+from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
-from flexctrl.effects.flexibility import Deforming, ShaftElasticity
+from flexctrl.effects.flexibility import BeamFlexibility, Deforming, ShaftElasticity
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.structure.elements import Beam
-from flexctrl.structure.refine import refine
+from flexctrl.structure.refine import coarsen, refine
+from flexctrl.structure.structure import Structure
 from flexctrl.study.omissions import Subject
 
 __all__ = ["Fidelity", "Setting", "sweep"]
+
+_MODES = 3
 
 
 def _rigid(effects: Sequence[Effect]) -> list[Effect]:
@@ -26,6 +30,10 @@ def _rigid(effects: Sequence[Effect]) -> list[Effect]:
 
 def _shafts(effects: Sequence[Effect]) -> list[Effect]:
     return [e for e in effects if not isinstance(e, Deforming) or isinstance(e, ShaftElasticity)]
+
+
+def _modes(effects: Sequence[Effect]) -> list[Effect]:
+    return [ComponentModes(_MODES, e.of) if type(e) is BeamFlexibility else e for e in effects]
 
 
 def _linear(effects: Sequence[Effect]) -> list[Effect]:
@@ -38,6 +46,7 @@ class Fidelity(Enum):
     RIGID = "rigid"
     RIGID_WITH_SHAFTS = "rigid, shafts"
     LINEAR = "linear"
+    COMPONENT_MODES = "component modes"
     FULL = "full"
 
     def effects(self, given: Sequence[Effect]) -> list[Effect]:
@@ -56,9 +65,23 @@ class Fidelity(Enum):
             Fidelity.RIGID: _rigid,
             Fidelity.RIGID_WITH_SHAFTS: _shafts,
             Fidelity.LINEAR: _linear,
+            Fidelity.COMPONENT_MODES: _modes,
             Fidelity.FULL: list,
         }
         return rungs[self](flat)
+
+    def structure(self, given: Structure) -> Structure:
+        """Return the mesh of this rung: component modes need as few elements as the nodes in use allow.
+
+        Parameters
+        ----------
+        given : Structure
+
+        Returns
+        -------
+        Structure
+        """
+        return coarsen(given) if self is Fidelity.COMPONENT_MODES else given
 
 
 @dataclass(frozen=True)
@@ -97,7 +120,8 @@ class Setting:
         -------
         Scene
         """
-        structure = refine(scene.structure, self.mesh) if self.mesh > 1 else scene.structure
+        structure = self.fidelity.structure(scene.structure)
+        structure = refine(structure, self.mesh) if self.mesh > 1 else structure
         simulation = replace(scene.simulation, method=self.method, tolerance=self.tolerance)
         return scene.with_(structure=structure, effects=self.fidelity.effects(scene.effects), simulation=simulation)
 

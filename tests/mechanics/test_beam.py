@@ -10,7 +10,7 @@ from numpy.polynomial.legendre import leggauss
 from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
-from flexctrl.mechanics import beam
+from flexctrl.mechanics import beam, beam_inertia
 from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, plane_masses, to_space
 
 SECTION = fc.Section(
@@ -43,11 +43,11 @@ def force(share):
 
 
 def weight(m):
-    return beam.weight(m, G)
+    return beam_inertia.weight(m, G)
 
 
 def height(a, b):
-    return beam.height_energy(motion(a, b), G, 0.5 * (a.x + b.x))
+    return beam_inertia.height_energy(motion(a, b), G, 0.5 * (a.x + b.x))
 
 
 def strain(a, b):
@@ -55,14 +55,14 @@ def strain(a, b):
 
 
 def kinetic(a, b):
-    return beam.kinetic_energy(motion(a, b))
+    return beam_inertia.kinetic_energy(motion(a, b))
 
 
 ELASTIC = kernel(force(beam.elastic_force), 2)
-INERTIAL = kernel(force(beam.inertial_force), 2)
+INERTIAL = kernel(force(beam_inertia.inertial_force), 2)
 WEIGHT = kernel(force(weight), 2)
 VISCOUS = kernel(force(beam.viscous_force), 2)
-DRAG = kernel(force(beam.drag), 2)
+DRAG = kernel(force(beam_inertia.drag), 2)
 STATES = [
     random_slots(seed, ENDS, turn, push, 2.0)
     for seed, (turn, push) in enumerate([(0.0, 0.0), (1e-6, 1e-6), (0.05, 0.02), (0.3, 0.1), (0.6, 0.3), (0.9, 0.4)])
@@ -175,8 +175,8 @@ def test_tangents_at_rest_are_the_textbook_matrices():
     K, M = to_space(beam_stiffness(SECTION, L), AXES), to_space(beam_mass(SECTION, L), AXES)
     close(slopes(force(beam.elastic_force), 2)[0](REST), -K, 1e-12)
     close(slopes(force(beam.viscous_force), 2)[1](REST), -K, 1e-12)
-    close(slopes(force(beam.inertial_force), 2)[2](REST), -M, 1e-12)
-    close(slopes(force(beam.drag), 2)[1](REST), -M, 1e-12)
+    close(slopes(force(beam_inertia.inertial_force), 2)[2](REST), -M, 1e-12)
+    close(slopes(force(beam_inertia.drag), 2)[1](REST), -M, 1e-12)
 
 
 def test_tangents_of_a_turned_element_are_the_turned_matrices():
@@ -184,7 +184,7 @@ def test_tangents_of_a_turned_element_are_the_turned_matrices():
     Q = slots[3:12].reshape(3, 3)
     K, M = to_space(beam_stiffness(SECTION, L), Q @ AXES), to_space(beam_mass(SECTION, L), Q @ AXES)
     close(slopes(force(beam.elastic_force), 2)[0](slots), -K, 1e-11)
-    close(slopes(force(beam.inertial_force), 2)[2](slots), -M, 1e-12)
+    close(slopes(force(beam_inertia.inertial_force), 2)[2](slots), -M, 1e-12)
 
 
 def test_a_stretched_element_stiffens_as_a_string_in_bending():

@@ -322,7 +322,8 @@ class Marcher:
         v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
         driven, t = table[:, nodes + 2 * f.padded : width - 1], table[:, width - 1].tolist()
         R = R.reshape(count, -1, 3, 3)
-        return [State(x[i], R[i], q[i], v[i], driven[i], t[i]) for i in range(count)]
+        dry = self.model.rest.dry
+        return [State(x[i], R[i], q[i], v[i], driven[i], t[i], dry) for i in range(count)]
 
 
 def _march(F: Flattened, method: Method) -> March:

@@ -1,0 +1,89 @@
+"""Beams that bend in a handful of modes on a moving frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeGuard
+
+from flexctrl.effects.effect import Effect, Inner
+from flexctrl.effects.flexibility import BeamFlexibility
+from flexctrl.errors import StructureError
+from flexctrl.structure.drives import Drive
+from flexctrl.structure.elements import Beam, Part
+from flexctrl.structure.freedoms import check_finite
+from flexctrl.structure.structure import Structure
+
+_MOST = 10
+
+
+@dataclass(frozen=True, init=False)
+class ComponentModes(BeamFlexibility):
+    """Elements bend in clamped modes of their own beside the cubics of their ends: few elements do for a whole beam.
+
+    Static shapes of the ends and the first modes of the clamped element are the Craig–Bampton basis (Craig & Bampton
+    1968) on the element's moving frame. v(x) = N(x) d + Σ φᵢ(x) ηᵢ in each plane of bending; the amplitudes ηᵢ [m]
+    are freedoms named ``<beam>_<element>_y1`` (along the element's y), ``…_z1`` and so on. Weight, inertia, tension
+    and damping act on the axis as the modes bend it. Stretch and torsion stay linear along an element.
+
+    It takes the place of `BeamFlexibility` on the beams it names; see `flexctrl.coarsen` for a mesh that goes with it.
+
+    Parameters
+    ----------
+    count : int
+        Modes an element in each plane, 0 to 10; with 0 it is `BeamFlexibility`.
+    of : sequence of str
+        Names of the beams; default: all.
+
+    Raises
+    ------
+    StructureError
+        For a count that is no whole number from 0 to 10; by `assemble`, for a beam whose section shears or couples
+        (more elements do for these).
+    """
+
+    count: int = 3
+
+    def __init__(self, count: int = 3, of: Sequence[str] = ()) -> None:
+        super().__init__(of)
+        found = check_finite(count, "count", "ComponentModes", least=0.0)
+        if found != int(found) or found > _MOST:
+            raise StructureError(f"ComponentModes: count = {count!r}; expected a whole number from 0 to {_MOST}")
+        object.__setattr__(self, "count", int(found))
+
+    def everywhere(self) -> Effect:
+        """The effect on every beam."""
+        return ComponentModes(self.count)
+
+    def check_on(self, structure: Structure) -> None:
+        """Refuse sections that shear."""
+        for part in structure.elements:
+            if isinstance(part, Beam) and self.bends(part) and part.section.shears:
+                raise StructureError(
+                    f"ComponentModes: the section of beam {part.name!r} shears or couples, for which there are no "
+                    f"component modes; name the other beams (of=…) and give {part.name!r} more elements"
+                )
+
+    def inner(self, structure: Structure) -> tuple[Inner, ...]:
+        """Amplitudes of every element, along y and then along z."""
+        return tuple(
+            Inner(f"{part.name}_{element}_{axis}{mode}", part.length, order=2)
+            for part in structure.elements
+            if self.modes(part)
+            for element in range(part.elements)
+            for axis in "yz"
+            for mode in range(1, self.count + 1)
+        )
+
+    def modes(self, part: Part | Drive) -> TypeGuard[Beam]:
+        """Tell whether the elements of a part have modes of their own.
+
+        Parameters
+        ----------
+        part : Part or Drive
+
+        Returns
+        -------
+        bool
+        """
+        return self.count > 0 and isinstance(part, Beam) and self.bends(part)

@@ -1,0 +1,164 @@
+"""Beams in a few modes on a moving frame: closed forms, laws, and the mesh that they save."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import scipy.optimize as so
+from scipy.spatial.transform import Rotation
+
+import flexctrl as fc
+from flexctrl.errors import StructureError
+from flexctrl.mechanics.clamped_modes import clamped_shapes
+
+SECTION = fc.Section(EA=1e7, EI_y=2e3, EI_z=1e3, GJ=8e2, rhoA=3.0, rhoJ=0.01, rhoI_y=4e-4, rhoI_z=2e-4)
+PLAIN = fc.Section(EA=1e9, EI_y=1e3, EI_z=1e3, GJ=8e2, rhoA=3.0, rhoJ=0.01)
+LENGTH = 3.0
+
+
+def beam(elements=1, section=SECTION, end=(3.0, 0.5, 0.2), held="u v w rx ry rz"):
+    b = fc.Beam("b", (0, 0, 0), end, section, elements=elements)
+    tip = fc.PointMass("tip", b.end, 2.0)
+    return fc.Structure(
+        [b, tip],
+        [fc.Support(b.start, held), fc.Pin(b.end, tip.node)],
+        inputs=[fc.Force("push", b.end, "y")],
+        outputs=[fc.Position("y", b.end, "y"), fc.Position("z", b.end, "z")],
+    )
+
+
+def model(structure, *effects, backend=None):
+    return fc.assemble(structure, [fc.LargeRotation(), *effects], backend or fc.CasadiVM())
+
+
+def test_no_modes_equal_plain_flexibility():
+    plain, without = (model(beam(2), e, fc.Gravity()) for e in (fc.BeamFlexibility(), fc.ComponentModes(0)))
+    assert plain.coordinates == without.coordinates
+    assert np.array_equal(fc.equilibrium(plain).state.q, fc.equilibrium(without).state.q)
+
+
+def test_tangent_at_rest_is_the_assembled_matrices():
+    m = model(beam(2), fc.ComponentModes(3))
+    still, u = np.zeros(m.n), np.zeros(1)
+    for seed, matrix in (((1.0, 0.0, 0.0), m.stiffness()), ((0.0, 0.0, 1.0), m.mass())):
+        found = -m.slope(m.rest, still, still, seed, u)
+        assert abs(found - matrix).max() < 1e-12 * abs(matrix).max()
+
+
+def test_one_element_converges_to_the_frequencies_of_a_cantilever():
+    """cos β cosh β = −1. Craig–Bampton converges with the modes: the lower half is a thousandth off at most."""
+    bar = fc.Beam("b", (0, 0, 0), (LENGTH, 0, 0), PLAIN)
+    s = fc.Structure([bar], [fc.Support(bar.start)])
+    places = [((i + 0.2) * math.pi, (i + 0.8) * math.pi) for i in range(4)]
+    roots = np.array([so.brentq(lambda b: math.cos(b) + 1 / math.cosh(b), *place) for place in places])
+    exact = roots**2 / LENGTH**2 * math.sqrt(1e3 / 3.0) / (2 * math.pi)
+
+    def off(count):
+        found = fc.linearize(model(s, fc.ComponentModes(count))).modes().frequencies
+        return np.abs(found[:, None] / exact - 1).min(axis=0)
+
+    few, some, many = off(2), off(4), off(8)
+    assert few[0] < 1e-4
+    assert some[:2].max() < 2e-4
+    assert many.max() < 2e-4
+    assert (many < 0.3 * some).all()
+
+
+def test_clamped_beam_has_its_own_modes_exactly():
+    bar = fc.Beam("b", (0, 0, 0), (LENGTH, 0, 0), PLAIN)
+    s = fc.Structure([bar], [fc.Support(bar.start), fc.Support(bar.end)])
+    found = fc.linearize(model(s, fc.ComponentModes(3))).modes().frequencies
+    roots = np.array([4.730040744862704, 7.853204624095838, 10.995607838001671])  # Blevins 1979, table 8-1
+    exact = np.sort(np.repeat(roots**2 / LENGTH**2 * math.sqrt(1e3 / 3.0) / (2 * math.pi), 2))
+    assert found == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_pull_stiffens_the_modes():
+    """Clamped beam under tension against a fine mesh: geometric stiffness acts on the modes."""
+
+    def lowest(structure, effect):
+        m = model(structure, effect)
+        return fc.linearize(m, at=fc.equilibrium(m, inputs={"pull": 4e3})).modes().frequencies[:4]
+
+    def pulled(elements):
+        bar = fc.Beam("b", (0, 0, 0), (LENGTH, 0, 0), PLAIN, elements=elements)
+        return fc.Structure(
+            [bar], [fc.Support(bar.start), fc.Support(bar.end, "v w rx ry rz")], inputs=[fc.Force("pull", bar.end, "x")]
+        )
+
+    fine, few = lowest(pulled(40), fc.BeamFlexibility()), lowest(pulled(1), fc.ComponentModes(6))
+    assert few == pytest.approx(fine, rel=3e-4)
+    loose = lowest(pulled(1), fc.BeamFlexibility())
+    assert loose[:2] != pytest.approx(fine[:2], rel=0.1)
+
+
+def test_weight_bends_the_modes():
+    """A clamped–clamped beam sags by q L⁴/(384 EI) in its middle, which one element without modes cannot."""
+    bar = fc.Beam("b", (0, 0, 0), (LENGTH, 0, 0), PLAIN)
+    s = fc.Structure([bar], [fc.Support(bar.start), fc.Support(bar.end, "v w rx ry rz")])
+    m = model(s, fc.ComponentModes(9), fc.Gravity())
+    amplitudes = [fc.equilibrium(m).state.q[m.coordinate(f"b_0_z{i}")] for i in range(1, 10)]
+    middle = amplitudes @ clamped_shapes(9, np.array([0.5]))[:, 0]
+    assert middle == pytest.approx(-3.0 * 9.81 * LENGTH**4 / (384 * 1e3), rel=1e-3)
+
+
+def test_energy_is_kept_and_backends_agree():
+    m = model(beam(2), fc.ComponentModes(2), fc.Gravity())
+    runs = [
+        fc.simulate(machine, until=0.2, method=fc.GeneralizedAlpha(5e-4, 1.0), every=0.01)
+        for machine in (m, m.with_(backend=fc.Compiled()))
+    ]
+    assert all(run.report.energy_residual < 1e-4 for run in runs)
+    assert runs[0]["z"] == pytest.approx(runs[1]["z"], abs=1e-8)
+
+
+def test_turning_the_machine_turns_its_motion():
+    """Frame invariance: the same cantilever with its axes and gravity turned together."""
+    turn = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()
+
+    def hung(R):
+        b = fc.Beam("b", (0, 0, 0), R @ (3.0, 0.0, 0.0), SECTION, up=R @ (0.0, 0.0, 1.0))
+        tip = fc.PointMass("tip", b.end, 2.0)
+        s = fc.Structure([b, tip], [fc.Support(b.start), fc.Pin(b.end, tip.node)])
+        m = model(s, fc.ComponentModes(2), fc.Gravity(R @ (0.0, -3.0, -9.0)))
+        rest = fc.equilibrium(m)
+        return rest.state.x[1], rest.state.q[-4:], fc.linearize(m, at=rest).modes().frequencies
+
+    (x, amplitudes, frequencies), (turned, same, also) = hung(np.eye(3)), hung(turn)
+    assert turn @ x == pytest.approx(turned, abs=1e-9)
+    assert amplitudes == pytest.approx(same, abs=1e-9)
+    assert frequencies == pytest.approx(also, rel=1e-7)
+
+
+def test_few_modes_follow_a_fine_mesh_through_large_motion():
+    def swing(elements, effect):
+        m = model(beam(elements, held="u v w rx rz"), effect, fc.Gravity(), backend=fc.Compiled())
+        return fc.simulate(m, until=1.0, method=fc.GeneralizedAlpha(1e-3, 0.9), every=0.01)["z"]
+
+    fine, few = swing(16, fc.BeamFlexibility()), swing(2, fc.ComponentModes(2))
+    assert np.ptp(fine) > 2.0
+    assert np.abs(few - fine).max() < 1e-4 * np.ptp(fine)
+
+
+def test_coarsening_keeps_the_nodes_in_use():
+    b = fc.Beam("b", (0, 0, 0), (8, 0, 0), SECTION, elements=8)
+    load = fc.PointMass("load", b.node(6), 1.0)
+    s = fc.Structure(
+        [b, load], [fc.Support(b.start), fc.Pin(b.node(6), load.node)], outputs=[fc.Position("x", b.node(2), "x")]
+    )
+    coarse = fc.coarsen(s)
+    assert coarse.elements[0].elements == 4
+    assert coarse.outputs[0].at.position == (2.0, 0.0, 0.0)
+    assert str(fc.refine(coarse, 2).join_table) == str(s.join_table)
+
+
+def test_what_cannot_be_is_refused():
+    shearing = fc.Section(EA=1e7, EI_y=2e3, EI_z=1e3, GJ=8e2, rhoA=3.0, rhoJ=0.01, GA_y=1e5, GA_z=1e5)
+    with pytest.raises(StructureError, match="section of beam 'b' shears"):
+        model(beam(1, shearing), fc.ComponentModes(2))
+    with pytest.raises(StructureError, match="whole number from 0 to 10"):
+        fc.ComponentModes(2.5)
+    with pytest.raises(StructureError, match="did you mean 'b'"):
+        fc.coarsen(beam(2), of=["bb"])
