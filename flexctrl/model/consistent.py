@@ -77,7 +77,7 @@ def breaches(model: Model, state: State) -> Iterator[Breach]:
     Breach
     """
     nodes, motion, size = model.structure.nodes, model.motion, model.structure.size
-    size = max(size, float(np.abs(model.rest.x).max()))
+    size = max(size, *(float(np.abs(x).max()) for x in (model.rest.x, state.x)))
     labels = [*map(str, nodes), "the ground"]
     off = np.abs(state.x - _expected(motion, state))
     yield _worst(off.max(axis=1) / size, lambda i: f"{labels[i]} is {off[i].max():.3g} m from where it is tied")
