@@ -32,11 +32,6 @@ class Resolvent:
         """Eigenvalues of A, shape (n,)."""
         return self.T if self.T.ndim == 1 else self.T.diagonal()
 
-    def largest(self, mu: np.ndarray) -> np.ndarray:
-        """max |μ/(μ − pole)|, at least 1; shape (N,)."""
-        nearest = np.abs(mu[:, None] - self.poles).min(axis=1, initial=np.inf)
-        return np.maximum(1.0, np.abs(mu) / np.maximum(nearest, np.finfo(float).tiny))
-
     def solve(self, rhs: np.ndarray, mu: np.ndarray) -> np.ndarray:
         """(μ − A)⁻¹ rhs for each μ.
 

@@ -1,4 +1,4 @@
-"""Responses of large models whatever damps them: a small space that holds the answer, its error bounded at each s."""
+"""Responses of large models whatever damps them: a small space that holds the answer, its error estimated at each s."""
 
 from __future__ import annotations
 
@@ -28,11 +28,12 @@ def sampled_transfer(base: Scaled, modes: Callable[[], Modes], top: float) -> Ca
     """Galerkin projection on modes, static solutions and solutions at some s, until the error is small at all s.
 
     The space starts with the modes given and P⁻¹ B, P = sym(K + a C + a² M), a > 0. For each s asked for, the
-    residual r = B − (K + s C + s² M) x is known from its share in a few fixed vectors, and with it
-    |Δ(c x)| ≤ |c|_P⁻¹ · |P^½ (K + s C + s² M)⁻¹ P^½| · |r|_P⁻¹ (the middle factor taken within the space). Where
-    this exceeds 2e-10 of |H|, the worst s are solved by sparse factors and join the space (a rational Krylov space
-    with greedy points: S. Gugercin, A. Antoulas, C. Beattie, SIAM J. Matrix Anal. Appl. 30 (2008) 609–638; bounds
-    as in reduced-basis methods: G. Rozza, D. Huynh, A. Patera, Arch. Comput. Methods Eng. 15 (2008) 229–275).
+    residual r = B − (K + s C + s² M) x is known from its share in a few fixed vectors. It is orthogonal to the space;
+    its effect on an output c is what P⁻¹ r makes the space do through C and M, solved for, and at most
+    2 |c|_P⁻¹ |r|_P⁻¹ outside of it, where no pole is near. Where this exceeds 2e-10 of |H|, the worst s are solved by
+    sparse factors and join the space (a rational Krylov space with greedy points: S. Gugercin, A. Antoulas,
+    C. Beattie, SIAM J. Matrix Anal. Appl. 30 (2008) 609–638; errors as in reduced-basis methods: G. Rozza, D. Huynh,
+    A. Patera, Arch. Comput. Methods Eng. 15 (2008) 229–275).
     What a space of 400 vectors does not bring under the bound is solved one by one; so are a few s alone.
 
     Parameters

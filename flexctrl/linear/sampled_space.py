@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 import scipy.linalg as la
@@ -23,6 +24,9 @@ DEPENDENT = 1e-12
 NOTHING = 1e-13
 CHUNK = 1000
 TINY = float(np.finfo(float).tiny)
+OUTSIDE = 2.0
+
+Faces: TypeAlias = "tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +37,14 @@ class Metric:
     ----------
     model : LinearModel
     a : float
-    A, C, M : scipy.sparse.csc_matrix
+    A, C, M, skew : scipy.sparse.csc_matrix
+        The last is A − P.
     inverse : callable
         P⁻¹.
     root : callable
         W.
-    reach : tuple of two numpy.ndarray, shape (n_outputs,)
-        √(c P⁻¹ cᵀ) of the rows of Cq and Cv.
+    rows : tuple of two numpy.ndarray, shape (n, n_outputs)
+        W P⁻¹ of the rows of Cq and Cv.
     """
 
     model: LinearModel
@@ -47,9 +52,10 @@ class Metric:
     A: sp.csc_matrix
     C: sp.csc_matrix
     M: sp.csc_matrix
+    skew: sp.csc_matrix
     inverse: Callable[[np.ndarray], np.ndarray]
     root: Callable[[np.ndarray], np.ndarray]
-    reach: tuple[np.ndarray, np.ndarray]
+    rows: tuple[np.ndarray, np.ndarray]
 
 
 def metric_of(model: LinearModel, a: float) -> Metric | None:
@@ -82,8 +88,11 @@ def metric_of(model: LinearModel, a: float) -> Metric | None:
         x = lu.solve(rhs)
         return np.asarray(x + lu.solve(rhs - P @ x))
 
-    reach = tuple(np.sqrt(np.maximum(np.einsum("pn,np->p", c, inverse(c.T.copy())), 0.0)) for c in (model.Cq, model.Cv))
-    return Metric(model, a, A, sp.csc_matrix(C + 2.0 * a * M), M, inverse, lambda x: W @ x[order], (reach[0], reach[1]))
+    def root(x: np.ndarray) -> np.ndarray:
+        return np.asarray(W @ x[order])
+
+    rows = root(inverse(model.Cq.T.copy())), root(inverse(model.Cv.T.copy()))
+    return Metric(model, a, A, sp.csc_matrix(C + 2.0 * a * M), M, sp.csc_matrix(A - P), inverse, root, rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +109,7 @@ class Space:
     Z : numpy.ndarray, shape (n, m + 3k)
         Orthonormal.
     faces : tuple of numpy.ndarray
-        W P⁻¹ of A V, C V, M V and B in terms of Z.
+        W V, and W P⁻¹ of (A − P) V, C V, M V and B, in terms of Z.
     dust : numpy.ndarray, shape (k,)
         |A V|_P⁻¹ if every entry of A is wrong by rounding: no solver leaves less.
     """
@@ -110,7 +119,7 @@ class Space:
     WV: np.ndarray
     images: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
     Z: np.ndarray
-    faces: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+    faces: Faces
     dust: np.ndarray
 
     @cached_property
@@ -148,14 +157,26 @@ class Space:
 
     def _few(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         model, z = self.metric.model, s - self.metric.a
+        Cq, Cv = model.Cq @ self.V, model.Cv @ self.V
         with np.errstate(all="ignore"):
-            y = _times(self.turn, _solved(self, z))
-            H = _times(model.Cq @ self.V, y) + _times(model.Cv @ self.V, y) * s + model.D[:, :, None]
+            y = _times(self.turn, _solved(self, z, _times(self.turn.T, self.images[3][:, :, None])))
+            H = _times(Cq, y) + _times(Cv, y) * s + model.D[:, :, None]
+            left = _residual(self, z, y)
+            size = np.linalg.norm(left, axis=0)
+            inside = _times(self.turn, _solved(self, z, _times(self.turn.T, _coupled(self, z, left))))
+            far = self.reach[0][:, None] + np.abs(s) * self.reach[1][:, None]
+            error = np.abs(_times(Cq, inside) + _times(Cv, inside) * s) + OUTSIDE * far[:, None, :] * size
+            miss = (error / np.maximum(ACCURACY * np.abs(H), TINY)).max(axis=0, initial=0.0)
             dust = np.sqrt(np.einsum("k,kmn->mn", self.dust**2, np.abs(y) ** 2))
-            reach = self.metric.reach[0][:, None] + np.abs(s) * self.metric.reach[1][:, None]
-            allowed = ACCURACY * np.abs(H) / (reach * self.inner.largest(1.0 / z) + TINY)[:, None, :]
-            seen = np.where(reach[:, None, :] > 0, allowed, np.inf).min(axis=0, initial=np.inf)
-            return H, (_residuals(self, z, y) / np.maximum(seen, dust)).max(axis=0)
+            return H, np.minimum(miss, size / dust).max(axis=0)
+
+    @cached_property
+    def reach(self) -> tuple[np.ndarray, np.ndarray]:
+        """√(c P⁻¹ cᵀ) of the rows of Cq and Cv, without what lies in the span of V."""
+        rows = (self.metric.model.Cq, self.metric.model.Cv)
+        rest = (W - self.WV @ (c @ self.V).T for W, c in zip(self.metric.rows, rows, strict=True))
+        lengths = [np.linalg.norm(x, axis=0) for x in rest]
+        return lengths[0], lengths[1]
 
 
 def started(metric: Metric, shapes: np.ndarray) -> Space:
@@ -175,7 +196,7 @@ def started(metric: Metric, shapes: np.ndarray) -> Space:
     none, square = np.zeros((n, 0)), np.zeros((0, 0))
     Z, R = np.linalg.qr(metric.root(still))
     flat = np.zeros((len(R), 0))
-    images, faces = (square, square, square, np.zeros((0, m))), (flat, flat, flat, R)
+    images, faces = (square, square, square, np.zeros((0, m))), (flat, flat, flat, flat, R)
     space = Space(metric, none, none, images, Z, faces, np.zeros(0))
     return grown(space, np.hstack([shapes, still, metric.inverse(metric.M @ still), metric.inverse(metric.C @ still)]))
 
@@ -200,7 +221,8 @@ def grown(space: Space, vectors: np.ndarray) -> Space:
         np.block([[old, space.V.T @ move], [new.T @ (X @ space.V), new.T @ move]])
         for old, X, move in zip(space.images[:3], (metric.A, metric.C, metric.M), moved, strict=True)
     ]
-    Z, faces = _extended(space, metric.root(metric.inverse(np.hstack(moved))), width)
+    forces = np.hstack([metric.skew @ new, *moved[1:]])
+    Z, faces = _extended(space, np.hstack([Wnew, metric.root(metric.inverse(forces))]), width)
     signs = np.random.default_rng(V.shape[1]).choice([-1.0, 1.0], new.shape)
     dust = np.linalg.norm(metric.root(metric.inverse(ROUNDING * signs * (abs(metric.A) @ np.abs(new)))), axis=0)
     force = np.vstack([space.images[3], new.T @ metric.model.B])
@@ -226,10 +248,8 @@ def _fresh(space: Space, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x, space.metric.root(x)
 
 
-def _extended(
-    space: Space, columns: np.ndarray, width: int
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Z with room for more columns, and the faces with these: A, C and M side by side, each `width` wide."""
+def _extended(space: Space, columns: np.ndarray, width: int) -> tuple[np.ndarray, Faces]:
+    """Z with room for more columns, and the faces with these: all but that of B side by side, each `width` wide."""
     length = _lengths(columns)
     Z, R, known = columns / length, np.eye(length.size), np.zeros((space.Z.shape[1], length.size))
     for _ in range(3):
@@ -240,8 +260,8 @@ def _extended(
         Z, R = Z[:, :rank], step[:rank, np.argsort(pivot)] @ R
     added = np.vstack([known, R]) * length
     old = [np.vstack([face, np.zeros((len(R), face.shape[1]))]) for face in space.faces]
-    A, C, M = (np.hstack([old[i], added[:, i * width : (i + 1) * width]]) for i in range(3))
-    return np.hstack([space.Z, Z]), (A, C, M, old[3])
+    V, skew, C, M = (np.hstack([old[i], added[:, i * width : (i + 1) * width]]) for i in range(4))
+    return np.hstack([space.Z, Z]), (V, skew, C, M, old[4])
 
 
 def _first_order(A: np.ndarray, C: np.ndarray, M: np.ndarray) -> Resolvent:
@@ -252,22 +272,31 @@ def _first_order(A: np.ndarray, C: np.ndarray, M: np.ndarray) -> Resolvent:
     return resolvent(np.block([[np.zeros((k, k)), np.diag(m)], [-coupled[:, :k], -coupled[:, k:]]]))
 
 
-def _solved(space: Space, z: np.ndarray) -> np.ndarray:
-    """y of shape (k, n_inputs, N), with a step of refinement."""
-    A, C, M, b = space.reduced
+def _solved(space: Space, z: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """y of shape (k, n_inputs, N) in turned coordinates, for forces b on these, with a step of refinement."""
+    A, C, M, _ = space.reduced
     inverse, mu = np.linalg.inv(A), 1.0 / z
-    y = np.zeros((*b.shape, z.size), dtype=complex)
+    y = np.zeros((*b.shape[:2], z.size), dtype=complex)
     for _ in range(2):
-        rest = b[:, :, None] - _times(A, y) - z * _times(C, y) - z**2 * _times(M, y)
+        rest = b - _times(A, y) - z * _times(C, y) - z**2 * _times(M, y)
         y = y + mu * space.inner.solve(np.concatenate([np.zeros_like(rest), _times(inverse, rest)]), mu)[len(A) :]
     return y
 
 
-def _residuals(space: Space, z: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """|r|_P⁻¹, shape (n_inputs, N)."""
-    A, C, M, B = space.faces
-    left = B[:, :, None] - _times(A, y) - z * _times(C, y) - z**2 * _times(M, y)
-    return np.asarray(np.linalg.norm(left, axis=0))
+def _residual(space: Space, z: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """r in terms of Z, so that its length is |r|_P⁻¹; shape (columns of Z, n_inputs, N).
+
+    What it seems to have along V is rounding, and large where V is soft.
+    """
+    V, skew, C, M, B = space.faces
+    left = B[:, :, None] - _times(V + skew, y) - z * _times(C, y) - z**2 * _times(M, y)
+    return np.asarray(left - _times(V, _times(V.T, left)))
+
+
+def _coupled(space: Space, z: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """How P⁻¹ r, which is P-orthogonal to V, pushes V through the other terms of A(s); shape (k, n_inputs, N)."""
+    _, skew, C, M, _ = space.faces
+    return np.asarray(_times(skew.T, left) + z * _times(C.T, left) + z**2 * _times(M.T, left))
 
 
 def _lengths(columns: np.ndarray) -> np.ndarray:
