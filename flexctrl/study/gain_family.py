@@ -215,8 +215,8 @@ def _touched(A: np.ndarray, B: np.ndarray, C: np.ndarray, blocks: tuple[slice, .
     return np.concatenate(found) if found else np.zeros(0, dtype=int)
 
 
-def first_crossing(family: GainFamily, start: float, most: float) -> Crossing | None:
-    """Return the first gain above ``start`` at which a pole leaves the stable region; None up to ``most``.
+def first_crossing(family: GainFamily, start: float, end: float) -> Crossing | None:
+    """Return the first gain on the way from ``start`` to ``end`` at which a pole leaves the stable region, or None.
 
     Between two gains every pole is followed as a cubic with the right ends and slopes; the interval is halved
     while such a curve, or its uncertainty, reaches the boundary, so that a mode which is unstable over a short
@@ -227,15 +227,17 @@ def first_crossing(family: GainFamily, start: float, most: float) -> Crossing | 
     family : GainFamily
     start : float
         Where the loop is stable.
-    most : float
+    end : float
+        Positive; above or below ``start``.
 
     Returns
     -------
     Crossing or None
     """
     before = family.at(start)
-    while before.gain < most:
-        after = family.at(min(most, _RATIO * before.gain))
+    while before.gain != end:
+        on = min(end, _RATIO * before.gain) if end > start else max(end, before.gain / _RATIO)
+        after = family.at(on)
         for a, b in _brackets(family, before, after, _HALVINGS):
             return _refined(family, a, b)
         before = after
@@ -243,7 +245,7 @@ def first_crossing(family: GainFamily, start: float, most: float) -> Crossing | 
 
 
 def _brackets(family: GainFamily, a: Spectrum, b: Spectrum, halvings: int) -> Iterator[tuple[Spectrum, Spectrum]]:
-    """Yield, in order, intervals at whose upper end the loop is unstable."""
+    """Yield, in order, intervals at whose far end the loop is unstable."""
     if b.stable and not _may_cross(a, b):
         return
     if halvings:
@@ -270,16 +272,16 @@ def _may_cross(a: Spectrum, b: Spectrum) -> bool:
 
 def _refined(family: GainFamily, a: Spectrum, b: Spectrum) -> Crossing:
     """Newton's method on the depth of the pole that is beyond the boundary at b, kept inside the bracket."""
-    low, high, here, pole = a.gain, b.gain, b, b.worst
+    stable, unstable, here, pole = a.gain, b.gain, b, b.worst
     for _ in range(60):
         if here.depth[pole] > 0.0:
-            high = here.gain
+            unstable = here.gain
         else:
-            low = here.gain
+            stable = here.gain
         slope = here.slope[pole]
-        gain = here.gain - here.depth[pole] / slope if slope else low
-        if not low < gain < high:
-            gain = 0.5 * (low + high)
+        gain = here.gain - here.depth[pole] / slope if slope else stable
+        if not min(stable, unstable) < gain < max(stable, unstable):
+            gain = 0.5 * (stable + unstable)
         guess = here.poles[pole] + (gain - here.gain) * here.drift[pole]
         step = abs(gain - here.gain)
         here, pole = family.near(gain, guess)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Spillover", "spillover"]
 
-_DOWN = 1.4
+_RATIO = np.log(1.4)
 _BRANCH = 60
 
 
@@ -38,10 +38,13 @@ class Spillover:
     Attributes
     ----------
     gain : float
-        Critical factor k* on the loop gain: stable below, unstable just above. Infinite if the loop stays
-        stable up to ``searched[1]``, 0 if it is unstable at all gains down to ``searched[0]``.
+        Critical factor k* on the loop gain: stable just below, unstable just above. Infinite if the loop stays
+        stable up to ``searched[1]``, 0 if no stable gain was found.
+    lower : float
+        The loop is stable from here up to ``gain``, and unstable just below: 0 if it stays stable down to
+        ``searched[0]``. A machine that falls over by itself needs some gain.
     mode : CriticalMode or None
-        None if nothing goes unstable. At gain 0 the worst mode at the controller's own gain.
+        What goes unstable at ``gain``; None if nothing does. At gain 0 the worst mode at the controller's own gain.
     rigid_gain : float or None
         The same critical gain on the rigid twin; None if the plant was a linear model.
     searched : tuple of float
@@ -61,6 +64,7 @@ class Spillover:
     """
 
     gain: float
+    lower: float
     mode: CriticalMode | None
     rigid_gain: float | None
     searched: tuple[float, float]
@@ -75,7 +79,7 @@ class Spillover:
     @property
     def stable(self) -> bool:
         """Whether the machine is stable under the controller as it is."""
-        return self.gain > 1.0
+        return self.lower < 1.0 < self.gain
 
     def confirm(self, margin: float = 0.02) -> Confirmation:
         """Run the nonlinear machine just below and above the critical gain; see `flexctrl.study.confirm.confirm`.
@@ -109,14 +113,21 @@ class Spillover:
         return "\n".join([f"{self.linear.name} {self._verdict()}", *self._twin()])
 
     def _verdict(self) -> str:
-        if self.mode is None:
-            return f"stays stable up to {self.searched[1]:.4g} × the controller's gain"
-        where = _where(self.mode)
+        where = _where(self.mode) if self.mode is not None else ""
         if self.gain == 0.0:
-            return f"is unstable at every gain down to {self.searched[0]:.3g} × the controller's, {where}"
+            low, high = self.searched
+            return f"is unstable at every gain from {low:.3g} to {high:.4g} × the controller's, {where}"
+        if self.lower >= 1.0:
+            return f"is unstable: it needs {self.lower:.4g} × the controller's gain{self._beyond(where)}"
+        below = f"; below {self.lower:.4g} × it is unstable too" if self.lower else ""
+        if self.mode is None:
+            return f"stays stable up to {self.searched[1]:.4g} × the controller's gain{below}"
         if self.gain < 1.0:
-            return f"is unstable: it bears only {self.gain:.4g} × the controller's gain; beyond, it oscillates {where}"
-        return f"goes unstable at {self.gain:.4g} × the controller's gain, {where}"
+            return f"is unstable: it bears only {self.gain:.4g} × the controller's gain; beyond, it goes {where}{below}"
+        return f"goes unstable at {self.gain:.4g} × the controller's gain, {where}{below}"
+
+    def _beyond(self, where: str) -> str:
+        return f", and bears no more than {self.gain:.4g} ×; beyond, it goes {where}" if where else ""
 
     def _twin(self) -> list[str]:
         if self.rigid_gain is None:
@@ -158,7 +169,8 @@ def spillover(
 
     The loop gain is scaled from the controller's own (1) up until an eigenvalue of the closed loop leaves the
     stable half plane (the unit circle under a sampled controller, with the machine sampled exactly); if the loop
-    is unstable at 1, from the first stable gain below. Modes are followed from gain to gain by their eigenvalues
+    is unstable at 1, from the first stable gain below, or else above. The scan goes down from there too, for
+    machines that are stable under some gain only. Modes are followed from gain to gain by their eigenvalues
     and slopes, and the critical gain is finished by Newton's method.
 
     Parameters
@@ -200,19 +212,25 @@ def _rigid_gain(model: Model, law: LinearController, u: np.ndarray, searched: tu
     twin = rigid(model)
     assert isinstance(twin, Model)
     rest = equilibrium(twin, inputs=dict(zip(model.inputs, u.tolist(), strict=True)))
-    return _critical(gain_family(linearize(twin, at=rest), law), searched)[0]
+    return _critical(gain_family(linearize(twin, at=rest), law), searched)[1]
 
 
-def _critical(family: GainFamily, searched: tuple[float, float]) -> tuple[float, Crossing | None]:
-    """Critical gain and its crossing; for a loop that is never stable, its worst pole at gain 1."""
+def _critical(family: GainFamily, searched: tuple[float, float]) -> tuple[float, float, Crossing | None]:
+    """Ends of the stable interval and the crossing at the upper; for no such interval, the worst pole at gain 1."""
+    inside = _stable_gain(family, searched)
+    if not inside:
+        first = family.at(1.0)
+        return 0.0, 0.0, Crossing(first, first.worst)
+    lower, upper = (first_crossing(family, inside, end) for end in searched)
+    return 0.0 if lower is None else lower.gain, np.inf if upper is None else upper.gain, upper
+
+
+def _stable_gain(family: GainFamily, searched: tuple[float, float]) -> float:
+    """The first stable gain from 1 on downwards, then upwards; 0 if there is none."""
     least, most = searched
-    gain, first = 1.0, family.at(1.0)
-    while not family.at(gain).stable:
-        gain /= _DOWN
-        if gain < least:
-            return 0.0, Crossing(first, first.worst)
-    found = first_crossing(family, gain, most)
-    return (np.inf, None) if found is None else (found.gain, found)
+    down = np.append(np.exp(-np.arange(0.0, -np.log(least), _RATIO)), least)
+    up = np.append(np.exp(np.arange(_RATIO, np.log(most), _RATIO)), most)
+    return next((float(gain) for gain in (*down, *up) if family.at(gain).stable), 0.0)
 
 
 def _certificate(
@@ -225,13 +243,13 @@ def _certificate(
     twin: float | None,
 ) -> Spillover:
     family = gain_family(linear, law)
-    gain, crossing = _critical(family, searched)
+    lower, gain, crossing = _critical(family, searched)
     empty = np.zeros(0)
     if crossing is None:
-        return Spillover(gain, None, twin, searched, empty, empty, linear, law, plant, at, u)
+        return Spillover(gain, lower, None, twin, searched, empty, empty, linear, law, plant, at, u)
     gains, branch = _branch(family, crossing, searched)
     mode = critical_mode(linear, law, family, crossing, complex(np.interp(1.0, gains, branch)))
-    return Spillover(gain, mode, twin, searched, gains, branch, linear, law, plant, at, u)
+    return Spillover(gain, lower, mode, twin, searched, gains, branch, linear, law, plant, at, u)
 
 
 def _branch(family: GainFamily, crossing: Crossing, searched: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
