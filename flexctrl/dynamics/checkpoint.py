@@ -21,7 +21,7 @@ from flexctrl.model.model import Model
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
 
-_FORMAT = 1
+_FORMAT = 2
 _HOUSE = "flexctrl."
 
 

@@ -175,6 +175,7 @@ def _begun(
     model, pace = plan.model, plan.method.pace
     state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
     size = pace.step if isinstance(pace, Fixed) else min(pace.first, pace.largest)
+    state = model.motion.counted(state) if isinstance(model, Model) else state
     supply = plan.feed.first(state)
     state = model.switches.begin(state, supply.u)
     try:

@@ -113,7 +113,7 @@ class Chart:
         for _ in range(_CLOSINGS if self.motion.linkage.loops else 0):
             moved = self.motion.advance(moved, np.zeros_like(xi), xi, t)
         driven = self.motion.unwound(moved.x, moved.R, self.reference.driven + self._turning @ xi)
-        return State(moved.x, moved.R, moved.q[: self.model.n], v, driven, t, moved.dry)
+        return State(moved.x, moved.R, moved.q[: self.model.n], v, driven, t, moved.dry, moved.shown)
 
     def rate(self, xi: np.ndarray, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Return how fast the coordinates change, and what the chart's own turning adds to the accelerations.

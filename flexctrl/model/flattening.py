@@ -75,11 +75,16 @@ class Flattened:
         f.z[: forces.slot_count] = forces.slots(state, state.v, still)
         f.pose.reshape(-1, 12)[:] = np.hstack([state.x, state.R.reshape(-1, 9)])
         f.q[:], f.driven[:] = self.ordered(state.q), state.driven
+        self.gauges.shown[:], self.gauges.summed[:] = state.shown, self.model.motion.winding @ state.q
         f.step[:], f.v[:], f.rate[:] = 0.0, self.ordered(state.v), 0.0
 
     def state(self, v: np.ndarray, t: float) -> State:
-        """Return the state at the start of the step, with rates ``v`` in the order of elimination."""
-        return self.pose_state(self.flat.pose, self.flat.q, v, self.flat.driven, t)
+        """Return the state at the start of the step, with rates ``v`` in the order of elimination.
+
+        Its outputs have been read.
+        """
+        found = self.pose_state(self.flat.pose, self.flat.q, v, self.flat.driven, t)
+        return replace(found, shown=self.gauges.shown.copy())
 
     def pose_state(self, pose: np.ndarray, q: np.ndarray, v: np.ndarray, driven: np.ndarray, t: float) -> State:
         """Return the state of a pose (12 a node) and values in the order of elimination."""
@@ -180,7 +185,8 @@ class _Layout:
             **self._tables,
             **self._runs,
         )
-        gauges = replace(self._gauges, sums=np.zeros(self._gauges.rows))
+        shown, summed = np.zeros((2, self._gauges.turning))
+        gauges = replace(self._gauges, sums=np.zeros(self._gauges.rows), shown=shown, summed=summed)
         return Flattened(self.model, flat, gauges, self._axes, self.plan, self.pattern[:2])
 
     @cached_property

@@ -59,8 +59,10 @@ class Gauges:
     angles : Wholes
         Angles of two sums: output, opposite, adjacent.
     turns : Wholes
-        Rotations: output, slot of the node's rotation, of the base's, and a sum that is about as large.
+        Rotations: output, slot of the node's rotation, of the base's, and a sum that grows about as much.
     axes : Reals
+    shown, summed : Reals
+        Rotations, and these sums, when they were last read.
     tensions : Runs
     """
 
@@ -79,11 +81,13 @@ class Gauges:
     angles: Wholes
     turns: Wholes
     axes: Reals
+    shown: Reals
+    summed: Reals
     tensions: Runs
 
 
 def read(g: Gauges, z: Reals, y: Reals) -> None:
-    """Read all outputs."""
+    """Read all outputs; angles not far from where they were last."""
     for i in range(g.rows):
         total = 0.0
         for k in range(g.starts[i], g.starts[i + 1]):
@@ -99,7 +103,10 @@ def read(g: Gauges, z: Reals, y: Reals) -> None:
         y[g.angles[3 * k]] = math.atan2(g.sums[g.angles[3 * k + 1]], g.sums[g.angles[3 * k + 2]])
     for k in range(g.turning):
         at = g.turns[4 * k :]
-        y[at[0]] = turned(z[at[1] :], z[at[2] :], g.axes[3 * k :], g.sums[at[3]])
+        about = g.shown[k] + g.sums[at[3]] - g.summed[k]
+        g.shown[k] = turned(z[at[1] :], z[at[2] :], g.axes[3 * k :], about)
+        g.summed[k] = g.sums[at[3]]
+        y[at[0]] = g.shown[k]
 
 
 def turned(R: Reals, base: Reals, axis: Reals, about: float) -> float:
@@ -152,6 +159,7 @@ class _Builder:
         self.plain: list[tuple[int, int]] = []
         self.angles: list[tuple[int, int, int]] = []
         self.turns: list[tuple[int, int, int, int]] = []
+        self.twists = iter(zip(model.motion.twists.axes, model.motion.winding, strict=True))
         self.axes: list[np.ndarray] = []
         self.gaps = gaps_of(model.effects)
         self.winches: list[tuple[int, Winch]] = []
@@ -196,10 +204,8 @@ class _Builder:
     def _rotation(self, i: int, output: Rotation) -> None:
         at = self.s.number(output.at)
         base = len(self.s.nodes) if output.minus is None else self.s.number(output.minus)
-        T, axis = self.model.motion.jacobian(self.model.motion.rest), np.array(output.direction)
-        turning = axis @ (T[6 * at + 3 : 6 * at + 6] - T[6 * base + 3 : 6 * base + 6]).toarray()
-        own = np.flatnonzero(turning)
-        about = self._sum(self.q_start + self.position[own], turning[own])
+        axis, winding = next(self.twists)
+        about = self._sum(self.q_start + self.position[winding.indices], winding.data)
         self.turns.append((i, NODE_SLOT * at + 3, NODE_SLOT * base + 3, about))
         self.axes.append(axis)
 
@@ -223,6 +229,8 @@ class _Builder:
             angles=np.array(self.angles, dtype=int).ravel(),
             turns=np.array(self.turns, dtype=int).ravel(),
             axes=np.concatenate([empty, *self.axes]),
+            shown=np.zeros(len(self.turns)),
+            summed=np.zeros(len(self.turns)),
             tensions=runs,
         )
 

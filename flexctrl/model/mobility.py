@@ -14,6 +14,7 @@ from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.linkage import Link, Linkage, Loop, renumbered
 from flexctrl.model.motion import Dry, Motion, State
+from flexctrl.model.twists import Twists
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis
@@ -101,6 +102,7 @@ def _motion(
     sources = number[np.array([after.get(d.name, len(names)) for d in structure.drives], dtype=int)]
     last = iter(range(len(own), len(names)))
     linkage, nodes, linked = _linkage(structure, ties, elastic, x, open_place, loops)
+    twists = Twists.of(structure)
     return Motion(
         names=tuple(names[i] for i in kept),
         place=number[open_place],
@@ -110,8 +112,11 @@ def _motion(
         linkage=linkage,
         nodes=nodes,
         linked=number[linked],
-        rest=State(x, R, zero, zero, np.zeros(len(structure.drives)), dry=Dry.loose(len(inner))),
+        rest=State(
+            x, R, zero, zero, np.zeros(len(structure.drives)), 0.0, Dry.loose(len(inner)), np.zeros(len(twists))
+        ),
         notes=loops.notes,
+        twists=twists,
         inner=number[np.array([next(last) if i.name else len(names) for i in inner], dtype=int)],
         effects=inner,
     )

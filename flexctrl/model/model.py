@@ -306,7 +306,8 @@ class Model:
         q = state.q + step
         raw = (self.motion.jacobian(self.rest) @ q)[: self.motion.source_base].reshape(-1, 6)
         x, R = self.rest.x + raw[:, :3], exponential(raw[:, 3:]) @ self.rest.R
-        return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t, state.dry)
+        shown = self.motion.shown(self.rest.shown, q, R)
+        return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t, state.dry, shown)
 
     def rates(self, state: State) -> np.ndarray:
         """Return the raw rates of a state: velocities and spins of all nodes, then the speeds of the motors.

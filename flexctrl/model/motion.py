@@ -18,6 +18,7 @@ from flexctrl.effects.effect import Inner
 from flexctrl.kernels.kernel import Backend, Run
 from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.linkage import Linkage, reciprocal_condition
+from flexctrl.model.twists import Twists
 from flexctrl.structure.drives import Drive, RotaryDrive
 
 DENSE_UP_TO = 60
@@ -68,6 +69,8 @@ class State:
         Time [s].
     dry : Dry
         What dry contacts do.
+    shown : numpy.ndarray, shape (angles,)
+        What each `Rotation` output shows, turns included [rad].
     """
 
     x: np.ndarray
@@ -77,6 +80,7 @@ class State:
     driven: np.ndarray
     t: float = 0.0
     dry: Dry = field(default_factory=lambda: Dry.loose(0))
+    shown: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def with_(self, *, v: np.ndarray | None = None, t: float | None = None, dry: Dry | None = None) -> State:
         """Return a copy at another time, with other rates or other contacts.
@@ -132,6 +136,8 @@ class Motion:
         Number of each inner freedom's degree of freedom; ``n`` for those that have only a phase.
     effects : tuple of Inner
         What the inner freedoms are.
+    twists : Twists
+        The angles that outputs show.
     """
 
     names: tuple[str, ...]
@@ -144,6 +150,7 @@ class Motion:
     linked: np.ndarray
     rest: State
     notes: tuple[str, ...]
+    twists: Twists
     inner: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     effects: tuple[Inner, ...] = ()
 
@@ -244,7 +251,27 @@ class Motion:
             pose = self.linkage.placed(self._pose(state.x, state.R), step[self.linked])
             x[self.nodes] = pose.reshape(-1, 12)[:, :3]
             R[self.nodes] = orthonormal(pose.reshape(-1, 4, 3)[:, 1:])
-        return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t, state.dry)
+        shown = self.shown(state.shown, step, R)
+        return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t, state.dry, shown)
+
+    def shown(self, before: np.ndarray, step: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Return the angles of outputs after a step to rotations R, from those before."""
+        return self.twists.next_to(before + self.winding @ step, R) if len(self.twists) else before
+
+    def counted(self, state: State) -> State:
+        """Return a state made elsewhere with the angles of outputs next to those it shows, or else to its sums."""
+        about = state.shown if state.shown.size == len(self.twists) else self.winding @ state.q
+        return replace(state, shown=self.twists.next_to(about, state.R))
+
+    @cached_property
+    def winding(self) -> sp.csr_matrix:
+        """About what a step of the degrees of freedom adds to the angles of outputs: it tells whole turns apart."""
+        T, twists = self.jacobian(self.rest), self.twists
+        rows = [
+            sp.csr_matrix(axis) @ (T[6 * at + 3 : 6 * at + 6] - T[6 * base + 3 : 6 * base + 6])
+            for at, base, axis in zip(twists.at, twists.base, twists.axes, strict=True)
+        ]
+        return sp.csr_matrix(sp.vstack(rows)) if rows else sp.csr_matrix((0, self.n))
 
     def _turned(self, R: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Return rotations turned by rotation vectors in space axes."""

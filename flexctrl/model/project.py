@@ -138,6 +138,7 @@ def project(
     asked = _asked(model, wish)
     state = _nearest(asked, _first(model, wish))
     state, wanted = _moving(model, state, wish, velocities or {})
+    state = model.motion.counted(replace(state, shown=wish.shown)) if isinstance(wish, State) else state
     shown = np.unique(np.append(asked.numbers, list(wanted))).astype(int)
     moved, turned, changed = (np.zeros((len(model.structure.nodes), 3)) for _ in range(3))
     moved[asked.numbers] = state.x[asked.numbers] - asked.x

@@ -175,7 +175,7 @@ def _measure(s: Structure, effects: tuple[Effect, ...], motion: Motion, output: 
         line = s.part(output.line)
         return _hoist(s, effects, motion, line) if isinstance(line, Winch) else _tension(s, effects, output)
     if isinstance(output, Rotation):
-        return _rotation(s, motion, output)
+        return _rotation(s, output)
     return _linear(s, output)
 
 
@@ -295,20 +295,15 @@ def _pull(line: Rope | Spring, effects: tuple[Effect, ...]) -> ca.Function:
     return ca.Function("pull", [z], [ca.vertcat(tension, ca.densify(ca.gradient(tension, z)))])
 
 
-def _rotation(s: Structure, motion: Motion, output: Rotation) -> Measure:
+def _rotation(s: Structure, output: Rotation) -> Measure:
     at = s.number(output.at)
     base = len(s.nodes) if output.minus is None else s.number(output.minus)
     axis = np.array(output.direction)
-    T = motion.jacobian(motion.rest)
-    # how many turns: from the summed degrees of freedom as they move the nodes at rest
-    turning = axis @ (T[6 * at + 3 : 6 * at + 6] - T[6 * base + 3 : 6 * base + 6]).toarray()
+    number = [o.name for o in s.outputs if isinstance(o, Rotation)].index(output.name)
     cells = np.concatenate([6 * at + 3 + np.arange(3), 6 * base + 3 + np.arange(3)])
 
     def value(state: State, rates: np.ndarray) -> float:
-        Q = state.R[base].T @ state.R[at]
-        axial = np.array([Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]])
-        angle = float(np.arctan2(axial @ axis, np.trace(Q) - axis @ Q @ axis))
-        return angle + 2.0 * np.pi * float(np.round((turning @ state.q - angle) / (2.0 * np.pi)))
+        return float(state.shown[number])
 
     def slope(state: State, rates: np.ndarray) -> tuple:
         a, b = state.R[base] @ axis, state.R[at] @ axis

@@ -214,9 +214,10 @@ class Velocity:
 class Rotation:
     """Output: a node's angle about an axis [rad], less that of ``minus`` if given.
 
-    The angle is the integral of the angular velocity along the axis: it does not wrap after a
-    turn. Where the axis keeps its direction it is the plain angle of rotation. Across a `Hinge`
-    or drive it is measured about the axis as the ``minus`` side carries it.
+    Where the axis keeps its direction it is the plain angle of rotation, the integral of the angular
+    velocity; it is followed from step to step and does not wrap after a turn. Where the axis tilts, it
+    is the twist that is left when the tilt is undone. Across a `Hinge` or drive it is measured about
+    the axis as the ``minus`` side carries it.
 
     Parameters
     ----------

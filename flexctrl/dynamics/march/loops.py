@@ -229,12 +229,14 @@ def note(m: March) -> None:
     read(m.gauges, f.z, row[1:])
     if m.keeping == 1 or m.t >= m.due:
         nodes = 12 * f.nodes
-        width = nodes + 2 * f.padded + f.drives + 1
+        angles = nodes + 2 * f.padded + f.drives
+        width = angles + m.gauges.turning + 1
         state = m.states[width * m.kept :]
         copy(nodes, f.pose, state)
         copy(f.padded, f.q, state[nodes:])
         copy(f.padded, m.v, state[nodes + f.padded :])
         copy(f.drives, f.driven, state[nodes + 2 * f.padded :])
+        copy(m.gauges.turning, m.gauges.shown, state[angles:])
         state[width - 1] = m.t
         m.kept += 1
         m.due = m.t + m.spacing

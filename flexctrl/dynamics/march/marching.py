@@ -167,8 +167,7 @@ class Marcher:
 
     @cached_property
     def _state_width(self) -> int:
-        f = self.flattened.flat
-        return 12 * f.nodes + 2 * f.padded + f.drives + 1
+        return _state_width(self.flattened)
 
     def entered(self, point: AlphaPoint) -> Marcher:
         """Put a point at the start; return the march."""
@@ -320,16 +319,22 @@ class Marcher:
         q, v = np.empty((2, count, n))
         q[:, F.plan.order] = table[:, nodes : nodes + n]
         v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
-        driven, t = table[:, nodes + 2 * f.padded : width - 1], table[:, width - 1].tolist()
+        driven, shown = np.split(table[:, nodes + 2 * f.padded : width - 1], [f.drives], axis=1)
+        t = table[:, width - 1].tolist()
         R = R.reshape(count, -1, 3, 3)
         dry = self.model.rest.dry
-        return [State(x[i], R[i], q[i], v[i], driven[i], t[i], dry) for i in range(count)]
+        return [State(x[i], R[i], q[i], v[i], driven[i], t[i], dry, shown[i]) for i in range(count)]
+
+
+def _state_width(F: Flattened) -> int:
+    f = F.flat
+    return 12 * f.nodes + 2 * f.padded + f.drives + F.gauges.turning + 1
 
 
 def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, lead, b, pulled, reach, first = np.zeros((9, flat.padded))
-    state = 12 * flat.nodes + 2 * flat.padded + flat.drives + 1
+    state = _state_width(F)
     shelf = int(min(_CAPACITY, max(1, _BYTES // (8 * state))))
     return March(
         flat=flat,

@@ -106,7 +106,7 @@ class March:
     rows : Reals
         Time and outputs after each step.
     states : Reals
-        Poses, degrees of freedom, rates, driven coordinates, and the time.
+        Poses, degrees of freedom, rates, driven coordinates, angles of outputs, and the time.
     """
 
     flat: Flat
