@@ -17,10 +17,14 @@ from flexctrl.model.motion import Motion, State
 _ASYMMETRY = 1e-6
 _SLOPE = 1.9
 _ROUND_OFF = 1e-12
+_VANISHING, _CAUTION = (1e-12, 3e-13), 100.0
 
 
 def taylor_slope(force: Callable[[np.ndarray], np.ndarray], K: sp.spmatrix, scale: np.ndarray) -> float:
-    """Return the slope of the Taylor remainder of a force along a fixed, mixed direction.
+    """Return the slope of the Taylor remainder of a force along a fixed, mixed direction, to and fro.
+
+    Both signs are tried, and the larger remainder counts: where the force has a corner, one of the two sides is
+    wrong in the first order whatever K is.
 
     Parameters
     ----------
@@ -39,9 +43,15 @@ def taylor_slope(force: Callable[[np.ndarray], np.ndarray], K: sp.spmatrix, scal
     direction = scale * np.random.default_rng(0).uniform(0.5, 1.0, scale.size) * np.resize([1.0, -1.0, 1.0], scale.size)
     energy = np.abs(scale) * np.asarray(abs(K) @ np.abs(scale)).ravel()
     weight = np.abs(scale) / max(float(energy.max(initial=0.0)), 1e-300)
-    noise = np.finfo(float).eps * 1e3
+    push = K @ direction
+
+    def left(size: float) -> float:
+        sides = (force(e * direction) + e * push for e in (size, -size))
+        return max(float(np.abs(side * weight).max(initial=0.0)) for side in sides)
+
     sizes = 10.0 ** np.arange(-1.5, -10.25, -0.5)
-    rest = [np.abs((force(e * direction) + e * (K @ direction)) * weight).max(initial=0.0) for e in sizes]
+    rest = [left(size) for size in sizes]
+    noise = max(np.finfo(float).eps, _CAUTION * max(map(left, _VANISHING)))
     clear = np.flatnonzero(np.array(rest[:-1]) > 30.0 * noise)
     if not clear.size:
         return np.inf
@@ -77,8 +87,8 @@ def certify(
         raise LinearizationError(f"linearize: M is not positive (pivot {definiteness:.1e} after scaling)")
     if slope < _SLOPE:
         raise LinearizationError(
-            f"linearize: the forces have no derivative here (Taylor slope {slope:.2f}, 2 expected): a rope on the "
-            "verge of going slack, or a stop. Linearise beside it"
+            f"linearize: the forces have no derivative here (Taylor slope {slope:.2f}, 2 expected): on one side of "
+            "this place they are others than on the other. Linearise beside it"
         )
     return Certificate(
         residual,

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 
 from flexctrl.effects.backlash import gaps_of
 from flexctrl.model.loose_kinds import loose_names
@@ -137,3 +138,44 @@ class Kinks:
         strains = np.sqrt(np.einsum("ij,ij->i", arms, arms)) - lengths
         own = np.append(state.q, 0.0)[motion.sources[drives]]
         return np.append(strains, rows[:, 0] * state.driven[drives] + rows[:, 1] * own - rows[:, 2])
+
+    def standing(self, state: State, free: np.ndarray) -> tuple[str, ...]:
+        """Say in words which parts stand exactly on a corner that a motion of the free coordinates would leave.
+
+        Parameters
+        ----------
+        state : State
+        free : numpy.ndarray
+            Numbers of the coordinates that can move.
+
+        Returns
+        -------
+        tuple of str
+            Each part with what to do about it. Empty where all laws of force have a derivative.
+        """
+        on = np.flatnonzero(np.abs(self.values(state)) <= self.dust)
+        lines = len(self.lines[1])
+        moved = self._leaving(state, free)
+        return tuple(dict.fromkeys(self._words(i) for i in on if i >= lines or moved[i]))
+
+    def _leaving(self, state: State, free: np.ndarray) -> np.ndarray:
+        """Whether the length of each line changes with any of some coordinates."""
+        ends = self.lines[0]
+        if not len(ends):
+            return np.zeros(0, dtype=bool)
+        arms = state.x[ends[:, 1]] - state.x[ends[:, 0]]
+        arms /= np.linalg.norm(arms, axis=1)[:, None]
+        T = self.model.motion.jacobian(state)[:, free]
+        places = (6 * ends[:, :, None] + np.arange(3)).reshape(len(ends), 6)
+        rows = np.repeat(np.arange(len(ends)), 6)
+        pulls = sp.csr_matrix((np.hstack([-arms, arms]).ravel(), (rows, places.ravel())), (len(ends), T.shape[0]))
+        return np.asarray(abs(pulls @ T).max(axis=1).todense()).ravel() > _ROUND_OFF**0.5
+
+    def _words(self, corner: int) -> str:
+        """What to say of a part on its corner."""
+        name = self.names[corner]
+        if self.ends[corner]:
+            return self.ends[corner] + "; pay some out"
+        if name in self._loose:
+            return f"{name} stands exactly on a flank of its gap; load it, or move it off the flank"
+        return f"{name} is exactly at its natural length; prestress it, or hold it slack or taut"

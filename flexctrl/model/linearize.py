@@ -63,6 +63,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     held = set(range(model.n)) - set(free.tolist())
     balance = Balance(model, u, {i: float(state.q[i]) for i in sorted(held)})
     residual = _check_balance(balance, state)
+    _refuse_corners(model, state, free)
     loads = _without_energy(model, u)
     linear, asymmetry = _derivative(model, state, u, free, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
@@ -135,6 +136,15 @@ def _check_balance(balance: Balance, state: State) -> float:
             "linearise about equilibrium(model), or name the inputs that balance it"
         )
     return balance.beyond_noise(state, residual)
+
+
+def _refuse_corners(model: Model, state: State, free: np.ndarray) -> None:
+    standing = model.kinks.standing(state, free) if model.large else ()
+    if standing:
+        raise LinearizationError(
+            "linearize: the forces have no derivative here, one way they are others than the other way: "
+            + "; ".join(standing)
+        )
 
 
 def _symmetric(A: sp.spmatrix) -> sp.csc_matrix:
