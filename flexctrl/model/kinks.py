@@ -156,7 +156,7 @@ class Kinks:
         on = np.flatnonzero(np.abs(self.values(state)) <= self.dust)
         lines = len(self.lines[1])
         moved = self._leaving(state, free)
-        return tuple(dict.fromkeys(self._words(i) for i in on if i >= lines or moved[i]))
+        return tuple(dict.fromkeys(self._words(i) for i in on.tolist() if i >= lines or moved[i]))
 
     def _leaving(self, state: State, free: np.ndarray) -> np.ndarray:
         """Whether the length of each line changes with any of some coordinates."""
