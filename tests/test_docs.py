@@ -71,6 +71,13 @@ def test_relative_links_lead_somewhere(page: Path) -> None:
     assert [t for t in targets if not (page.parent / t).exists()] == []
 
 
+def test_the_gallery_shows_every_example() -> None:
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"examples/(\w+\.(?:py|toml))", text))
+    assert shown == {p.name for p in (ROOT / "examples").iterdir() if p.suffix in (".py", ".toml")}
+    assert all((ROOT / "docs" / p).is_file() for p in re.findall(r"{image} (\S+)", text))
+
+
 def test_every_level_with_public_names_has_a_page() -> None:
     levels = {module.split(".")[1] for module in flexctrl._HOMES}
     pages = "".join(p.read_text(encoding="utf-8") for p in (ROOT / "docs" / "api").glob("*.md"))
