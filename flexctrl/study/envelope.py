@@ -23,6 +23,7 @@ from flexctrl.study.amplitudes import (
     InitialSpeed,
     Unit,
 )
+from flexctrl.study.giving_way import giving_way_between
 from flexctrl.study.predictions import (
     CurveDifference,
     Deflection,
@@ -56,6 +57,7 @@ __all__ = [
 
 _PERIODS = 2.6
 _CLOSE = 2e-3
+_BEFORE = 1e-5
 _TRIALS = 40
 _TINY = 1e-12
 
@@ -79,6 +81,9 @@ class Envelope:
         All amplitudes tried, ascending.
     until : float
         Length of the runs [s]; 0 if nothing was run.
+    gives_way : bool
+        Whether the machine stops bearing the load at the limit, by buckling, snapping through or fluttering, with
+        an error still below what is allowed.
     """
 
     name: str
@@ -88,6 +93,7 @@ class Envelope:
     unit: Unit
     trials: tuple[Trial, ...]
     until: float
+    gives_way: bool = False
 
     @property
     def last(self) -> Trial:
@@ -112,6 +118,9 @@ class Envelope:
             most = f"{last.amplitude:.4g} {self.unit.symbol}"
             return f"{self.name}: the linear {self.quantity} is right within {percent} up to {self.unit.words} = {most}"
         where = f"{self.unit.words} = {self.limit:.4g} {self.unit.symbol}"
+        if self.gives_way:
+            right = f"the linear {self.quantity} is right within {percent} up to there"
+            return f"{self.name}: the machine gives way at {where}; {right}"
         numbers = f"linear {last.predicted:.5g}, nonlinear {last.actual:.5g}"
         return f"{self.name}: the linear {self.quantity} is wrong by {percent} at {where} ({numbers})"
 
@@ -132,7 +141,10 @@ def validity_envelope(
     The linear model answers exactly (modal exponentials), the nonlinear one by a run, by its
     equilibrium (`Deflection`) or by its linearisation about the loaded shape (`Frequency`). The amplitude grows
     from a small one until the error is exceeded, then the bracket is narrowed by the rule of false
-    position on logarithms, in which the error of most predictions is straight.
+    position on logarithms, in which the error of most predictions is straight. Under a constant load a
+    `Deflection` or `Frequency` is told up to where the machine gives way at most: where its stiffness, on the path
+    of equilibria from rest, stops being positive definite. Beyond, the equilibrium that the linear model is
+    tangent to is one that the machine leaves.
 
     Parameters
     ----------
@@ -174,7 +186,7 @@ def validity_envelope(
     search = _Search(case, vary, quantity, error, span, method, [])
     limit = search.limit(small, large)
     trials = tuple(sorted(search.trials, key=lambda tried: tried.amplitude))
-    return Envelope(model.structure.name, quantity, error, limit, unit, trials, span)
+    return Envelope(model.structure.name, quantity, error, limit, unit, trials, span, search.gave_way)
 
 
 def _case(model: Model, at: Rest | State | None) -> Case:
@@ -209,6 +221,7 @@ class _Search:
     until: float
     method: Integrator | None
     trials: list[Trial]
+    gave_way: bool = False
 
     def excess(self, amplitude: float) -> float:
         """Logarithm of the error over what is allowed."""
@@ -229,12 +242,24 @@ class _Search:
             high = min(low * growth, most)
             above = self.excess(high)
             if above >= 0.0:
-                return self._between(low, below, high, above)
+                high, above = self._bearing(low, high, above)
+                return high if self.gave_way else self._between(low, below, high, above)
             if high >= most:
                 return math.inf
             power = max((above - below) / math.log(high / low), 0.5)
             growth = min(max(1.1 * math.exp(-above / power), 1.2), 4.0)
             low, below = high, above
+
+    def _bearing(self, low: float, high: float, above: float) -> tuple[float, float]:
+        """The upper end, or just below where the machine gives way before it, and its excess."""
+        if not self.trials[-1].gave_way:
+            return high, above
+        critical = high * giving_way_between(self.case, self.vary.begin(self.case, high)[2])
+        if not low < critical < high:
+            return high, above
+        above = self.excess((1.0 - _BEFORE) * critical)
+        self.gave_way = above < 0.0
+        return critical, above
 
     def _between(self, low: float, below: float, high: float, above: float) -> float:
         """Rule of false position, Illinois variant; halving where the upper end has no finite error."""
@@ -243,6 +268,7 @@ class _Search:
             share = -below / (above - below) if np.isfinite(above) else 0.5
             middle = low * (high / low) ** share
             if high / low < 1.0 + _CLOSE:
+                self.gave_way = not np.isfinite(above) and any(t.gave_way for t in self.trials if t.amplitude == high)
                 return middle
             here = self.excess(middle)
             if abs(here) < _CLOSE:

@@ -14,9 +14,9 @@ from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.errors import EquilibriumError, LinearizationError, StructureError, did_you_mean
 from flexctrl.linear.statespace import modal_first_order
-from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.study.amplitudes import Amplitude, Case, ConstantLoad
+from flexctrl.study.giving_way import gives_way, loaded
 
 __all__ = [
     "CurveDifference",
@@ -49,6 +49,9 @@ class Trial:
         |actual − predicted|/|predicted|, for a curve the RMS difference over the RMS prediction.
     t, linear, nonlinear : numpy.ndarray
         The curves compared, as deviations from rest; empty if nothing was run.
+    gave_way : bool
+        Whether the machine, loaded on from rest, stopped bearing the load before this amplitude; the error is
+        then infinite.
     """
 
     amplitude: float
@@ -58,6 +61,7 @@ class Trial:
     t: np.ndarray = field(default_factory=lambda: _NONE)
     linear: np.ndarray = field(default_factory=lambda: _NONE)
     nonlinear: np.ndarray = field(default_factory=lambda: _NONE)
+    gave_way: bool = False
 
 
 @dataclass(frozen=True)
@@ -227,11 +231,6 @@ def _place(case: Case, output: str) -> int:
     return case.model.outputs.index(output)
 
 
-def _loaded(case: Case, u: np.ndarray) -> Rest:
-    inputs = dict(zip(case.model.inputs, (case.inputs + u).tolist(), strict=True))
-    return equilibrium(case.model, inputs=inputs, start=case.rest)
-
-
 def _static(case: Case, quantity: Deflection, amplitude: float, u: np.ndarray) -> Trial:
     place, linear = _place(case, quantity.output), case.linear
     chosen = linear.select(outputs=[quantity.output])
@@ -239,9 +238,12 @@ def _static(case: Case, quantity: Deflection, amplitude: float, u: np.ndarray) -
     if not np.isfinite(predicted):
         raise StructureError(f"{linear.name} drifts away under this load; deflection has no meaning")
     try:
-        actual = _loaded(case, u).outputs[quantity.output] - float(case.outputs[place])
+        rest = loaded(case, u)
     except EquilibriumError:
-        return Trial(amplitude, predicted, np.inf, np.inf)
+        return Trial(amplitude, predicted, np.inf, np.inf, gave_way=True)
+    if gives_way(case, rest, u):
+        return Trial(amplitude, predicted, np.inf, np.inf, gave_way=True)
+    actual = rest.outputs[quantity.output] - float(case.outputs[place])
     return Trial(amplitude, predicted, actual, _relative(predicted, actual))
 
 
@@ -251,9 +253,12 @@ def _tuned(case: Case, quantity: Frequency, amplitude: float, u: np.ndarray) -> 
         raise StructureError(f"mode {quantity.mode} of {case.linear.name} has no frequency; see linear.modes()")
     shape, predicted = before.shapes[:, quantity.mode - 1], float(before.frequencies[quantity.mode - 1])
     try:
-        now = linearize(case.model, at=_loaded(case, u))
+        rest = loaded(case, u)
+        now = linearize(case.model, at=rest)
     except (EquilibriumError, LinearizationError):
-        return Trial(amplitude, predicted, np.inf, np.inf)
+        return Trial(amplitude, predicted, np.inf, np.inf, gave_way=True)
+    if gives_way(case, rest, u):
+        return Trial(amplitude, predicted, np.inf, np.inf, gave_way=True)
     after = now.modes()
     same = int(np.argmax(np.abs(after.shapes.T @ (now.M @ shape))))
     actual = float(after.frequencies[same])

@@ -134,6 +134,62 @@ def test_stiffening_of_a_pulled_column():
     assert found.limit == pytest.approx(0.21 * np.pi**2 * 100.0 / 16.0, rel=2e-3)
 
 
+def test_the_envelope_ends_at_the_buckling_load():
+    """A straight column shortens as the linear model says beyond π² EI/L² too, but does not stay straight."""
+    model = column()
+    path = fc.equilibrium_path(model, {"squeeze": 1.0}, 100.0)
+    found = validity_envelope(model, ConstantLoad({"squeeze": 1.0}), Deflection("end"), 0.05)
+    assert found.limit == pytest.approx(np.pi**2 * 100.0 / 16.0, rel=5e-4)
+    assert found.limit == pytest.approx(path.branchings[0].factor, rel=1e-8)
+    assert found.gives_way
+    assert f"gives way at load = {found.limit:.4g} ×" in str(found)
+    before = validity_envelope(model, ConstantLoad({"squeeze": 1.0}), Deflection("end"), 0.05, most=60.0)
+    assert (before.limit, before.gives_way) == (np.inf, False)
+    pulled = validity_envelope(model, ConstantLoad({"squeeze": -1.0}), Deflection("end"), 0.05, most=1e4)
+    assert (pulled.limit, pulled.gives_way) == (np.inf, False)
+    assert len(found.plot().axes) == 1
+
+
+@pytest.mark.slow
+def test_the_envelope_ends_where_a_shallow_truss_snaps():
+    """Two bars in a shallow roof: the error is told before; with a large one allowed, the limit load ends it."""
+    rise, half, stiffness = 0.1, 1.0, 1e4
+    apex = fc.PointMass("apex", (0, 0, rise), 1.0)
+    bars = [fc.Spring(f"bar{i}", (x, 0, 0), apex.node, stiffness=stiffness) for i, x in enumerate((-half, half))]
+    structure = fc.Structure(
+        [apex, *bars],
+        [*(fc.Support(bar.start) for bar in bars), *(fc.Pin(bar.end, apex.node) for bar in bars)],
+        inputs=[fc.Force("load", apex.node, "-z")],
+        outputs=[fc.Position("height", apex.node, "z")],
+        name="roof",
+    )
+    model = fc.assemble(fc.planar(structure, "y"), [fc.LargeRotation()])
+    z = np.linspace(0.0, rise, 200_001)
+    lengths = np.hypot(half, z)
+    snap = float((2 * stiffness * (np.hypot(half, rise) - lengths) * z / lengths).max())
+    found = validity_envelope(model, ConstantLoad({"load": 1.0}), Deflection("height"), 5.0)
+    assert found.limit == pytest.approx(snap, rel=1e-4)
+    assert found.gives_way
+
+
+@pytest.mark.slow
+def test_a_follower_load_ends_the_envelope_at_flutter():
+    """Beck's column: 20.0509 EI/L²; its stiffness stays regular."""
+    beam = fc.Beam("beam", (0, 0, 0), (2, 0, 0), fc.Section.rectangle(fc.STEEL, 0.02, 0.02), 12)
+    structure = fc.Structure(
+        [beam],
+        [fc.Support(beam.start)],
+        inputs=[fc.FollowerForce("push", beam.end, "-x")],
+        outputs=[fc.Position("end", beam.end, "x")],
+        name="beck",
+    )
+    model = fc.assemble(fc.planar(structure), [fc.Flexible(), fc.LargeRotation()])
+    unit = fc.STEEL.E * 0.02**4 / 12 / 4.0
+    found = validity_envelope(model, ConstantLoad({"push": unit}), Deflection("end"), 0.05, first=1.0, most=100.0)
+    assert found.limit == pytest.approx(20.0509, rel=3e-3)
+    assert found.gives_way
+
+
 def test_a_linear_machine_is_right_everywhere():
     body = fc.PointMass("cart", (0, 0, 0), 2.0)
     spring = fc.Spring("spring", (-1, 0, 0), body.node, stiffness=50.0)
