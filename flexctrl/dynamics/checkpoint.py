@@ -151,6 +151,13 @@ class Autosave:
 
 def machine_of(model: Model | LinearPlant) -> str:
     """Return a digest of a model: its names, its effects and its parts' numbers."""
+    known = model.__dict__.get("_digest")
+    if known is None:
+        known = model.__dict__["_digest"] = _digest(model)
+    return known
+
+
+def _digest(model: Model | LinearPlant) -> str:
     digest = hashlib.sha256(repr((model.coordinates, model.inputs, model.outputs, model.effects)).encode())
     for numbers in model.numbers if isinstance(model, LinearPlant) else _numbers(model):
         digest.update(np.ascontiguousarray(numbers).tobytes())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from flexctrl.model.model import Model
@@ -13,6 +15,10 @@ _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
 
 def turning(model: Model) -> np.ndarray:
     """Return which degrees of freedom are rotations, shape (n,)."""
+    return _once(model, _turning)
+
+
+def _turning(model: Model) -> np.ndarray:
     other = (*_SHIFTS, *model.motion.scales)
     return np.array([not name.endswith(other) for name in model.coordinates], dtype=bool)
 
@@ -23,8 +29,21 @@ def yardsticks(model: Model) -> np.ndarray:
     A source angle counts as the motion it drives, or a motor's many turns would excuse any error of the machine;
     inner freedoms of effects have scales of their own.
     """
+    return _once(model, _yardsticks)
+
+
+def _yardsticks(model: Model) -> np.ndarray:
     size = model.structure.size
     gears = {f"{d.name}_source": abs(d.effective_ratio) * (1.0, size)[d.column == 0] for d in model.structure.drives}
     known = gears | model.motion.scales
     pairs = zip(model.coordinates, turning(model), strict=True)
     return np.array([known.get(name, 1.0 if turns else size) for name, turns in pairs])
+
+
+def _once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:
+    """What is found of a model, kept with it."""
+    kept = model.__dict__.setdefault("_scales", {})
+    if found not in kept:
+        kept[found] = found(model)
+        kept[found].flags.writeable = False
+    return kept[found]

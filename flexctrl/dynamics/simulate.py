@@ -22,7 +22,7 @@ from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.record import InMemory, Record
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
-from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Stepper
+from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.linear.model import LinearModel
@@ -122,6 +122,8 @@ def simulate(
         return _run(plan, stepper, start, tuple(events), rows, track)
     finally:
         recorder.close()
+        if isinstance(stepper, Reusable):
+            stepper.done()
 
 
 def _plant(linear: LinearModel, method: Integrator) -> LinearPlant:

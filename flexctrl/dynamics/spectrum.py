@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from flexctrl.errors import StructureError
@@ -52,6 +54,7 @@ def damping_and_shift(rho: float, x: float) -> tuple[float, float]:
     return float(-exponent.real / abs(exponent)), float(exponent.imag / x - 1.0)
 
 
+@cache
 def told_damping(rho: float) -> str:
     """Return a report's words on the damping of generalised alpha."""
     if rho == 1.0:

@@ -28,6 +28,7 @@ __all__ = [
     "Mark",
     "Pace",
     "Point",
+    "Reusable",
     "StepError",
     "Stepper",
 ]
@@ -190,6 +191,14 @@ class Marching(Stepper[P], Protocol[P]):
 
     def march(self, point: P, h: float, count: int) -> Block:
         """Return up to ``count`` steps of length h under the inputs of ``point``, which stay as they are."""
+
+
+@runtime_checkable
+class Reusable(Protocol):
+    """A stepper whose workspace another run can use."""
+
+    def done(self) -> None:
+        """Leave it; no more steps are taken."""
 
 
 @runtime_checkable

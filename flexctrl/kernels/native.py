@@ -66,6 +66,12 @@ class Packed:
             else:
                 words[i] = self._address(name, kind, getattr(record, name))
 
+        self.__dict__["_first"] = words.copy()
+
+    def reset(self) -> None:
+        """Set all numbers to what they were first."""
+        self._words[:] = self._first
+
     def _address(self, name: str, kind: Any, value: Any) -> int:
         if isinstance(kind, type):
             inner = Packed(value)

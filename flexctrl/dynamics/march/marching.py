@@ -45,6 +45,7 @@ _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
 _CAPACITY = 1024
 _BYTES = 16e6
+_SPARE = 2
 
 
 def can_march(model: Model) -> bool:
@@ -101,6 +102,9 @@ class Remembered:
     numbers: tuple[float, ...]
 
 
+_NOTHING: tuple[tuple[int, int], np.ndarray, np.ndarray] = ((-1, -1), np.zeros(0), np.zeros(0))
+
+
 class Pacing(NamedTuple):
     """Steps of controlled error: the first and the largest, where to stop and what not to pass [s]; the tolerance."""
 
@@ -129,9 +133,27 @@ class Marcher:
         m = self.march
         self._run = m.bound(run)
         self._task, self._h, self._wanted, self._done = (m.cell(name) for name in ("task", "h", "wanted", "done"))
-        self._kept: tuple[tuple[int, int], np.ndarray, np.ndarray] = ((-1, -1), np.zeros(0), np.zeros(0))
+        self._kept = _NOTHING
         self.width = 1 + len(model.outputs)
         self.rows = m.rows.reshape(-1, self.width)
+
+    @classmethod
+    def of(cls, model: Model, method: Method) -> Marcher:
+        """Return a march that another run is done with, as good as new, or a new one."""
+        idle = _idle(model)
+        while idle:
+            found = idle.pop()
+            if found.method.coefficients == method.coefficients and found.method.least == method.least:
+                return found
+        return cls(model, method)
+
+    def done(self) -> None:
+        """Leave the march to another run."""
+        self.march.reset()
+        self.flattened.flat.z[:] = 0.0
+        self._kept = _NOTHING
+        if len(_idle(self.model)) < _SPARE:
+            _idle(self.model).append(self)
 
     def remembered(self) -> Remembered:
         """Return what another march needs to go on with the same bits."""
@@ -329,6 +351,11 @@ class Marcher:
 def _state_width(F: Flattened) -> int:
     f = F.flat
     return 12 * f.nodes + 2 * f.padded + f.drives + F.gauges.turning + 1
+
+
+def _idle(model: Model) -> list[Marcher]:
+    """Marches of a model that no run uses; not more than a few, and taken by one run at a time."""
+    return model.__dict__.setdefault("_marchers", [])
 
 
 def _march(F: Flattened, method: Method) -> March:

@@ -51,7 +51,13 @@ class MarchingStepper:
     def marcher(self) -> Marcher:
         """The model on a march."""
         p = self.plain
-        return Marcher(p.model, Method(p.coefficients, p.tolerance, p.weight, p.turning))
+        return Marcher.of(p.model, Method(p.coefficients, p.tolerance, p.weight, p.turning))
+
+    def done(self) -> None:
+        """Leave what steps need to another run; this one takes no more."""
+        if "marcher" in self.__dict__:
+            self.__dict__.pop("marcher").done()
+            self._here = None
 
     @property
     def memory(self) -> Memory:

@@ -1,0 +1,330 @@
+"""flexctrl against Exudyn in one run, on one thread, alternately.
+
+    python tests/benchmarks/race.py [crane chains loop cold] [--quick] [--page]
+
+Needs the extras ``[fast]`` and ``[bench]``. Times are CPU seconds of this process, the least of several runs, the two
+codes in turns; what is told are ratios. With ``--page`` the run makes ``docs/benchmarks/dynamics.md`` and its plot.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import ClassVar
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import numpy as np
+from exudyn_chain import AXIAL_STIFFNESS, BENDING_STIFFNESS, LENGTH, MASS_PER_LENGTH, exudyn_chain
+from exudyn_crane import DATA, DURATION, PUSH, exu, exudyn_crane
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+import flexctrl as fc
+from flexctrl.cranes import ceiling_crane
+
+EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation())
+TARGETS = (1e-3, 1e-4, 1e-5)
+MESHES = {1e-3: (2, 3, 4), 1e-4: (6, 8, 10), 1e-5: (20, 24)}
+STEPS = {1e-3: (1.2e-3, 1e-3, 8e-4, 6e-4, 5e-4, 4e-4), 1e-4: (2e-4, 1.5e-4, 1.25e-4, 1e-4), 1e-5: (3e-5, 2.5e-5, 2e-5)}
+CHAINS = (10, 100, 1000, 3000)
+LARGEST = 10_000
+SWINGS = {"easy": 0.05, "full swing": 0.5 * np.pi}
+CHAIN_STEP = 1e-3
+_FINALISTS = 2
+_BRIEF = 0.3
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to compute the crane; ``run`` gives its times, x1 − x4 there, and the CPU time it took."""
+
+    code: str
+    elements: int
+    step: float
+    name: str
+    run: Callable[[], tuple[NDArray[np.float64], NDArray[np.float64], float]]
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A setting with its error (m RMS) and least CPU time (s)."""
+
+    code: str
+    elements: int
+    step: float
+    name: str
+    error: float
+    seconds: float
+
+
+@cache
+def crane_model(elements: int) -> fc.Model:
+    return fc.assemble(ceiling_crane(elements=elements), EFFECTS)
+
+
+def our_crane(elements: int, method: fc.GeneralizedAlpha) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    model = crane_model(elements)
+    started = time.process_time()
+    run = fc.simulate(model, until=DURATION, inputs={"push": PUSH}, method=method)
+    seconds = time.process_time() - started
+    return run.t, run["x1_minus_x4"], seconds
+
+
+def their_crane(elements: int, step: float, reduced: bool) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    run = exudyn_crane(elements, step, reduced_integration=reduced)
+    return run.t, run.x1_minus_x4, run.seconds
+
+
+def settings_for(target: float, quick: bool) -> list[Setting]:
+    """The settings that may reach a target."""
+    found = []
+    for n in MESHES[target][:: 2 if quick else 1]:
+        for h in STEPS[target][:: 2 if quick else 1]:
+            for rho in (0.9, 0.5):
+                ours = partial(our_crane, n, fc.GeneralizedAlpha(h, rho))
+                found.append(Setting("flexctrl", n, h, f"generalised alpha, ρ = {rho}", ours))
+            for reduced in (False, True) if target > 1e-5 else (True,):
+                rule = "reduced" if reduced else "full"
+                found.append(Setting("Exudyn", n, h, f"cable, {rule} integration", partial(their_crane, n, h, reduced)))
+    return found
+
+
+def references() -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """The two converged runs: Exudyn's, and our own with as fine a mesh and step."""
+    theirs = np.genfromtxt(DATA, delimiter=",", names=True, skip_header=3)
+    t, x, _ = our_crane(32, fc.GeneralizedAlpha(5e-6))
+    return [(theirs["t"], theirs["x1_minus_x4"]), (theirs["t"], CubicSpline(t, x)(theirs["t"]))]
+
+
+def apart(t: NDArray[np.float64], x: NDArray[np.float64], t_r: NDArray[np.float64], x_r: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean((CubicSpline(t, x)(t_r) - x_r) ** 2)))
+
+
+def surveyed(setting: Setting, references: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Timed | None:
+    """Error against the nearer of the converged runs (each code's own is the nearer one), and a first time."""
+    try:
+        t, x, seconds = setting.run()
+    except exu.SolverError:
+        return None
+    error = min(apart(t, x, *reference) for reference in references)
+    return Timed(setting.code, setting.elements, setting.step, setting.name, error, seconds)
+
+
+def crane_race(quick: bool) -> dict[str, object]:
+    """All settings tried once; the quickest that reach a target, timed in turns."""
+    known = references()
+    points: list[Timed] = []
+    best: dict[str, dict[str, Timed]] = {}
+    for target in TARGETS:
+        settings = settings_for(target, quick)
+        tried = [(s, p) for s in settings if (p := surveyed(s, known)) is not None]
+        tried = [
+            (s, min(p, surveyed(s, known) or p, key=lambda q: q.seconds) if p.seconds < _BRIEF else p) for s, p in tried
+        ]
+        finalists = [
+            pair
+            for code in ("flexctrl", "Exudyn")
+            for pair in sorted(
+                ((s, p) for s, p in tried if s.code == code and p.error <= target), key=lambda pair: pair[1].seconds
+            )[:_FINALISTS]
+        ]
+        times: dict[str, list[float]] = {}
+        for _ in range(3 if quick or target < 1e-4 else 7):
+            for s, _p in finalists:
+                times.setdefault(repr(s), []).append(s.run()[2])
+        final = [Timed(**{**vars(p), "seconds": min(times[repr(s)])}) for s, p in finalists]
+        points += [p for _, p in tried]
+        best[f"{target:g}"] = {
+            code: min((p for p in final if p.code == code), key=lambda p: p.seconds) for code in ("flexctrl", "Exudyn")
+        }
+        ours, theirs = best[f"{target:g}"].values()
+        print(f"crane to {target:g} m: {ours.seconds / theirs.seconds:.3f} of Exudyn's time\n  {ours}\n  {theirs}")
+    gap = apart(*known[0], *known[1])
+    print(f"converged runs apart: {gap:.1e} m RMS")
+    return {
+        "gap": gap,
+        "points": [vars(p) for p in points],
+        "best": {k: {c: vars(p) for c, p in v.items()} for k, v in best.items()},
+    }
+
+
+@cache
+def chain_model(elements: int, angle: float) -> fc.Model:
+    """The chain of `exudyn_chain`."""
+    section = fc.Section(
+        EA=AXIAL_STIFFNESS,
+        EI_y=BENDING_STIFFNESS,
+        EI_z=BENDING_STIFFNESS,
+        GJ=BENDING_STIFFNESS,
+        rhoA=MASS_PER_LENGTH,
+        rhoJ=1e-4,
+    )
+    end = LENGTH * np.array([np.sin(angle), 0.0, -np.cos(angle)])
+    beam = fc.Beam("chain", (0, 0, 0), tuple(end), section, elements=elements)
+    outputs = [fc.Position(f"tip_{d}", at=beam.end, direction=d) for d in "xyz"]
+    return fc.assemble(fc.Structure([beam], [fc.Support(beam.start, held="u v w")], [], [], outputs), EFFECTS)
+
+
+def our_chain(elements: int, angle: float, steps: int) -> tuple[NDArray[np.float64], float, int]:
+    model = chain_model(elements, angle)
+    started = time.process_time()
+    run = fc.simulate(model, until=steps * CHAIN_STEP, method=fc.GeneralizedAlpha(CHAIN_STEP))
+    seconds = time.process_time() - started
+    if run.status is not fc.Status.FINISHED:
+        raise RuntimeError(run.report.message)
+    return np.array([run[f"tip_{d}"][-1] for d in "xyz"]), seconds, run.report.newton_iterations
+
+
+def chain_race(quick: bool) -> dict[str, object]:
+    """Time per step; how ours grows up to 10,000 elements; the full swing of 3,000 to its end."""
+    rows = []
+    for name, angle in SWINGS.items():
+        for n in CHAINS[: 3 if quick else None]:
+            steps = max(100 if quick else 400, min(2000, 100_000 // n))
+            ours, theirs, newton = [], [], (0, 0)
+            for _ in range(2 if n > 1000 else 3):
+                tip, seconds, k = our_chain(n, angle, steps)
+                ours.append(seconds)
+                other = exudyn_chain(n, angle, CHAIN_STEP, steps)
+                theirs.append(other.seconds)
+                newton = (k, other.newton)
+            row = {
+                "swing": name,
+                "elements": n,
+                "steps": steps,
+                "ours": min(ours) / steps,
+                "theirs": min(theirs) / steps,
+                "newton": [k / steps for k in newton],
+                "apart": float(np.abs(tip - other.tip).max()),
+            }
+            rows.append(row)
+            print(row, f"ratio {row['ours'] / row['theirs']:.3f}", flush=True)
+    return {"rows": rows, "growth": growth(quick), "swing": full_swing(quick)}
+
+
+def growth(quick: bool) -> dict[str, object]:
+    """Exponent of our time per step between 100 and 10,000 elements, from the difference of long and short runs."""
+    found = {}
+    for name, angle in SWINGS.items():
+        times = {}
+        for n in (100, 1000) if quick else (100, 1000, LARGEST):
+            short, long = (100, 200) if n > 1000 else (200, 600)
+            spans = [[our_chain(n, angle, steps)[1] for steps in (short, long)] for _ in range(3)]
+            times[n] = (min(s[1] for s in spans) - min(s[0] for s in spans)) / (long - short)
+        exponent = float(np.polyfit(np.log(list(times)), np.log(list(times.values())), 1)[0])
+        found[name] = {"times": {str(n): t for n, t in times.items()}, "exponent": exponent}
+        print(f"growth, {name}: exponent {exponent:.3f}", times, flush=True)
+    return found
+
+
+def full_swing(quick: bool) -> dict[str, object]:
+    """Two seconds of the full swing: past the lowest point and through the whip of the free end."""
+    n, steps = (300, 500) if quick else (3000, 2000)
+    _, seconds, _ = our_chain(n, SWINGS["full swing"], steps)
+    started = time.process_time()
+    try:
+        ratio = seconds / exudyn_chain(n, SWINGS["full swing"], CHAIN_STEP, steps).seconds
+        theirs = "finished"
+    except exu.SolverError:
+        ratio = seconds / (time.process_time() - started)
+        theirs = "Newton failed"
+    print(f"full swing of {n}, {steps} steps: ours finished, Exudyn {theirs}; time ratio {ratio:.3f}", flush=True)
+    return {"elements": n, "steps": steps, "theirs": theirs, "ratio": ratio}
+
+
+@dataclass(frozen=True)
+class Law:
+    """A proportional controller in Python, read at every step."""
+
+    sample_time: float = 1e-4
+    inputs: ClassVar[tuple[str, ...]] = ("x1_minus_x4",)
+    outputs: ClassVar[tuple[str, ...]] = ("push",)
+
+    def initial(self) -> NDArray[np.float64]:
+        return np.zeros(0)
+
+    def command(self, t: float, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        return PUSH - 200.0 * y
+
+
+def loop_race(quick: bool) -> dict[str, object]:
+    """A controller at every step of the crane against the same crane without; and a plain loop, as a yardstick."""
+    steps, model = (500 if quick else 2000), crane_model(1)
+    how = {"until": steps * 1e-4, "method": fc.GeneralizedAlpha(1e-4)}
+    spans: list[list[float]] = [[], []]
+    for _ in range(9):
+        for span, controller, inputs in zip(spans, (None, Law()), ({"push": PUSH}, None), strict=True):
+            started = time.process_time()
+            fc.simulate(model, controller, inputs=inputs, **how)
+            span.append(time.process_time() - started)
+    still, closed = (min(span) / steps for span in spans)
+    print(f"controller at every step: {1e6 * (closed - still):.1f} us over {1e6 * still:.1f} us open", flush=True)
+    return {"over": closed - still, "open": still}
+
+
+_FIRST = """
+import time
+start = time.perf_counter()
+import numpy, casadi
+libraries = time.perf_counter()
+import flexctrl as fc
+imported = time.perf_counter()
+model = fc.assemble(fc.cranes.ceiling_crane(), [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
+run = fc.simulate(model, until=0.05, inputs={"push": 500.0}, method=fc.GeneralizedAlpha(1e-4))
+float(run["x1_minus_x4"][-1])
+print(imported - libraries, time.process_time())
+"""
+
+
+def cold_race(quick: bool) -> dict[str, object]:
+    """CPU seconds of a process from its start to the first result of the crane, without and with kept code."""
+    empty, kept, imports = [], [], []
+    with tempfile.TemporaryDirectory() as bytecode:
+        for round_ in range(2 if quick else 6):
+            with tempfile.TemporaryDirectory() as cache_home:
+                for spans in (empty, kept):
+                    environment = {**os.environ, "XDG_CACHE_HOME": cache_home, "PYTHONPYCACHEPREFIX": bytecode}
+                    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+                    told = subprocess.run(
+                        [sys.executable, "-c", _FIRST], env=environment, capture_output=True, text=True, check=True
+                    )
+                    imported, cpu = map(float, told.stdout.split())
+                    if round_:  # the first one writes bytecode, as an installation does
+                        spans.append(cpu)
+                        imports.append(imported)
+    found = {"empty": min(empty), "kept": min(kept), "import": min(imports)}
+    print("cold process:", found, flush=True)
+    return found
+
+
+RACES: dict[str, Callable[[bool], dict[str, object]]] = {
+    "crane": crane_race,
+    "chains": chain_race,
+    "loop": loop_race,
+    "cold": cold_race,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("races", nargs="*", choices=[*RACES, []], help="default: all")
+    parser.add_argument("--quick", action="store_true", help="fewer settings and steps")
+    parser.add_argument("--page", action="store_true", help="write docs/benchmarks/dynamics.md and its plot")
+    asked = parser.parse_args()
+    found = {name: RACES[name](asked.quick) for name in asked.races or RACES}
+    if asked.page:
+        from race_page import write
+
+        write(found)
+
+
+if __name__ == "__main__":
+    main()

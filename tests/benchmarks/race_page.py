@@ -1,0 +1,151 @@
+"""The page of a race: docs/benchmarks/dynamics.md and its plot, made of what `race` found."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+_HEAD = """\
+# Dynamics against Exudyn
+
+<!-- Made by `python tests/benchmarks/race.py --page` -->
+
+Both codes in one run, on one thread, in turns; the least CPU time of several runs counts. Only ratios are told: seconds
+are the host's. Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9,
+`EigenSparse`, modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its
+quickest element here (no torsion; its beams with torsion take several times as long). Building the model is left out
+for both, everything that `simulate` and `SolveDynamic` do is in.
+"""
+_CRANE = """\
+## The paper's crane, 50 ms
+
+Least time in which $x_1 - x_4$ is right to a given error (RMS, against the converged run of either code: 32 elements a
+member, 5 µs; these two are {gap:.1e} m apart), over meshes, steps and methods of each code.
+
+| error | flexctrl | Exudyn | time ratio | goal |
+|---|---|---|---|---|
+{rows}
+
+```{{image}} ../_static/race.png
+:alt: Error of x1 - x4 against CPU time for all settings tried, both codes
+:width: 70%
+```
+
+Time is relative to the quickest setting of Exudyn that reaches 1e-3 m. A point is one mesh, step and method.
+"""
+_CHAINS = """\
+## Chains
+
+A chain of {length} m (1 kg/m, EA = 2π·10⁵ N, EI = 1 N m²) of cable elements, held at its upper end and let go without
+tension at 0.05 rad from the vertical (easy) or from the horizontal (full swing); steps of 1 ms. Our elements have
+torsion, Exudyn's cable has none.
+
+| chain | elements | steps | Newton iterations a step, flexctrl / Exudyn | time per step, ratio | goal |
+|---|---|---|---|---|---|
+{rows}
+
+Our time per step between 100 and {largest} elements grows with an exponent of {growth} (goal: 1.05).
+
+The full swing of {swing_elements} elements over {swing_steps} steps, through the lowest point and the whip of the
+free end: flexctrl finishes; Exudyn: {theirs}. Ratio of the times: {swing_ratio:.2f}.
+"""
+_LOOP = """\
+## A controller in Python at every step
+
+The crane with one element a member and steps of 0.1 ms, under a proportional controller that is read at every
+step: {over:.1f} µs a step over open loop (goal: 15 µs), where an open-loop step takes {open:.1f} µs on this host.
+"""
+_COLD = """\
+## From a cold process to the first result
+
+CPU time of a new process until the crane's first 500 steps are done, imports included: {empty:.2f} s with an empty
+cache, compiling everything (goal: 1.5 s), {kept:.2f} s with code kept by an earlier process. `import flexctrl` takes
+{imported:.0f} ms beyond numpy and casadi (goal: 150 ms); its parts are imported when first used. Python's bytecode is
+there, as after an installation.
+"""
+
+
+def write(found: dict[str, Any]) -> None:
+    """Write the page and the plot."""
+    parts = [_HEAD, versions()]
+    makers = {"crane": crane, "chains": chains, "loop": loop, "cold": cold}
+    parts += [makers[name](result) for name, result in found.items()]
+    page = DOCS / "benchmarks" / "dynamics.md"
+    page.parent.mkdir(exist_ok=True)
+    page.write_text("\n".join(parts), encoding="utf-8")
+    if "crane" in found:
+        plot(found["crane"], DOCS / "_static" / "race.png")
+
+
+def versions() -> str:
+    names = ("exudyn", "numpy", "casadi", "llvmlite")
+    told = ", ".join(f"{name} {version(name)}" for name in names)
+    return f"Python {platform.python_version()}, {told}; {platform.machine()}, {platform.system()}.\n"
+
+
+def crane(found: dict[str, Any]) -> str:
+    rows = []
+    for target, best in found["best"].items():
+        ours, theirs = best["flexctrl"], best["Exudyn"]
+        ratio = ours["seconds"] / theirs["seconds"]
+        rows.append(f"| {target} m | {_setting(ours)} | {_setting(theirs)} | **{ratio:.2f}** | 0.33 |")
+    return _CRANE.format(gap=found["gap"], rows="\n".join(rows))
+
+
+def _setting(p: dict[str, Any]) -> str:
+    return f"{p['elements']} elements a member, {1e3 * p['step']:g} ms, {p['name']}: {p['error']:.1e} m"
+
+
+def chains(found: dict[str, Any]) -> str:
+    from exudyn_chain import LENGTH
+
+    rows = []
+    for row in found["rows"]:
+        goal = "0.20" if row["elements"] >= 100 else "–"
+        newton = " / ".join(f"{k:.1f}" for k in row["newton"])
+        ratio = row["ours"] / row["theirs"]
+        rows.append(f"| {row['swing']} | {row['elements']} | {row['steps']} | {newton} | **{ratio:.2f}** | {goal} |")
+    swing, growths = found["swing"], found["growth"]
+    largest = max(int(n) for n in growths["easy"]["times"])
+    return _CHAINS.format(
+        length=LENGTH,
+        rows="\n".join(rows),
+        largest=largest,
+        growth=", ".join(f"{g['exponent']:.2f} ({name})" for name, g in growths.items()),
+        swing_elements=swing["elements"],
+        swing_steps=swing["steps"],
+        theirs=swing["theirs"],
+        swing_ratio=swing["ratio"],
+    )
+
+
+def loop(found: dict[str, Any]) -> str:
+    return _LOOP.format(over=1e6 * found["over"], open=1e6 * found["open"])
+
+
+def cold(found: dict[str, Any]) -> str:
+    return _COLD.format(empty=found["empty"], kept=found["kept"], imported=1e3 * found["import"])
+
+
+def plot(found: dict[str, Any], path: Path) -> None:
+    """Error against time, both codes."""
+    import matplotlib.pyplot as plt
+
+    unit = found["best"]["0.001"]["Exudyn"]["seconds"]
+    figure, ax = plt.subplots(figsize=(6.0, 4.0), layout="constrained")
+    for code, style in (("flexctrl", "o"), ("Exudyn", "^")):
+        points = sorted((p["seconds"] / unit, p["error"]) for p in found["points"] if p["code"] == code)
+        front, least = [], float("inf")
+        for seconds, error in points:
+            if error < least:
+                front.append((seconds, error))
+                least = error
+        (line,) = ax.loglog(*zip(*front, strict=True), "-", lw=1.5)
+        ax.loglog(*zip(*points, strict=True), style, ms=4, color=line.get_color(), label=code)
+    ax.set(xlabel="CPU time (1: Exudyn's quickest to 1e-3 m)", ylabel="error of x₁ − x₄ [m RMS]")
+    ax.legend()
+    ax.grid(alpha=0.3)
+    figure.savefig(path, dpi=100)
