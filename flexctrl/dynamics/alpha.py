@@ -200,7 +200,9 @@ class Stepper:
                 worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part of it bend"
             )
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
-        return AlphaPoint(state, rate, self.feed.at(state, point.supply, h), algorithmic, _trend(point, rate))
+        return AlphaPoint(
+            state, rate, self.feed.at(state, point.supply, h), algorithmic, _trend(point, rate, self.weight)
+        )
 
     def _astray(self, unforeseen: np.ndarray) -> bool:
         """Tell whether Newton's method heads for a turn that the motion did not announce: another root."""
@@ -243,10 +245,10 @@ class Stepper:
         return float(local.max(initial=0.0)) / allowed
 
 
-def _trend(before: AlphaPoint, rate: np.ndarray) -> np.ndarray:
+def _trend(before: AlphaPoint, rate: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Return the change of the accelerations, if going on with the last change was the better guess."""
     change = rate - before.rate
-    still, onward = np.abs(change).sum(), np.abs(change - before.trend).sum()
+    still, onward = (float(np.abs(a) @ weight) for a in (change, change - before.trend))
     guessed_well = onward < still if before.trend.any() else still > 0.0
     return change if guessed_well else np.zeros_like(change)
 

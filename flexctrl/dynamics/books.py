@@ -8,12 +8,16 @@ import numpy as np
 
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Block, Point
 from flexctrl.model.motion import State
 
 __all__ = ["Books", "Sums"]
 
 _OFTEN = 32
+_ABSURD = 0.5
+_VISIBLE = 1e-3
+_ROUND_OFF = 1e-6
 _LOBATTO = ((0.5 * (1.0 - (3.0 / 7.0) ** 0.5), 49.0 / 180.0), (0.5, 64.0 / 180.0))
 _ENDS = 1.0 / 20.0
 
@@ -32,6 +36,8 @@ class Sums:
         When the balance was drawn last [J].
     gap, turnover : float
         Largest |energy − start − work + lost| and largest energy turned over [J].
+    made : float
+        Energy − start − work + lost when the balance was drawn last [J].
     power : float
         Dissipated now [W].
     closure : float
@@ -49,6 +55,7 @@ class Sums:
     stored: float = 0.0
     gap: float = 0.0
     turnover: float = 0.0
+    made: float = 0.0
     power: float = 0.0
     closure: float = 0.0
     entered: int = 0
@@ -61,6 +68,8 @@ class Books:
     def __init__(self, feed: Feed, state: State, order: int) -> None:
         self.feed, self.model, self.order = feed, feed.model, order
         self.first = state.q
+        self.lawful = self.model.large
+        self.reach = yardsticks(self.model)
         probe = np.linspace(1.0, 2.0, self.model.n)
         self.dissipates = bool(self.model.switches.names) or self.model.energy(state.with_(v=probe))[2] != 0.0
         kinetic, stored, power = self.model.energy(state)
@@ -143,8 +152,18 @@ class Books:
         s.kinetic, s.stored, _ = self.model.energy(point.state)
         gap = s.kinetic + s.stored - s.start - s.work + s.lost
         s.turnover = max(s.turnover, s.kinetic, abs(s.work), s.lost, abs(s.stored + s.kinetic - s.start))
-        s.gap = max(s.gap, abs(gap))
+        s.gap, s.made = max(s.gap, abs(gap)), gap
         s.closure = max(s.closure, self.model.motion.closure_error(point.state))
+
+    @property
+    def nonsense(self) -> str:
+        """What is wrong with a run whose method makes energy from nothing, a large share of all; empty if none is."""
+        s = self.sums
+        if not (self.lawful and s.entered >= _OFTEN and s.made > _ABSURD * s.turnover):
+            return ""
+        if (s.moved < _VISIBLE * self.reach).all() or s.made < _ROUND_OFF * abs(s.start):
+            return ""
+        return f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
 
     @property
     def residual(self) -> float:

@@ -127,6 +127,9 @@ class Journey:
             if not ride(self):
                 step(stop, self.plan.until)
             self._memory = self.stepper.memory
+            if nonsense := self.books.nonsense:
+                where = f"at t = {self.point.state.t:.6g} s; take smaller steps, or AdaptiveAlpha"
+                raise StepError(self.stepper.counts.worst, f"{nonsense} {where}")
             interruption.check()
             if (now := time.perf_counter()) - self._told > 0.1:
                 self._told = now

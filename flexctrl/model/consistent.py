@@ -14,7 +14,7 @@ from flexctrl.structure.relations import Copy, Turn
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
 
-__all__ = ["Breach", "breaches", "check_state"]
+__all__ = ["Breach", "breaches", "check_state", "extent"]
 
 _ALLOWED = 1e-8
 
@@ -76,8 +76,7 @@ def breaches(model: Model, state: State) -> Iterator[Breach]:
     ------
     Breach
     """
-    nodes, motion, size = model.structure.nodes, model.motion, model.structure.size
-    size = max(size, *(float(np.abs(x).max()) for x in (model.rest.x, state.x)))
+    nodes, motion, size = model.structure.nodes, model.motion, extent(model, state)
     labels = [*map(str, nodes), "the ground"]
     off = np.abs(state.x - _expected(motion, state))
     yield _worst(off.max(axis=1) / size, lambda i: f"{labels[i]} is {off[i].max():.3g} m from where it is tied")
@@ -92,6 +91,21 @@ def breaches(model: Model, state: State) -> Iterator[Breach]:
         yield _worst(astray, lambda i: f"drive {names[i]} is {astray[i]:.3g} from the coordinate it drives")
     if model.large and not motion.plain:
         yield from _linked(motion, state, labels, size)
+
+
+def extent(model: Model, state: State) -> float:
+    """Return what counts as the size of a machine in a state: itself, or how far it is from the origin [m].
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+
+    Returns
+    -------
+    float
+    """
+    return max(model.structure.size, float(np.abs(model.rest.x).max()), float(np.abs(state.x).max()))
 
 
 def _worst(gaps: np.ndarray, say: Callable[[int], str]) -> Breach:

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import lsmr
 
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
+from flexctrl.model.consistent import extent
 from flexctrl.model.motion import State
 from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import parse_point
@@ -78,6 +79,11 @@ class _Wish:
     own: np.ndarray
     values: np.ndarray
     reach: float
+
+    @property
+    def size(self) -> float:
+        """What counts as far [m]."""
+        return max(self.model.structure.size, float(np.abs(self.x).max(initial=0.0)))
 
     def gap(self, state: State) -> np.ndarray:
         """What is wanting, in metres."""
@@ -167,7 +173,7 @@ def _asked(model: Model, wish: State | Mapping[Node, Sequence[float]]) -> _Wish:
         numbers = np.arange(len(model.structure.nodes))
         own = np.unique(model.motion.cells[model.motion.source_base :])
         own = own[own < model.n]
-        return _Wish(model, numbers, wish.x[:-1], _square(wish.R[:-1]), own, wish.q[own], model.structure.size)
+        return _Wish(model, numbers, wish.x[:-1], _square(wish.R[:-1]), own, wish.q[own], extent(model, wish))
     places = _points(model, wish, "wish")
     numbers = np.array(list(places), dtype=int)
     x = np.array(list(places.values())).reshape(-1, 3)
@@ -192,7 +198,7 @@ def _first(model: Model, wish: State | Mapping[Node, Sequence[float]]) -> State:
 
 def _nearest(wish: _Wish, state: State) -> State:
     """Gauss and Newton's method from a state, with steps as long as they help."""
-    model, size = wish.model, wish.model.structure.size
+    model, size = wish.model, wish.size
     gap = wish.gap(state)
     for _ in range(_ROUNDS):
         step = _least(wish.slope(state), gap)

@@ -162,8 +162,8 @@ def accept(m: March) -> None:
     for i in range(0, f.padded, 8):
         rate = eight(f.rate[i:])
         change = rate - eight(m.rate[i:])
-        still = still + abs(change)
-        onward = onward + abs(change - eight(m.trend[i:]))
+        still = still + abs(change) * eight(m.weight[i:])
+        onward = onward + abs(change - eight(m.trend[i:])) * eight(m.weight[i:])
         reach = larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:])))
         far = larger(far, reach * eight(m.weight[i:]))
         put(m.reach[i:], reach)

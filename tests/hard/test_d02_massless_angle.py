@@ -1,0 +1,90 @@
+"""D2: freedoms without mass: a drive's source angle, from soft to stiff shafts, in frequency and in time.
+
+A motor turns 5 kg m² through a shaft of k_θ from 10 to 10¹² N m/rad. The pencils are in tests/validation too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorder import Absolute
+
+import flexctrl as fc
+
+PAGE = "hard"
+LOAD, TORQUE = 5.0, 2.0
+SHAFTS = (1e1, 1e3, 1e6, 1e9, 1e12)
+
+
+def turntable(stiffness: float, inertia: float = 0.0, ratio: float = 1.0) -> fc.Model:
+    body = fc.RigidBody("table", (0, 0, 0), 1.0, (LOAD, LOAD, LOAD))
+    motor = fc.RotaryDrive("motor", body.node, axis="z", stiffness=stiffness, inertia=inertia, ratio=ratio)
+    structure = fc.Structure(
+        [body],
+        [fc.Support(body.node, "u v w rx ry")],
+        [motor],
+        inputs=[fc.MotorTorque("torque", "motor")],
+        outputs=[fc.Rotation("table", body.node, "z"), fc.DriveAngle("angle", "motor")],
+    )
+    return fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity()])
+
+
+@pytest.mark.parametrize("stiffness", SHAFTS)
+def test_no_mode_is_invented(record, stiffness):
+    linear = fc.linearize(turntable(stiffness))
+    modes = linear.modes()
+    record(
+        f"D2 motor without inertia, k_θ = {stiffness:g}: infinite eigenvalues, rigid modes, modes",
+        ours=[modes.massless, modes.rigid, len(modes)],
+        reference=[1, 1, 1],
+        source="M = diag(0, 5)",
+        tolerance=Absolute(0),
+    )
+    omega = np.array([0.01, 1.0, 100.0])
+    table, angle = linear.frequency_response(omega).values[:, 0]
+    exact = -1.0 / (LOAD * omega**2)
+    worst = max(np.abs(table / exact - 1).max(), np.abs(angle / (exact + 1.0 / stiffness) - 1).max())
+    record(
+        f"D2 motor without inertia, k_θ = {stiffness:g}: torque → angles, relative error",
+        ours=worst,
+        reference=0,
+        source="−1/(J ω²) and 1/k − 1/(J ω²)",
+        tolerance=Absolute(1e-10),
+    )
+
+
+@pytest.mark.parametrize("method", [fc.GeneralizedAlpha(1e-2), fc.AdaptiveAlpha()], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("stiffness", SHAFTS)
+def test_a_massless_angle_in_time(record, stiffness, method):
+    """Under a torque that is there at once the shaft is twisted at once, by M/k."""
+    run = fc.simulate(turntable(stiffness), until=2.0, inputs={"torque": TORQUE}, method=method)
+    exact = 0.5 * TORQUE / LOAD * run.t**2
+    error = [np.abs(run["table"] - exact).max(), np.abs(run["angle"] - exact - TORQUE / stiffness)[1:].max(initial=0.0)]
+    record(
+        f"D2 motor without inertia, k_θ = {stiffness:g}, {type(method).__name__}: errors of both angles over 2 s [rad]",
+        ours=error,
+        reference=[0, 0],
+        source="M t²/2J, and M/k more",
+        tolerance=Absolute(1e-6),
+    )
+
+
+@pytest.mark.parametrize("stiffness", SHAFTS)
+@pytest.mark.parametrize("ratio", [1.0, 1000.0])
+def test_stiff_shafts_with_inertia_in_time(record, stiffness, ratio):
+    """Where steps do not resolve the shaft the machine moves as one: (J + R² J_m) α = R M."""
+    inertia = 1.0 / ratio**2
+    model = turntable(stiffness / ratio**2, inertia, ratio)
+    run = fc.simulate(model, until=4.0, inputs={"torque": TORQUE / ratio}, tolerance=fc.Tolerance(1e-6, 1e-9))
+    whole = 0.5 * TORQUE / (LOAD + 1.0) * run.t**2
+    omega = np.sqrt(stiffness * (1.0 / LOAD + 1.0))
+    swing = TORQUE / (stiffness * (1.0 + 1.0 / LOAD)) / (1.0 + LOAD)
+    resolved = run.report.steps > 10 * 4.0 * omega / (2.0 * np.pi)
+    exact = whole - (swing * (1.0 - np.cos(omega * run.t)) if resolved else 0.0)
+    record(
+        f"D2 motor of 1 kg m², R = {ratio:g}, k_θ R² = {stiffness:g}: table's angle over 4 s, error [rad]",
+        ours=np.abs(run["table"] - exact).max(),
+        reference=0,
+        source="rigid motion and the shaft's swing",
+        tolerance=Absolute(1e-4 + (0.0 if resolved else 2.0 * swing)),
+    )

@@ -1,0 +1,69 @@
+"""Every run tells its energy, steps, rejections, Newton counts, worst freedom; what fails says so, keeping the rest.
+
+The fixture in conftest.py asks this of every simulation of these tests; here are runs that cannot reach their end.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.dynamics.run import Status
+from flexctrl.errors import MechanismError, StructureError
+
+ROD = fc.Section(EA=1.0, EI_y=1.0, EI_z=1.0, GJ=1.0, rhoA=1.0, rhoJ=0.0)
+
+
+def chain(count: int = 12, stiffness: float = 1e8) -> fc.Model:
+    """Masses on stiff springs, let go from the horizontal."""
+    springs = [fc.Spring(f"s{i}", (i, 0, 0), (i + 1, 0, 0), stiffness=stiffness) for i in range(count)]
+    masses = [fc.PointMass(f"m{i}", spring.end, 1.0) for i, spring in enumerate(springs)]
+    joints = [fc.Support(springs[0].start), *(fc.Pin(a.end, b.start) for a, b in pairwise(springs))]
+    joints += [fc.Pin(spring.end, mass.node) for spring, mass in zip(springs, masses, strict=True)]
+    structure = fc.planar(fc.Structure([*springs, *masses], joints), "y")
+    return fc.assemble(structure, [fc.LargeRotation(), fc.Gravity()])
+
+
+@pytest.mark.parametrize("method", [fc.GeneralizedAlpha(0.02), fc.ConservingMidpoint(0.02)], ids=lambda m: str(m)[:8])
+def test_steps_that_make_energy_from_nothing_end_the_run(method):
+    """Fixed steps of many periods of the springs: an energy that grows without a source is no result."""
+    run = fc.simulate(chain(), until=20.0, method=method)
+    assert run.status is Status.FAILED
+    assert "has made" in run.report.message
+    assert "AdaptiveAlpha" in run.report.message
+    assert len(run.t) > 10
+
+
+def test_steps_that_are_controlled_reach_the_end_of_the_same_run():
+    run = fc.simulate(chain(), until=5.0)
+    assert run.status is Status.FINISHED
+    assert run.report.energy.gap < 0.0
+
+
+def test_a_dead_point_ends_the_run_by_name():
+    """Rockers: the first leans out until the coupler and the second are in line, and cannot say how they go on."""
+    points = [(0, 0, 0), (0.6, 0.8, 0), (1.4, 0.8, 0), (2.0, 0, 0)]
+    rods = [fc.Beam(f"rod{i}", a, b, ROD) for i, (a, b) in enumerate(pairwise(points))]
+    joints = [fc.Pin(a.end, b.start) for a, b in pairwise(rods)]
+    joints += [fc.Support(rods[0].start, "u v w"), fc.Support(rods[-1].end, "u v w")]
+    model = fc.assemble(fc.planar(fc.Structure(rods, joints), "z"), [fc.LargeRotation()])
+    run = fc.simulate(model, start=model.rest.with_(v=np.ones(1)), until=5.0, method=fc.GeneralizedAlpha(0.01))
+    assert run.status is Status.FAILED
+    assert "dead point" in run.report.message
+    assert "worst freedom" in run.report.message
+
+
+def test_a_freedom_without_mass_and_stiffness_is_refused_by_name():
+    spring, mass = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=0.0), fc.PointMass("mass", (1, 0, 0), 0.0)
+    structure = fc.Structure([spring, mass], [fc.Support(spring.start), fc.Pin(spring.end, mass.node)])
+    with pytest.raises(MechanismError, match="spring_1_u"):
+        fc.simulate(fc.assemble(structure, [fc.LargeRotation()]), until=1.0)
+
+
+@pytest.mark.parametrize("until", [0.0, -1.0, float("nan"), float("inf")])
+def test_an_end_that_is_none_is_refused(until):
+    with pytest.raises(StructureError, match="until"):
+        fc.simulate(chain(2), until=until)
