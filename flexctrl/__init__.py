@@ -48,6 +48,7 @@ _HOMES = {
     "flexctrl.effects.motor_lag": ("MotorLag",),
     "flexctrl.effects.backlash": ("Backlash",),
     "flexctrl.effects.wind": ("Wind",),
+    "flexctrl.effects.rope_mass": ("RopeMass",),
     "flexctrl.kernels.kernel": ("CasadiVM", "Compiled"),
     "flexctrl.model.assemble": ("assemble", "rigid"),
     "flexctrl.model.model": ("Model",),

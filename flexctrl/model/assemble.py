@@ -13,6 +13,7 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.effects.rope_mass import RopeMass
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equilibrium import equilibrium
@@ -20,6 +21,7 @@ from flexctrl.model.frictions import inner_freedoms
 from flexctrl.model.linearize import linearize
 from flexctrl.model.mobility import motion_of
 from flexctrl.model.model import Model, Small
+from flexctrl.structure.cut import cut_ropes
 from flexctrl.structure.elements import Beam, Rope
 from flexctrl.structure.freedoms import listed
 from flexctrl.structure.relations import Group
@@ -56,6 +58,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
         effect.check_beside(parts)
         _check_names(structure, effect)
         effect.check_on(structure)
+    structure, parts = _heavy(structure, parts)
     if any(isinstance(e, GeometricStiffness) for e in parts):
         return _prestressed(structure, parts, backend)
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
@@ -77,6 +80,20 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]
     return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
+
+
+def _heavy(structure: Structure, parts: tuple[Effect, ...]) -> tuple[Structure, tuple[Effect, ...]]:
+    """Cut ropes with mass into their elements, in the structure and where effects name them; the others have none."""
+    masses = [e for e in parts if isinstance(e, RopeMass)]
+    heavy = {p.name for p in structure.elements for e in masses if e.weighs(p)}
+    structure, pieces = cut_ropes(structure, heavy)
+
+    def named(effect: Effect) -> Effect:
+        if not isinstance(effect, Deforming | RopeMass) or not effect.of:
+            return effect
+        return type(effect)([piece for name in effect.of for piece in pieces.get(name, (name,))])
+
+    return structure, tuple(named(e) for e in parts) if pieces else parts
 
 
 def _check_names(structure: Structure, effect: Effect) -> None:

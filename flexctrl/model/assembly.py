@@ -30,6 +30,9 @@ def mass_blocks(s: Structure, motion: Motion) -> Iterator[tuple[str, Block]]:
                 yield part.name, (places, matrix)
         elif isinstance(part, PointMass | RigidBody):
             yield part.name, (6 * s.number(part.node) + np.arange(6), _body_mass(part))
+        elif isinstance(part, Rope) and part.rhoA:
+            places = np.concatenate([6 * s.number(node) + np.arange(3) for node in part.nodes])
+            yield part.name, (places, part.mass / 12.0 * np.kron([[5.0, 1.0], [1.0, 5.0]], np.eye(3)))
     for i, drive in enumerate(s.drives):
         yield drive.name, (np.array([motion.source_base + i]), np.array([[drive.inertia]]))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
-from flexctrl.effects.flexibility import BeamFlexibility
+from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch
 from flexctrl.mechanics.matrices import bending, coupling, plane_masses
 from flexctrl.model import kinds
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
@@ -74,7 +74,9 @@ def families_of(
     bent = [b for b in beams if b.name not in rigid and b.name not in {name for f in modal for name in f.parts}]
     stiff = tuple(e for e in effects if not isinstance(e, BeamFlexibility))
     springs = [p for p in parts if isinstance(p, Spring) and p.name not in loose]
-    ropes = [p for p in parts if isinstance(p, Rope) and p.name not in rigid]
+    ropes = [p for p in parts if isinstance(p, Rope) and not p.rhoA and p.name not in rigid]
+    heavy = [p for p in parts if isinstance(p, Rope) and p.rhoA]
+    links = tuple(e for e in effects if not isinstance(e, RopeStretch))
     tight = [d for d in structure.drives if d.name not in loose]
     made = [
         _beams(kinds.BEAM, structure, effects, [b for b in bent if not b.section.shears], rigid),
@@ -83,6 +85,8 @@ def families_of(
         _beams(kinds.BEAM, structure, stiff, [b for b in beams if b.name in rigid], rigid),
         lines_family(kinds.SPRING, structure, effects, springs),
         lines_family(kinds.ROPE, structure, effects, ropes),
+        lines_family(kinds.HEAVY_ROPE, structure, effects, [p for p in heavy if p.name not in rigid]),
+        lines_family(kinds.HEAVY_ROPE, structure, links, [p for p in heavy if p.name in rigid]),
         _bodies(kinds.POINT, structure, effects, [p for p in parts if isinstance(p, PointMass)]),
         _bodies(kinds.BODY, structure, effects, [p for p in parts if isinstance(p, RigidBody)]),
         drives_family(kinds.ROTARY_DRIVE, structure, effects, [d for d in tight if isinstance(d, RotaryDrive)]),
@@ -162,6 +166,8 @@ def lines_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], lines: S
     """Return the family of some ropes or springs."""
     nodes = [[s.number(line.start), s.number(line.end)] for line in lines]
     parameters = [[line.stiffness, line.length, line.damping] for line in lines]
+    if kind is kinds.HEAVY_ROPE:
+        parameters = [[*p, line.mass] for p, line in zip(parameters, lines, strict=True) if isinstance(line, Rope)]
     return _family(kind, effects, [line.name for line in lines], nodes, parameters)
 
 

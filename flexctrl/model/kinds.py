@@ -9,7 +9,7 @@ three seeds more.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
@@ -291,6 +291,23 @@ def _rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     return Shares(ca.SX(6, 1), pieces.line_force(m, rope_pull(effects, m)), ca.SX(1, 1), stored)
 
 
+def _heavy_rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    """A rope with mass, the last of its parameters."""
+    import casadi as ca
+
+    rope = _rope(effects, nodes, slot, parameters[:-1])
+    half = ca.vertcat(0.5 * parameters[-1], ca.SX(6, 1))
+    ends = [_body(effects, [node], slot, half) for node in nodes]
+    first, second = nodes
+    apart = pieces.body_energy(replace(first, v=first.v - second.v), pieces.named(pieces.BODY_PARAMETERS, half))
+    return Shares(
+        pieces.rope_share(*(e.inertia for e in ends)),
+        rope.force + pieces.rope_share(*(e.force for e in ends)),
+        ends[0].kinetic + ends[1].kinetic - apart / 6.0,
+        rope.stored + ends[0].stored + ends[1].stored,
+    )
+
+
 def rope_pull(effects: tuple[Effect, ...], m: pieces.LineMotion) -> ca.SX:
     """Return the tension in a rope under some effects."""
     import casadi as ca
@@ -357,6 +374,7 @@ def modal_beam(count: int) -> Kind:
 
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
 ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
+HEAVY_ROPE = Kind("heavy_rope", 2, 3, 0, len(pieces.LINE_PARAMETERS) + 1, _heavy_rope)
 POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)
 BODY = Kind("body", 1, 6, 0, len(pieces.BODY_PARAMETERS), _body)
 ROTARY_DRIVE = Kind("rotary_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _rotary)

@@ -202,7 +202,7 @@ def _element_kinds(sections: Mapping[str, Section], earlier: Sequence[Part]) -> 
     section = _chosen(sections, "section")
     return {
         "beam": Kind(Beam, {**ends, "section": section, "elements": whole, "up": direction}),
-        "rope": Kind(Rope, {**ends, "EA": number, "length": number, "damping": number}),
+        "rope": Kind(Rope, {**ends, **dict.fromkeys(("EA", "length", "damping", "rhoA"), number), "elements": whole}),
         "spring": Kind(Spring, {**ends, "stiffness": number, "length": number, "damping": number}),
         "point_mass": Kind(PointMass, {"at": point, "mass": number}),
         "rigid_body": Kind(RigidBody, {"at": point, "mass": number, "inertia": _inertia, "points": mapping(point)}),

@@ -18,6 +18,7 @@ from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.lugre_friction import LuGre, LuGreFriction
 from flexctrl.effects.motor_lag import MotorLag
+from flexctrl.effects.rope_mass import RopeMass
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.viscous_friction import ViscousFriction
 from flexctrl.effects.wind import Wind
@@ -69,6 +70,7 @@ EFFECTS: dict[str, Kind] = {
     "component_modes": Kind(ComponentModes, {"count": whole, "of": several(text)}),
     "shaft_elasticity": Kind(ShaftElasticity, {"of": several(text)}),
     "rope_stretch": Kind(RopeStretch, {"of": several(text)}),
+    "rope_mass": Kind(RopeMass, {"of": several(text)}),
     "large_rotation": Kind(LargeRotation),
     "geometric_stiffness": Kind(GeometricStiffness),
     "rotating_frame": Kind(RotatingFrame, {"rate": vector, "center": vector}),

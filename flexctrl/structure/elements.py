@@ -178,7 +178,7 @@ class Beam:
 
 @dataclass(frozen=True)
 class Rope:
-    """A massless rope that pulls but does not push: tension (EA/ℓ₀)(ℓ − ℓ₀)₊.
+    """A rope that pulls but does not push: tension (EA/ℓ₀)(ℓ − ℓ₀)₊; massless but for the effect `RopeMass`.
 
     Parameters
     ----------
@@ -191,6 +191,10 @@ class Rope:
         Unstretched length ℓ₀ [m]; default: the distance of the ends.
     damping : float
         Axial damping [N s/m], ≥ 0, acting while the rope is taut.
+    rhoA : float
+        Mass per unstretched length [kg/m], ≥ 0.
+    elements : int
+        Number of elements where it has mass.
 
     Raises
     ------
@@ -204,6 +208,8 @@ class Rope:
     EA: float
     length: float
     damping: float
+    rhoA: float
+    elements: int
 
     def __init__(
         self,
@@ -213,16 +219,25 @@ class Rope:
         EA: float,
         length: float | None = None,
         damping: float = 0.0,
+        rhoA: float = 0.0,
+        elements: int = 1,
     ) -> None:
         owner = f"Rope {check_name(name, 'Rope')!r}"
         check_finite(EA, "EA", owner, above=0.0)
         _set_line(self, name, start, end, length, damping, owner)
         object.__setattr__(self, "EA", float(EA))
+        object.__setattr__(self, "rhoA", check_finite(rhoA, "rhoA", owner, least=0.0))
+        object.__setattr__(self, "elements", check_whole(elements, "elements", owner, least=1, most=10**6))
 
     @property
     def stiffness(self) -> float:
         """Axial stiffness EA/ℓ₀ [N/m]."""
         return self.EA / self.length
+
+    @property
+    def mass(self) -> float:
+        """Its own mass ρA ℓ₀ [kg]."""
+        return self.rhoA * self.length
 
     @property
     def nodes(self) -> tuple[Node, ...]:

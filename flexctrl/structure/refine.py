@@ -8,7 +8,7 @@ from math import gcd
 from typing import Any, TypeVar
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.structure.elements import Beam, Node
+from flexctrl.structure.elements import Beam, Node, Rope
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.structure import Structure
 
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 def refine(structure: Structure, factor: int) -> Structure:
-    """Return a structure whose beams have ``factor`` times as many elements.
+    """Return a structure whose beams and ropes have ``factor`` times as many elements.
 
     Joints, drives, signals stay where they are: node i of a beam becomes node ``factor``·i.
 
@@ -38,7 +38,8 @@ def refine(structure: Structure, factor: int) -> Structure:
     if factor != int(factor) or factor < 1:
         raise StructureError(f"refine: factor = {factor!r}; expected a whole number ≥ 1")
     _check_joints(structure, "refine")
-    return _meshed(structure, {b.name: factor * b.elements for b in _beams(structure)})
+    meshed = _meshed(structure, {b.name: factor * b.elements for b in _beams(structure)})
+    return meshed.with_(elements=[_finer(e, factor) if isinstance(e, Rope) else e for e in meshed.elements])
 
 
 def coarsen(structure: Structure, of: Sequence[str] = ()) -> Structure:
@@ -122,14 +123,19 @@ def _meshed(structure: Structure, elements: Mapping[str, int]) -> Structure:
     assert not isinstance(structure.joints, JoinTable)
     return structure.with_(
         elements=[new.get(e.name) or e for e in structure.elements],
-        joints=[_with_nodes(j, moved) for j in structure.joints],
-        drives=[_with_nodes(d, moved) for d in structure.drives],
-        inputs=[_with_nodes(i, moved) for i in structure.inputs],
-        outputs=[_with_nodes(o, moved) for o in structure.outputs],
+        joints=[with_nodes(j, moved) for j in structure.joints],
+        drives=[with_nodes(d, moved) for d in structure.drives],
+        inputs=[with_nodes(i, moved) for i in structure.inputs],
+        outputs=[with_nodes(o, moved) for o in structure.outputs],
     )
 
 
-def _with_nodes(value: T, moved: Any) -> T:
+def _finer(rope: Rope, factor: int) -> Rope:
+    ends, count = (rope.start.position, rope.end.position), factor * rope.elements
+    return Rope(rope.name, *ends, rope.EA, rope.length, rope.damping, rhoA=rope.rhoA, elements=count)
+
+
+def with_nodes(value: T, moved: Any) -> T:
     """Return a frozen value with every node in it replaced; it was checked when it was made."""
     assert is_dataclass(value)
     copy = object.__new__(type(value))
@@ -144,4 +150,4 @@ def _replaced(value: Any, moved: Any) -> Any:
     return tuple(_replaced(v, moved) for v in value) if isinstance(value, tuple) else value
 
 
-__all__ = ["coarsen", "refine"]
+__all__ = ["coarsen", "refine", "with_nodes"]

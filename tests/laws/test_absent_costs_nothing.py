@@ -15,7 +15,7 @@ def machine(drives: bool = True, ropes: bool = True, masses: bool = True) -> fc.
     boom = fc.Beam("boom", (0, 0, 0), (2, 0, 0), TUBE, elements=2)
     parts, joints = [boom], [fc.Support(boom.start, held="u v w rx ry")]
     if ropes:
-        rope = fc.Rope("rope", boom.end, (2, 0, -1), EA=1e5)
+        rope = fc.Rope("rope", boom.end, (2, 0, -1), EA=1e5, rhoA=0.5, elements=3)
         parts.append(rope)
         joints.append(fc.Pin(boom.end, rope.start))
         if not masses:
@@ -47,6 +47,7 @@ ADDED = [
     (fc.ShaftElasticity(), 1, {"rotary_drive"}),
     (fc.RopeStretch(), 1, {"rope"}),
     (fc.Wind({"load": 1.0}, (10, 0, 0)), 0, {"wind"}),
+    (fc.RopeMass(), 4, {"heavy_rope"}),
     (fc.RayleighDamping(alpha=0.1), 0, {"beam", "point", "rotary_drive"}),
 ]
 

@@ -1,0 +1,142 @@
+"""Ropes with mass: hanging chains against Bessel functions, taut ropes, catenaries; absent, a massless line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.errors import StructureError
+
+LARGE, HEAVY, G, L, RHO = fc.LargeRotation(), fc.RopeMass(), 9.81, 10.0, 2.0
+CHAIN = np.array([1.20241278, 2.76003906, 4.32686396])
+"""(j₀ₖ/2): zeros of the Bessel function J₀ (B14), over √(g/L)."""
+LOADED = {1.0: (1.05642248, 4.08168676, 7.73750314), 100.0: (1.00082912, 31.52605999, 63.00444850)}
+"""With a load of μ ρ L (B14)."""
+
+
+def hanging(elements: int, mu: float = 0.0, **more: float) -> fc.Structure:
+    """A rope of 20 kg on which a load hangs, in the x-z plane."""
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -L), EA=1e9, rhoA=RHO, elements=elements, **more)
+    parts, joints = [rope], [fc.Support(rope.start)]
+    if mu:
+        parts.append(fc.PointMass("load", rope.end, mu * RHO * L))
+        joints.append(fc.Pin(rope.end, parts[1].node))
+    return fc.planar(fc.Structure(parts, joints, outputs=[fc.Tension("pull", rope)]), "y")
+
+
+def frequencies(model: fc.Model, count: int) -> np.ndarray:
+    linear = fc.linearize(model, at=fc.equilibrium(model))
+    return np.sort(linear.modes().omega)[:count] / np.sqrt(G / L)
+
+
+@pytest.mark.parametrize("stretching", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_a_hanging_chain_swings_as_bessel_says(stretching):
+    """Second order in the elements where tension falls to nothing; elastic ones and rigid links alike."""
+    more = [fc.RopeStretch()] if stretching else []
+    errors = [
+        np.abs(frequencies(fc.assemble(hanging(n), [LARGE, fc.Gravity(), HEAVY, *more]), 3) / CHAIN - 1.0)
+        for n in (10, 20)
+    ]
+    assert errors[1] == pytest.approx([3.3e-4, 3.4e-3, 1.2e-2], rel=0.1)
+    assert np.log2(errors[0] / errors[1])[:2] == pytest.approx([2.0, 2.0], abs=0.15)
+
+
+@pytest.mark.parametrize("mu", LOADED)
+def test_a_rope_with_a_load(mu):
+    model = fc.assemble(hanging(20, mu), [LARGE, fc.Gravity(), HEAVY, fc.RopeStretch()])
+    assert frequencies(model, 3) == pytest.approx(LOADED[mu], rel=2e-4 if mu == 1.0 else 5e-5)
+
+
+def test_a_rope_a_millionth_of_its_load():
+    """D12: pendulum and string modes both right."""
+    pendulum, string = frequencies(fc.assemble(hanging(20, 1e6), [LARGE, fc.Gravity(), HEAVY]), 2)
+    assert pendulum == pytest.approx(1.0000000833333, rel=1e-8)
+    assert string == pytest.approx(3141.593757, rel=1e-5)
+
+
+def test_tension_carries_what_hangs_below():
+    """At the start of the rope, at its first element's middle."""
+    structure = hanging(10, 1.0)
+    model = fc.assemble(structure, [LARGE, fc.Gravity(), HEAVY, fc.RopeStretch()])
+    found = fc.equilibrium(model).state
+    assert model.measure(found)[0] == pytest.approx(RHO * L * (2.0 - 0.05) * G, rel=1e-9)
+
+
+def test_a_rope_between_two_posts_sags_into_a_catenary():
+    """y = a (cosh(x/a) − 1) for a rope of 11 m over 10 m: 2 a sinh(5/a) = 11; second order in the elements."""
+    from scipy.optimize import brentq
+
+    a = brentq(lambda a: 2.0 * a * np.sinh(5.0 / a) - 11.0, 1.0, 100.0)
+    sag, errors = a * (np.cosh(5.0 / a) - 1.0), []
+    for count in (8, 16):
+        rope = fc.Rope("rope", (0, 0, 0), (10, 0, 0), EA=1e7, length=11.0, rhoA=RHO, elements=count)
+        structure = fc.planar(fc.Structure([rope], [fc.Support(rope.start), fc.Support(rope.end)]), "y")
+        model = fc.assemble(structure, [LARGE, fc.Gravity(), HEAVY, fc.RopeStretch()])
+        x = np.array([p.start.position[0] for p in model.structure.elements])[1:]
+        guess = {f"rope{i}_1_w": a * (np.cosh((at - 5.0) / a) - np.cosh(5.0 / a)) for i, at in enumerate(x)}
+        found = fc.equilibrium(model, start=model.displace(guess)).state
+        errors.append(abs(-found.x[:, 2].min() / sag - 1.0))
+    assert errors[0] < 1e-2
+    assert errors[1] < 0.3 * errors[0]
+
+
+@pytest.mark.parametrize("large", [True, False])
+def test_without_the_effect_a_rope_is_a_massless_line(large):
+    effects = [fc.Gravity(), fc.RopeStretch(), *([LARGE] if large else [])]
+    heavy, light = fc.assemble(hanging(8, 1.0), effects), fc.assemble(_massless(), effects)
+    assert heavy.n == light.n
+    assert [f.kernels for f in heavy.forces.families] == [f.kernels for f in light.forces.families]
+    assert (heavy.mass() != light.mass()).nnz == 0
+
+
+def _massless() -> fc.Structure:
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -L), EA=1e9)
+    load = fc.PointMass("load", rope.end, RHO * L)
+    joints = [fc.Support(rope.start), fc.Pin(rope.end, load.node)]
+    return fc.planar(fc.Structure([rope, load], joints, outputs=[fc.Tension("pull", rope)]), "y")
+
+
+def test_assembled_matrices_are_the_slopes_of_the_forces():
+    model = fc.assemble(hanging(4, 1.0), [LARGE, HEAVY, fc.RopeStretch(), fc.RayleighDamping(alpha=0.3)])
+    still = np.zeros(model.n)
+    slope = [-model.slope(model.rest, still, still, seeds, np.zeros(0)).toarray() for seeds in np.eye(3).tolist()]
+    assert slope[2] == pytest.approx(model.mass().toarray(), abs=1e-9)
+    assert slope[1] == pytest.approx(0.3 * model.mass().toarray(), abs=1e-9)
+    v = np.random.default_rng(1).normal(size=model.n)
+    assert model.energy(model.rest.with_(v=v))[0] == pytest.approx(0.5 * v @ model.mass() @ v)
+
+
+def test_a_swinging_rope_keeps_its_energy():
+    for backend in (fc.Compiled(), fc.CasadiVM()):
+        structure = hanging(4, 0.5, damping=0.0)
+        model = fc.assemble(structure, [LARGE, fc.Gravity(), HEAVY], backend)
+        start = model.rest.with_(v=np.linspace(1.0, 0.5, model.n))
+        run = fc.simulate(model, until=0.2, start=start, method=fc.GeneralizedAlpha(2e-3, rho=1.0))
+        assert run.report.energy_residual < 1e-4
+
+
+def test_only_the_named_ropes_have_mass_and_stretch():
+    ropes = [fc.Rope(n, (i, 0, 0), (i, 0, -1), EA=1e6, rhoA=1.0, elements=3) for i, n in enumerate(("a", "b"))]
+    loads = [fc.PointMass(f"m_{r.name}", r.end, 1.0) for r in ropes]
+    joints = [j for r, m in zip(ropes, loads, strict=True) for j in (fc.Support(r.start), fc.Pin(r.end, m.node))]
+    structure = fc.Structure([*ropes, *loads], joints)
+    model = fc.assemble(structure, [LARGE, fc.RopeMass(of=["a"]), fc.RopeStretch(of=["a", "b"])])
+    assert [p.name for p in model.structure.elements] == ["a0", "a1", "a2", "b", "m_a", "m_b"]
+    assert all(model.bends(p) for p in model.structure.elements[:4])
+    twin = fc.rigid(model)
+    assert twin.n == 3 * 2 + 2
+    assert [fc.refine(structure, 2).part(n).elements for n in "ab"] == [6, 6]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: hanging(0), "elements = 0"),
+        (lambda: fc.assemble(hanging(2), [fc.RopeMass(of=["rpoe"])]), "no rope 'rpoe' with rhoA.*rope"),
+        (lambda: fc.Rope("rope", (0, 0, 0), (0, 0, 1), EA=1.0, rhoA=-1.0), "rhoA = -1"),
+    ],
+)
+def test_impossible_heavy_ropes_are_refused(make, message):
+    with pytest.raises(StructureError, match=message):
+        make()
