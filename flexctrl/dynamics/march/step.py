@@ -21,7 +21,7 @@ _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
 _TRUSTED = 8
-_HABIT = 0.02
+_HABIT = 0.002
 
 
 def step(m: March) -> int:
