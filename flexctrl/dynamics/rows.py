@@ -112,13 +112,15 @@ class Rows:
 
     def sampled(self, table: np.ndarray, commands: np.ndarray, states: list[State], slack: float) -> None:
         """Write the rows of many steps with inputs of their own, and keep the states due for drawing."""
-        self.frames += states
         if self.every is not None:
             times = table[:, 0]
             ahead = int((times[-1] + slack) / self.every) + 1
             found = np.searchsorted(times, self.every * np.arange(self.count, ahead) - slack)
             chosen = found[found < len(times)]
+            if len(states) == len(table):
+                states = [states[i] for i in chosen]
             table, commands = table[chosen], commands[chosen]
+        self.frames += states
         self.count += len(table)
         self.recorder.rows(table, commands)
 

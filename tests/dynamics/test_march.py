@@ -18,6 +18,7 @@ from flexctrl.dynamics.march.loops import run as tasks
 from flexctrl.dynamics.march.marching import Marcher, Method
 from flexctrl.dynamics.march.record import DONE, FIXED, SETTLE
 from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.errors import ControllerError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
 from machines import machine
@@ -197,3 +198,57 @@ def test_models_that_cannot_march_take_plain_steps(effects, marched):
     assert isinstance(stepper, MarchingStepper) is marched
     plain = FIXED_STEPS.stepper(model.with_(backend=fc.CasadiVM()), feed_of(model, None, np.zeros(0)), TIGHT)
     assert not isinstance(plain, MarchingStepper)
+
+
+@pytest.mark.parametrize("every", [None, 4e-3])
+def test_controllers_read_at_every_step_are_ridden_with(every, monkeypatch, tmp_path):
+    """Inputs that jump at every step: rows, states within, books, what a stream writes."""
+    brake = Brake(sample_time=FIXED_STEPS.step)
+    how = {"controller": brake, "until": 0.06, "method": FIXED_STEPS, "tolerance": TIGHT, "every": every}
+    a, b = both(crane(), monkeypatch, **how)
+    alike(a, b)
+    for t in (0.004, 0.011, 0.0123, 0.05):
+        assert np.allclose(a.at(t).state.x, b.at(t).state.x, rtol=0.0, atol=1e-8)
+    fc.simulate(crane(), **how, record=fc.CsvStream(tmp_path / "rows.csv"))
+    written = np.genfromtxt(tmp_path / "rows.csv", delimiter=",", skip_header=1)
+    assert np.allclose(written, np.column_stack([a.t, a.y, a.u]), rtol=1e-9, atol=1e-12)
+
+
+def test_samples_go_on_bit_for_bit():
+    """A run stopped between two samples and resumed, with inputs that jump at every second step."""
+    how = {"controller": Brake(), "method": FIXED_STEPS, "tolerance": TIGHT}
+    whole = fc.simulate(crane(), until=0.06, **how)
+    half = fc.simulate(crane(), until=0.03, **how)
+    rest = fc.simulate(crane(), until=0.06, start=half.checkpoint, **how)
+    assert np.array_equal(rest.final.q, whole.final.q)
+    assert np.array_equal(rest.final.R, whole.final.R)
+
+
+def test_states_for_drawing_stay_within_their_room(monkeypatch):
+    """Large machines have room for a few states in one call only."""
+    how = {"until": 0.05, "inputs": {"push": 500.0}, "method": FIXED_STEPS, "tolerance": TIGHT}
+    ample = fc.simulate(crane(), **how)
+    monkeypatch.setattr("flexctrl.dynamics.march.marching._BYTES", 3 * 8 * 400)
+    tight = fc.simulate(crane(), **how)
+    assert np.array_equal(ample.y, tight.y)
+    assert [state.t for state in ample.frames] == [state.t for state in tight.frames]
+
+
+def test_runs_leave_nothing_to_the_next_one():
+    """Runs of a model share a workspace, one after the other."""
+    model, how = crane(), {"until": 0.03, "inputs": {"push": 500.0}, "method": FIXED_STEPS}
+    first = fc.simulate(model, **how)
+    fc.simulate(model, until=0.02, inputs={"push": -300.0}, method=FIXED_STEPS)
+    again = fc.simulate(model, **how)
+    assert np.array_equal(first.y, again.y)
+    assert first.report.newton_iterations == again.report.newton_iterations
+    assert np.array_equal(first.at(0.0123).state.R, again.at(0.0123).state.R)
+
+
+def test_a_command_of_the_wrong_length_is_refused():
+    class Two(Brake):
+        def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            return np.zeros(2)
+
+    with pytest.raises(ControllerError, match="2 values"):
+        fc.simulate(crane(), Two(), until=0.01, method=FIXED_STEPS)
