@@ -1,8 +1,9 @@
-"""B18, dry friction: a spring pulled over LuGre's bristles, and an oscillator that Coulomb's friction stops.
+"""B18, dry friction and play: LuGre's bristles, an oscillator that Coulomb's friction stops, one with backlash.
 
 Canudas de Wit et al. (1995): 1 kg on a spring of 2 N/m whose other end goes on at 0.1 m/s sticks and slips. The moving
 end of the spring is a force that grows by 0.2 N/s beside a spring to the ground. Coulomb's friction takes 4 F/k from
-the swing in each period, exactly, and at the end the mass stands still.
+the swing in each period, exactly, and at the end the mass stands still. Within play it flies
+freely: T = 2π/ω + 2 b/v.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ STOPS = {0.3: (-0.02, 7), 0.31: (-0.01, 8), 0.095: (0.015, 2)}
 """Start → where it stops, and after how many half periods."""
 
 
-def oscillator(stiffness: float, friction: fc.LuGreFriction | fc.CoulombFriction) -> fc.Model:
+def oscillator(stiffness: float, friction: fc.LuGreFriction | fc.CoulombFriction | fc.Backlash) -> fc.Model:
     """1 kg on a spring along x."""
     block = fc.RigidBody("block", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
     spring = fc.Spring("spring", (-10, 0, 0), (0, 0, 0), stiffness)
@@ -98,3 +99,26 @@ def test_coulomb_friction_stops_an_oscillator(start, record):
         source="it sticks",
         tolerance=Absolute(1e-9),
     )
+
+
+@pytest.mark.slow
+def test_period_with_backlash(record):
+    """A gap b of 20 mm; from rest at 50 mm it enters the gap at v = ω (50 mm − b/2)."""
+    model = oscillator(100.0, fc.Backlash({"spring": 0.02}))
+    run = fc.simulate(
+        model,
+        until=5.0,
+        start=model.displace(np.array([0.05])),
+        method=fc.ExplicitRungeKutta(),
+        tolerance=fc.Tolerance(1e-9, 1e-9),
+        events=[fc.Event("turning", "v", direction=fc.Direction.FALLING)],
+    )
+    tops = [event.t for event in run.events if event.name == "turning"]
+    record(
+        "B18 backlash, period over five swings [s]",
+        ours=np.diff([t for t in tops if t > 0.1])[:5].mean(),
+        reference=2.0 * np.pi / 10.0 + 2.0 * 0.02 / (10.0 * 0.04),
+        source="closed form",
+        tolerance=1e-6,
+    )
+    assert run.report.energy_residual < 2e-6
