@@ -1,0 +1,140 @@
+"""D14: dry friction and play: events are located, nothing creeps, nothing chatters.
+
+Coulomb's decaying oscillator, stick-slip on a belt, a mass between two stops.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorder import Absolute
+
+import flexctrl as fc
+
+PAGE = "hard"
+TIGHT = fc.Tolerance(1e-6, 1e-9)
+
+
+def block(stiffness: float, effects: list[fc.Effect], mass: float = 1.0) -> fc.Model:
+    """A mass along x on a spring to the ground."""
+    body = fc.PointMass("block", (0, 0, 0), mass)
+    spring = fc.Spring("spring", (-1, 0, 0), (0, 0, 0), stiffness=stiffness)
+    structure = fc.Structure(
+        [body, spring],
+        [fc.Support(spring.start), fc.Pin(spring.end, body.node), fc.Support(body.node, "v w")],
+        outputs=[fc.Position("x", body.node, "x"), fc.Velocity("v", body.node, "x")],
+    )
+    return fc.assemble(structure, [fc.LargeRotation(), *effects])
+
+
+@pytest.mark.parametrize(("first", "last", "halves"), [(0.3, -0.02, 7), (0.31, -0.01, 8), (0.095, 0.015, 2)])
+def test_coulomb_decay(record, first, last, halves):
+    """0.04 m less each half cycle; where the spring cannot overcome 2 N it stays for good."""
+    model = block(100.0, [fc.CoulombFriction({"block.u": 2.0})])
+    run = fc.simulate(model, start=model.displace({model.coordinates[0]: first}), until=4.0, tolerance=TIGHT)
+    record(
+        f"D14 Coulomb decay from {first:g} m: where it stops [m]",
+        ours=run["x"][-1],
+        reference=last,
+        source="x₀ − 0.04 m a half cycle",
+        tolerance=Absolute(1e-6),
+    )
+    stopped = run.t > run.events[-1].t + 1e-9
+    record(
+        f"D14 Coulomb decay from {first:g} m: creep afterwards [m/s]",
+        ours=np.abs(run["v"][stopped]).max(),
+        reference=0,
+        source="it sticks",
+        tolerance=Absolute(1e-9),
+    )
+    record(
+        f"D14 Coulomb decay from {first:g} m: rejected steps a half cycle",
+        ours=run.report.rejected_steps / halves,
+        reference=0,
+        source="fewer than 50",
+        tolerance=Absolute(50),
+    )
+
+
+def test_stick_slip_on_a_belt(record):
+    """m = k = 1 on a belt of 0.1 m/s, F_s = 1.5, F_k = 1, from the belt's speed and no tension."""
+    carrier = fc.RigidBody("carrier", (0, 0, 0), 1e8, (1e8, 1e8, 1e8))
+    rider = fc.RigidBody("rider", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
+    spring = fc.Spring("spring", (-1, 0, 0), (0, 0, 0), stiffness=1.0)
+    structure = fc.Structure(
+        [carrier, rider, spring],
+        [
+            fc.Support(carrier.node, "v w rx ry rz"),
+            fc.Slide(carrier.node, rider.node, "x"),
+            fc.Support(spring.start),
+            fc.Pin(spring.end, rider.node),
+        ],
+        outputs=[fc.Position("x", rider.node, "x"), fc.Velocity("v", rider.node, "x", minus=carrier.node)],
+    )
+    friction = fc.CoulombFriction({"rider": fc.Coulomb(1.0, static=1.5)})
+    model = fc.assemble(structure, [fc.LargeRotation(), friction])
+    start = model.rest.with_(v=np.full(model.n, 0.1))
+    run = fc.simulate(model, start=start, until=60.0, tolerance=fc.Tolerance(1e-7, 1e-10))
+    times = [event.t for event in run.events]
+    slips, sticks = np.array(times[0::2]), np.array(times[1::2])
+    count = min(len(slips), len(sticks)) - 1
+    assert count >= 3
+    record(
+        "D14 belt: first slip, slip, stick, period [s]",
+        ours=[
+            slips[0],
+            (sticks[:count] - slips[:count]).mean(),
+            (slips[1 : count + 1] - sticks[:count]).mean(),
+            np.diff(slips).mean(),
+        ],
+        reference=[15.0, 3.53638377, 10.0, 13.53638377],
+        source="harmonic pieces",
+        tolerance=1e-4,
+    )
+    held = [(run.t > a + 1e-9) & (run.t < b - 1e-9) for a, b in zip(sticks[:count], slips[1:], strict=False)]
+    creep = run["v"][np.any(held, axis=0)]
+    record(
+        "D14 belt: creep against the belt while it sticks [m/s]",
+        ours=np.abs(creep).max(),
+        reference=0,
+        source="it sticks",
+        tolerance=Absolute(1e-9),
+    )
+    record(
+        "D14 belt: rejected steps an event",
+        ours=run.report.rejected_steps / len(times),
+        reference=0,
+        source="fewer than 50",
+        tolerance=Absolute(50),
+    )
+
+
+@pytest.mark.slow
+def test_free_play(record):
+    """m = 1 at 1 m/s in a gap of 0.02 m between springs of 1e4 N/m: 2π/ω + 2 b/v, ten times (a hundred in B18)"""
+    model = block(1e4, [fc.Backlash({"spring": 0.02})])
+    period = 2.0 * np.pi / 100.0 + 2.0 * 0.02
+    centre = fc.Event("centre", "x", direction=fc.Direction.RISING)
+    run = fc.simulate(
+        model,
+        start=model.rest.with_(v=np.ones(model.n)),
+        until=10.5 * period,
+        method=fc.ExplicitRungeKutta(),
+        tolerance=fc.Tolerance(1e-8, 1e-10),
+        events=[centre],
+    )
+    passing = [event.t for event in run.events if event.name == "centre"]
+    record(
+        "D14 free play: mean period over ten [s]",
+        ours=np.diff(passing).mean(),
+        reference=period,
+        source="2π/ω + 2 b/v₀",
+        tolerance=1e-4,
+    )
+    record(
+        "D14 free play: energy lost or made over ten periods",
+        ours=run.report.energy_residual,
+        reference=0,
+        source="nothing dissipates",
+        tolerance=Absolute(1e-6),
+    )
