@@ -14,6 +14,7 @@ ROUGH = 1e-3
 GAP = 1e-6
 NOTHING = 1e-14
 PARALLEL = 1e-12
+ORTHOGONAL = 1e-2
 
 
 def krylov(
@@ -110,7 +111,22 @@ class _Space:
 
 
 def _orthonormal(Z: np.ndarray, image: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M-orthonormal N that spans Z, M N, and R in Z = N R; columns shorter than `least` are left out."""
+    """M-orthonormal N that spans Z, M N, and R in Z = N R; columns shorter than `least` are left out.
+
+    Columns that lie nearly in the span of the others come out orthogonal to the rounding of what sets them apart:
+    these go through it twice.
+    """
+    N, image, R, spread = _once_orthonormal(Z, image, least)
+    if spread < ORTHOGONAL:
+        N, image, again, _ = _once_orthonormal(N, image, 0.0)
+        R = again @ R
+    return N, image, R
+
+
+def _once_orthonormal(
+    Z: np.ndarray, image: np.ndarray, least: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """N, M N, R, and the smallest over the largest eigenvalue of the Gram matrix of the columns kept."""
     gram = Z.T @ image
     length = np.sqrt(np.maximum(gram.diagonal(), 0.0))
     long = np.flatnonzero(length > least)
@@ -121,7 +137,8 @@ def _orthonormal(Z: np.ndarray, image: np.ndarray, least: float) -> tuple[np.nda
     T = turn[:, kept] / size / scale[:, None]
     R = np.zeros((size.size, length.size))
     R[:, long] = (turn[:, kept] * size).T * scale
-    return Z[:, long] @ T, image[:, long] @ T, R
+    spread = float(values[kept].min(initial=1.0) / values.max(initial=1.0))
+    return Z[:, long] @ T, image[:, long] @ T, R, spread
 
 
 def _wider(A: np.ndarray, columns: int, filled: int) -> np.ndarray:

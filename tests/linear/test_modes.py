@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from fixtures import structures as s
 
 from flexctrl.errors import LinearizationError, MechanismError, StructureError
+from flexctrl.linear.krylov import _orthonormal
 from flexctrl.linear.model import LinearModel, PartMatrices
 
 CLAMPED_FREE = np.array([1.87510406871, 4.69409113297, 7.85475743824, 10.9955407349, 14.1371683910])
@@ -352,3 +353,15 @@ def test_no_repeated_mode_is_missed_by_lanczos():
     modes = linear.modes(14)
     np.testing.assert_allclose(modes.omega, np.repeat(s.chain_omega(200)[:5], 3)[:14], rtol=1e-11)
     assert orthonormality(linear, modes) < 1e-12
+
+
+def test_nearly_parallel_columns_come_out_orthogonal():
+    """A Krylov space that starts with modes known and noise: inverse iteration turns both to the softest ones."""
+    rng = np.random.default_rng(3)
+    M = sp.diags(rng.uniform(0.5, 2.0, 40)).tocsc()
+    known = rng.standard_normal((40, 6))
+    Z = np.hstack([known, known[:, :3] + 3e-5 * rng.standard_normal((40, 3))])
+    N, image, R = _orthonormal(Z, M @ Z, 0.0)
+    assert N.shape[1] == 9
+    np.testing.assert_allclose(N.T @ image, np.eye(9), atol=1e-11)
+    np.testing.assert_allclose(N @ R, Z, atol=1e-11)

@@ -89,3 +89,26 @@ def test_repeated_reduction_is_a_reduction():
     twice = full.reduce(MomentMatching((0.0, 40j), 10)).linear.reduce(ModalTruncation(3))
     np.testing.assert_allclose(twice.modes().omega, full.modes().omega[:3], rtol=1e-4)
     assert isinstance(twice.linear.M, sp.csc_matrix)
+
+
+def test_the_error_of_a_large_model_is_measured_where_the_reduced_one_can_have_modes():
+    """1,008 freedoms: the highest Ritz value, hundreds of modes up, is no frequency to measure the full model at."""
+    frame = s.grid_frame(13, 23, beta=1e-3, clamped=False)
+    assert len(frame.coordinates) == 1008
+    reduced = frame.reduce(MomentMatching((0.0, 20j), 16))
+    highest = frame.modes(16).omega[-1]
+    assert abs(reduced.damped_poles()).max() > 3.0 * highest
+    assert reduced.error.up_to == pytest.approx(3.0 * highest)
+    inside = np.linspace(0.05, 0.2, 7) * highest
+    gap = frame.frequency_response(inside).values - reduced.frequency_response(inside).values
+    assert (abs(gap).max(axis=-1) <= reduced.error.absolute * (1 + 1e-9)).all()
+
+
+def test_an_order_above_the_models_own_is_the_model():
+    """A search by error doubles the order past the number of freedoms; the columns beyond are rounding."""
+    full = s.cantilever(6, beta=1e-3)
+    reduced = full.reduce(MomentMatching((0.0, 30j), 20))
+    assert reduced.order == len(full.coordinates) == 12
+    assert reduced.error.worst < 1e-8
+    found = full.reduce(RelativeError(1e-9), using=lambda order: MomentMatching((0.0, 30j), order))
+    assert found.order <= 12

@@ -16,6 +16,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes
 from flexctrl.linear.poles import second_order_roots
 from flexctrl.linear.reduction.low_frequency import low_frequency, rigid_basis, undamped
+from flexctrl.linear.reduction.modal import ModalTruncation
 from flexctrl.linear.transfer import Transfer, transfer
 
 if TYPE_CHECKING:
@@ -133,13 +134,14 @@ def error_report(reduced: Reduced, top: float = np.inf) -> ErrorReport:
     reduced : Reduced
     top : float
         End of the band, rad/s. Left out: three times the highest mode of the full model; of a model of more
-        than 1000 coordinates, three times the highest mode kept.
+        than 1000 coordinates, three times the highest mode kept, or that a reduced model of this order can hold
+        (the highest poles of a projection, as by moment matching, belong to no mode).
 
     Returns
     -------
     ErrorReport
     """
-    return Reference(reduced.full, _band(reduced.full, top, float(abs(reduced.damped_poles()).max()))).compare(reduced)
+    return Reference(reduced.full, _band(reduced.full, top, partial(_kept, reduced))).compare(reduced)
 
 
 def smallest(full: LinearModel, goal: RelativeError, using: Callable[[int], Method]) -> Reduced:
@@ -212,15 +214,24 @@ def _highest(
     return (float(-found.fun), float(found.x)) if -found.fun > error[k] else (float(error[k]), float(omega[k]))
 
 
-def _band(full: LinearModel, top: float, kept: float = np.inf) -> float:
+def _band(full: LinearModel, top: float, kept: Callable[[], float] | None = None) -> float:
     """The end of the band: as asked, else three times the highest mode (kept, in a large model)."""
     if np.isfinite(top):
         return top
     if len(full.coordinates) <= COMPLETE:
         return 3.0 * float(np.sqrt(abs(full.modes().omega_squared).max()))
-    if not np.isfinite(kept):
+    if kept is None:
         raise ReductionError(f"{len(full.coordinates)} coordinates: say up to which frequency, up_to_hz")
-    return 3.0 * kept
+    return 3.0 * kept()
+
+
+def _kept(reduced: Reduced) -> float:
+    """The highest pole, of a projection no higher than the mode of the full model with the number of its poles."""
+    poles = abs(reduced.damped_poles())
+    highest = float(poles.max(initial=0.0))
+    if isinstance(reduced.method, ModalTruncation):
+        return highest
+    return min(highest, float(reduced.full.modes(max(len(poles) // 2, 1)).omega[-1])) or highest
 
 
 def _modes_below(full: LinearModel, top: float) -> Modes:

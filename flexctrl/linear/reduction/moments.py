@@ -33,7 +33,7 @@ class MomentMatching:
     points : tuple of float or complex
         Expansion points s in rad/s, e.g. ``(0.0, 30j)``; a complex point brings its conjugate.
     order : int
-        Largest number of coordinates, rigid-body modes included.
+        Largest number of coordinates, rigid-body modes included; more than the model has are not taken.
     """
 
     points: tuple[complex, ...]
@@ -62,7 +62,7 @@ class MomentMatching:
                 f"MomentMatching needs points and an order above the {r} rigid-body modes; got "
                 f"{len(self.points)} points, order {self.order}"
             )
-        columns = _collect(full, rigid, self.points, self.order - r)
+        columns = _collect(full, rigid, self.points, min(self.order, len(full.coordinates)) - r)
         names = (*(f"rigid{j + 1}" for j in range(r)), *(f"krylov{j + 1}" for j in range(columns.shape[1])))
         return galerkin(full, self, np.hstack([rigid, columns]), names, np.eye(len(names), r))
 
