@@ -68,6 +68,10 @@ class Feed:
         assert self.controller is not None
         return tuple(self.model.inputs.index(name) for name in self.controller.outputs)
 
+    @cached_property
+    def _base(self) -> list[float]:
+        return self.base.tolist()
+
     def measured(self, state: State) -> np.ndarray:
         """What the controller reads of a state."""
         return self.model.measure(state)[self.reads] if self.reads.size else np.zeros(0)
@@ -113,15 +117,15 @@ class Feed:
         return self.evaluate(state, x)
 
     def _total(self, command: Any) -> np.ndarray:
-        u = self.base.copy()
+        u = self._base.copy()
         values, writes = np.asarray(command, dtype=float).ravel().tolist(), self._writes
         if len(values) != len(writes):
             raise ControllerError(
                 f"the controller's command has {len(values)} values; expected one for each of its {len(writes)} outputs"
             )
-        for i, value in zip(writes, values, strict=True):  # a few numbers: quicker than indexing by arrays
+        for i, value in zip(writes, values, strict=True):  # a few numbers: quicker in a list than in an array
             u[i] += value
-        return u
+        return np.array(u)
 
     def at(self, state: State, before: Supply, h: float) -> Supply:
         """Return the inputs at the end of a step of length h; the controller's state follows the trapezoidal rule."""

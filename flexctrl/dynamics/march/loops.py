@@ -40,7 +40,7 @@ _EXACT = 1e-13
 _NEAR = 1e-9
 _CONTRACTING = 0.5
 _TINY = 1e-300
-_LEFT = 0.1
+_LEFT = 0.02
 _MASSLESS = 1e-14
 
 

@@ -133,6 +133,7 @@ class Marcher:
         m = self.march
         self._run = m.bound(run)
         self._task, self._h, self._wanted, self._done = (m.cell(name) for name in ("task", "h", "wanted", "done"))
+        self._jumping = m.cell("jumping")
         self._kept = _NOTHING
         self.width = 1 + len(model.outputs)
         self.rows = m.rows.reshape(-1, self.width)
@@ -260,7 +261,7 @@ class Marcher:
     def jumps(self, u: np.ndarray) -> None:
         """Let the inputs jump before the next step of one length."""
         self.supply(u)
-        self.march.jumping = 1
+        self._jumping[0] = 1
 
     def travelled(self, pacing: float | Pacing, count: int) -> list[State]:
         """Take as many steps and return the states after them."""

@@ -91,15 +91,16 @@ class _Ride:
         With a controller at every step this is most of a run, so what is done for a sample is done here at once.
         """
         marcher, m, stops, mark = self.marcher, self.marcher.march, self.journey.stops, self.journey.mark
-        feed, legs, y = self.journey.plan.feed, self.legs.legs, self.marcher.rows[:, 1:]
+        feed, legs, times, y = self.journey.plan.feed, self.legs.legs, self.marcher.rows[:, 0], self.marcher.rows[:, 1:]
         pace, reads, supply = self.pace, feed.reads, self.supply
-        commands = np.empty((marcher.room, len(supply.u)))
+        room, clock = marcher.room, m.cell("t")
+        commands = np.empty((room, len(supply.u)))
         t, done, status = m.t, 0, DONE
         marcher.begin()
         while time.perf_counter() < deadline:
             stop = stops.next
             wanted = done + max(1, math.ceil((stop - t) / pace - 1e-6))
-            if wanted > marcher.room or stop > self.until + self.tick:
+            if wanted > room or stop > self.until + self.tick:
                 break
             mark.size, start = (stop - t) / (wanted - done), done
             status, done = marcher.on(mark.size, wanted)
@@ -109,7 +110,7 @@ class _Ride:
             if done < wanted or stop >= self.until - self.tick:
                 mark.left = wanted - done
                 break
-            t = m.t = marcher.rows[done - 1, 0] = stop
+            t = clock[0] = times[done - 1] = stop
             stops.passed += 1
             before, supply = supply, feed.sampled(stop, y[done - 1, reads], supply)
             commands[done - 1] = supply.u
