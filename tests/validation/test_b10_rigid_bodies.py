@@ -1,8 +1,8 @@
 """B10 and D23, rigid bodies that spin: pendulum of the IFToMM, heavy top, Dzhanibekov's wing nut.
 
 The top is to be right to 5e-4 m with steps of 0.2 ms. `ConservingMidpoint` is, and so is generalised alpha
-extrapolated; alone it needs 0.16 ms (7e-4 m with 0.2): increments of rotation along the mean spin leave out h³/12 ω × ω̇,
-which moves the top's axis under its spin of 150 rad/s.
+extrapolated; alone it needs 0.16 ms (7e-4 m with 0.2): increments of rotation along the mean spin leave out
+h³/12 ω × ω̇, which moves the top's axis under its spin of 150 rad/s.
 """
 
 from __future__ import annotations
