@@ -70,9 +70,15 @@ def turn_kernel() -> Kernel:
     from flexctrl.kernels.kernel import Kernel
 
     rows, theta = ca.SX.sym("R", 9), ca.SX.sym("theta", 3)
+    return Kernel("turn", ca.vertcat(rows, theta), ca.SX.sym("p", 0), turned_rows(rows, theta))
+
+
+def turned_rows(rows: ca.SX, theta: ca.SX) -> ca.SX:
+    """Return exp(θ×) R, R given and returned row by row, nearer to orthonormal than R."""
+    import casadi as ca
+
     R = rotation_of(theta) @ ca.reshape(rows, 3, 3).T
-    R = R @ (1.5 * ca.DM.eye(3) - 0.5 * R.T @ R)
-    return Kernel("turn", ca.vertcat(rows, theta), ca.SX.sym("p", 0), ca.vec(R.T))
+    return ca.vec((R @ (1.5 * ca.DM.eye(3) - 0.5 * R.T @ R)).T)
 
 
 def exponential(theta: np.ndarray) -> np.ndarray:

@@ -62,7 +62,9 @@ class Flat:
         Their directions at rest.
     u : Reals *
         Inputs.
-    turn, linkage, winding, forces, tangents, energies : Runs
+    shift : Reals *
+        How far all nodes are shifted and turned from the drawn shape, for models in small motion.
+    turn, linkage, winding, forces, tangents, energies, shifts : Runs
         Kernels; of the linkage: places, rates, accelerations, forces; of its drives: driven coordinates.
     books : Reals
         Kinetic energy, stored energy, dissipated power.
@@ -82,6 +84,7 @@ class Flat:
     unit_loads: int
     following: int
     carried: int
+    shifting: int
     entries: int
     drive_base: int
     z: Reals
@@ -110,12 +113,14 @@ class Flat:
     follows: Wholes
     toward: Reals
     u: Reals
+    shift: Reals
     turn: Runs
     linkage: Runs
     winding: Runs
     forces: Runs
     tangents: Runs
     energies: Runs
+    shifts: Runs
     books: Reals
 
 
@@ -137,6 +142,9 @@ def place(f: Flat) -> None:
         clear(9, f.z[NODE_SLOT * f.turned[k] + 3 :])
     if f.turning > 0:
         f.turn[0](f.z, f.z)
+    if f.shifting > 0:
+        clear(f.shifting, f.shift)
+        f.shifts[0](f.z, f.z)
     if f.linking > 0:
         for k in range(f.linking):
             clear(_POSE, f.z[NODE_SLOT * f.linked[k] :])

@@ -1,0 +1,354 @@
+"""The layout of a flat model: which entry of the workspace each kernel reads and adds to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.kernels.kernel import Kernel, Run
+from flexctrl.mechanics.rotation import turn_kernel
+from flexctrl.model.axes import Axes, axes_of
+from flexctrl.model.entries import entry, entry_energy, entry_slope
+from flexctrl.model.flat import Flat
+from flexctrl.model.fronts import Plan, plan_of
+from flexctrl.model.gauges import Gauges, gauges_of
+from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Flattened", "Layout"]
+
+_ALIGNED = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Flattened:
+    """A model on flat vectors, and how to bring states there and back.
+
+    Attributes
+    ----------
+    model : Model
+    flat : Flat
+    gauges : Gauges
+        Its outputs.
+    axes : Axes
+        Of its tangents.
+    plan : Plan
+        How its tangents are eliminated; degrees of freedom stand in that order.
+    pattern : tuple of numpy.ndarray
+        Rows and columns of their entries (with repeats).
+    constants : tuple of int and numpy.ndarray
+        What the workspace holds from some place on that never changes.
+    """
+
+    model: Model
+    flat: Flat
+    gauges: Gauges
+    axes: Axes
+    plan: Plan
+    pattern: tuple[np.ndarray, np.ndarray]
+    constants: tuple[int, np.ndarray]
+
+    def ordered(self, x: np.ndarray) -> np.ndarray:
+        """Return values of the degrees of freedom in the order of elimination, padded with zeros."""
+        out = np.zeros(self.flat.padded)
+        out[: self.flat.n] = x[self.plan.order]
+        return out
+
+    def own(self, x: np.ndarray) -> np.ndarray:
+        """Return values of the degrees of freedom in the model's order."""
+        out = np.empty(self.flat.n)
+        out[self.plan.order] = x[: self.flat.n]
+        return out
+
+    def enter(self, state: State) -> None:
+        """Put a state at the start of a step."""
+        f, forces, (first, values) = self.flat, self.model.forces, self.constants
+        still = np.zeros(f.n)
+        f.z[first : first + values.size] = values
+        f.z[: forces.slot_count] = forces.slots(state, state.v, still)
+        f.pose.reshape(-1, 12)[:] = np.hstack([state.x, state.R.reshape(-1, 9)])
+        f.q[:], f.driven[:] = self.ordered(state.q), state.driven
+        self.gauges.shown[:], self.gauges.summed[:] = state.shown, self.model.motion.winding @ state.q
+        f.step[:], f.v[:], f.rate[:] = 0.0, self.ordered(state.v), 0.0
+
+    def state(self, v: np.ndarray, t: float) -> State:
+        """Return the state at the start of the step, with rates ``v`` in the order of elimination.
+
+        Its outputs have been read.
+        """
+        found = self.pose_state(self.flat.pose, self.flat.q, v, self.flat.driven, t)
+        return replace(found, shown=self.gauges.shown.copy())
+
+    def pose_state(self, pose: np.ndarray, q: np.ndarray, v: np.ndarray, driven: np.ndarray, t: float) -> State:
+        """Return the state of a pose (12 a node) and values in the order of elimination."""
+        rows = pose.reshape(-1, 12)
+        x, R = rows[:, :3].copy(), rows[:, 3:].reshape(-1, 3, 3).copy()
+        return State(x, R, self.own(q), self.own(v), driven.copy(), t, self.model.rest.dry)
+
+
+class Layout:
+    """The workspace of a model, part by part."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.motion, self.forces = model, model.motion, model.forces
+        m = self.motion
+        self.padded = (m.n // 8 + 1) * 8
+        self.linked = np.zeros(0, dtype=int) if m.plain else m.linked_cells
+        self.carried = -(-len(self.linked) // 8) * 8
+        self.sizes = self._sizes()
+        ends = np.cumsum([0, *(-(-size // 8) * 8 for size in self.sizes.values())])
+        self.starts = dict(zip(self.sizes, ends.tolist(), strict=False))
+        self.length = int(ends[-1])
+
+    def _sizes(self) -> dict[str, int]:
+        return {
+            "slots": self.forces.slot_count,
+            "seeds": 3,
+            "pose": 12 * len(self.motion.place),
+            **dict.fromkeys(("step", "v", "rate"), self.padded),
+            **dict.fromkeys(("force", "load"), self.padded + self.carried),
+            "q": self.padded,
+            "found": len(self.motion.drives),
+            "u": len(self.model.inputs),
+            "shift": 0,
+        }
+
+    @cached_property
+    def pattern(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows and columns of the tangent in degrees of freedom; which entries of the blocks they are, if plain."""
+        m = self.motion
+        raw = self.forces.pattern
+        if m.plain:
+            rows, columns = (m.cells[cells] for cells in raw)
+            kept = np.flatnonzero((rows < m.n) & (columns < m.n))
+            return rows[kept], columns[kept], kept
+        found = self._slopes().tocoo()
+        return found.row, found.col, np.zeros(0, dtype=int)
+
+    def _slopes(self) -> sp.csr_matrix:
+        """A matrix with all entries that slopes have: those of levers in a place where none vanishes by chance, as
+        pieces push on them even where they do not (slack ropes), and as they turn in motion."""
+        m, rng = self.motion, np.random.default_rng(0)
+        step, v, a = rng.uniform(0.1, 0.4, (3, m.n))
+        state = m.advance(m.rest, step, v, 0.0)
+        u = rng.uniform(0.5, 1.0, len(self.model.inputs))
+        T = abs(m.jacobian(state))
+        pushed = sp.csr_matrix((np.ones(len(self.forces.pattern[0])), self.forces.pattern), shape=(m.raw, m.raw))
+        return abs(self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)) + T.T @ pushed @ T
+
+    @cached_property
+    def entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows and columns of what acts on the degrees of freedom themselves; its entries of K, C, M and of a load."""
+        damping = self.model.viscous.tocoo()
+        values = np.zeros((damping.nnz, 4))
+        values[:, 1] = damping.data
+        return damping.row, damping.col, values
+
+    @cached_property
+    def plan(self) -> Plan:
+        rows, columns = (np.concatenate([a, b]) for a, b in zip(self.pattern[:2], self.entries[:2], strict=True))
+        return plan_of(rows, columns, self.motion.n)
+
+    @cached_property
+    def position(self) -> np.ndarray:
+        """Place of each degree of freedom in the order of elimination; the last entry is for none."""
+        return np.append(self.plan.position, self.motion.n)
+
+    @cached_property
+    def targets(self) -> np.ndarray:
+        """Where each raw force is added, from the start of ``force``."""
+        found = self.position[self.motion.cells]
+        found[self.linked] = self.padded + np.arange(len(self.linked))
+        return found
+
+    def made(self) -> Flattened:
+        z = _aligned(self.length)
+        part = {name: z[start : start + self.sizes[name]] for name, start in self.starts.items()}
+        for hidden in {"slots", "drawn"} & set(part):
+            del part[hidden]
+        vectors: dict[str, Any] = {"z": z, "driven": np.zeros(len(self.motion.drives)), "books": np.zeros(3), **part}
+        flat = Flat(
+            **vectors,
+            **self._numbers,
+            **self._tables,
+            **self._runs,
+        )
+        shown, summed = np.zeros((2, self._gauges.turning))
+        gauges = replace(self._gauges, sums=np.zeros(self._gauges.rows), shown=shown, summed=summed)
+        return Flattened(self.model, flat, gauges, self._axes, self.plan, self.pattern[:2], self.constants)
+
+    @property
+    def constants(self) -> tuple[int, np.ndarray]:
+        """What the workspace holds from some place on that never changes."""
+        return 0, np.zeros(0)
+
+    @cached_property
+    def _gauges(self) -> Gauges:
+        return gauges_of(self.model, self.starts["q"], self.plan.position)
+
+    @cached_property
+    def _axes(self) -> Axes:
+        return axes_of(self.model, self.plan, self.pattern[:2])
+
+    @cached_property
+    def _own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Nodes that are not placed by the linkage; those that move, and those that turn."""
+        m = self.motion
+        own = np.setdiff1d(np.arange(len(m.place)), [] if m.plain else m.nodes)
+        moved, turned = (own[(m.place[own, cells] < m.n).any(axis=1)] for cells in (slice(3), slice(3, 6)))
+        return own, moved, turned
+
+    @cached_property
+    def _tables(self) -> dict[str, Any]:
+        m, (own, moved, turned) = self.motion, self._own
+        cells = self.position[m.place[own]]
+        nodes, freedoms = np.nonzero(cells < m.n)
+        loads = self.model.signals.loads.tocoo()
+        return {
+            "moved": moved,
+            "turned": turned,
+            "linked": np.zeros(0, dtype=int) if m.plain else m.nodes,
+            "cells": self.position[m.place].ravel(),
+            "slots": NODE_SLOT * own[nodes] + 12 + freedoms,
+            "sources": cells[nodes, freedoms],
+            "shafts": self.position[np.concatenate([m.sources, m.inner])],
+            "rigid": m.rigid.astype(np.int64),
+            "rotary": m.rotary.astype(np.int64),
+            "ratios": m.ratios,
+            "inputs": np.concatenate([self.targets[loads.row], loads.col]).astype(np.int64),
+            "unit": loads.data.astype(float),
+            "follows": self._follows(),
+            "toward": np.array([d for f in self.model.signals.follows for d in f.direction], dtype=float),
+        }
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        m, tables = self.motion, self._tables
+        return {
+            "n": m.n,
+            "padded": self.padded,
+            "size": self.length,
+            "nodes": len(m.place),
+            "moving": len(tables["moved"]),
+            "turning": len(tables["turned"]),
+            "linking": len(tables["linked"]),
+            "rates": len(tables["slots"]),
+            "drives": len(m.drives),
+            "inner": m.inner.size,
+            "pieces": len(self._runs["forces"]),
+            "shifting": self.sizes["shift"],
+            "unit_loads": len(tables["unit"]),
+            "following": len(self.model.signals.follows),
+            "carried": self.carried,
+            "entries": self.plan.length,
+            "drive_base": self.forces.drive_base,
+        }
+
+    @cached_property
+    def _runs(self) -> dict[str, Any]:
+        m, turned = self.motion, self._own[2]
+        own_tangents = m.plain and not self.model.signals.follows
+        damped = bool(self.model.viscous.nnz)
+        return {
+            "turn": (self._turn(turned),) if len(turned) else (),
+            "linkage": () if m.plain else self._linkage(),
+            "winding": (self._winding(),) if m.drives else (),
+            "forces": (*self._forces(), *([self._entry_forces()] if damped else [])),
+            "tangents": (*self._tangents(), *([self._entry_slopes()] if damped else [])) if own_tangents else (),
+            "energies": (*self._energies(), *([self._entry_energies()] if damped else [])),
+            "shifts": (),
+        }
+
+    def _entry_forces(self) -> Run:
+        rows, columns, values = self.entries
+        at = self.position[columns]
+        gather = np.column_stack([self.starts[name] + at for name in ("q", "step", "v", "rate")])
+        scatter = self.starts["force"] + self.position[rows][:, None]
+        return self.model.backend.bind(entry(), gather, values, scatter)
+
+    def _entry_slopes(self) -> Run:
+        rows, columns, values = self.entries
+        seeds = np.tile(self.starts["seeds"] + np.arange(3), (len(rows), 1))
+        return self.model.backend.bind(entry_slope(), seeds, values, self.plan.places(rows, columns)[:, None])
+
+    def _entry_energies(self) -> Run:
+        rows, columns, values = self.entries
+        ends = [self.starts[name] + self.position[cells] for cells in (rows, columns) for name in ("q", "v")]
+        books = np.tile(np.arange(3), (len(rows), 1))
+        return self.model.backend.bind(entry_energy(), np.column_stack(ends), values, books)
+
+    def _follows(self) -> np.ndarray:
+        follows = self.model.signals.follows
+        return np.array([w for f in follows for w in (f.input, f.node, *self.targets[f.cell : f.cell + 3])], dtype=int)
+
+    def _bind(self, kernel: Kernel, gather: np.ndarray, scatter: np.ndarray) -> Run:
+        """One item."""
+        return self.model.backend.bind(kernel, gather[None], np.zeros((1, 0)), scatter[None])
+
+    def _turn(self, nodes: np.ndarray) -> Run:
+        old = self.starts["pose"] + 12 * nodes[:, None] + 3 + np.arange(9)
+        theta = self.starts["step"] + self.position[self.motion.place[nodes, 3:]]
+        new = NODE_SLOT * nodes[:, None] + 3 + np.arange(9)
+        return self.model.backend.bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(nodes), 0)), new)
+
+    def _linkage(self) -> tuple[Run, ...]:
+        m, starts = self.motion, self.starts
+        place, rates, accelerations, collect, _ = m.linkage.kernels
+        rigid = self.forces.drive_base + DRIVE_SLOT * np.flatnonzero(m.rigid)
+        slot = NODE_SLOT * m.nodes[:, None]
+        pose, own = (slot + np.arange(12)).ravel(), self.position[m.linked]
+        before = (starts["pose"] + 12 * m.nodes[:, None] + np.arange(12)).ravel()
+        v, a = starts["v"] + own, starts["rate"] + own
+        speeds, changes = ((slot + k + np.arange(6)).ravel() for k in (12, 18))
+        raw = starts["force"] + self.padded + np.arange(len(self.linked))
+        return (
+            self._bind(place, np.concatenate([before, starts["step"] + own]), pose),
+            self._bind(rates, np.concatenate([pose, v]), np.concatenate([speeds, rigid + 1])),
+            self._bind(accelerations, np.concatenate([pose, v, a]), np.concatenate([changes, rigid + 2])),
+            self._bind(collect, np.concatenate([pose, raw]), starts["force"] + own),
+        )
+
+    def _winding(self) -> Run:
+        m = self.motion
+        pose = (NODE_SLOT * m.nodes[:, None] + np.arange(12)).ravel()
+        return self._bind(m.linkage.kernels[4], pose, self.starts["found"] + np.arange(len(m.drives)))
+
+    def _forces(self) -> list[Run]:
+        base, sources = self.forces.drive_base, self.motion.source_base
+        goal = self.starts["force"] + self.targets
+        bind = self.model.backend.bind
+        return [
+            bind(f.kernels.force, f.gather(base), f.parameters, goal[f.scatter(sources)]) for f in self.forces.families
+        ]
+
+    def _energies(self) -> list[Run]:
+        base, bind = self.forces.drive_base, self.model.backend.bind
+        return [
+            bind(f.kernels.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
+            for f in self.forces.families
+        ]
+
+    def _tangents(self) -> list[Run]:
+        rows, columns, kept = self.pattern
+        places = np.full(self.forces.entries, self.plan.length)
+        places[kept] = self.plan.places(rows, columns)
+        runs = []
+        for f, start in zip(self.forces.families, self.forces.block_starts, strict=True):
+            size = f.kernels.kind.width**2
+            seeds = np.tile(self.starts["seeds"] + np.arange(3), (f.count, 1))
+            gather = np.hstack([f.gather(self.forces.drive_base), seeds])
+            scatter = places[start : start + f.count * size].reshape(f.count, size)
+            runs.append(self.model.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
+        return runs
+
+
+def _aligned(size: int) -> np.ndarray:
+    """Return zeros that begin on a cache line."""
+    room = np.zeros(size + _ALIGNED // 8)
+    skip = -room.ctypes.data % _ALIGNED // 8
+    return room[skip : skip + size]
