@@ -53,15 +53,16 @@ def test_marched_as_stepped(effects):
     assert can_be_flat(model)
     start = fc.equilibrium(model) if model.large else None
     runs = [
-        fc.simulate(m, until=0.3, start=start, inputs={"torque": 0.4, "push": 3.0}, method=fc.GeneralizedAlpha(2e-3))
+        fc.simulate(m, until=0.1, start=start, inputs={"torque": 0.4, "push": 3.0}, method=fc.GeneralizedAlpha(5e-4))
         for m in (model, model.with_(backend=fc.CasadiVM()))
     ]
-    tight = 1e-6 if model.large else 1e-9  # marches of nonlinear models stop Newton at a share of the step's error
+    tight = 1e-5 if model.large else 1e-9  # marches of nonlinear models stop Newton at a share of the step's error
     for name in runs[0].outputs:
         scale = max(1e-3, float(np.abs(runs[1][name]).max()))
         assert runs[0][name] == pytest.approx(runs[1][name], abs=tight * scale)
-    for a, b in ((r.report.energy_residual for r in runs), (r.report.energy.dissipated for r in runs)):
-        assert a == pytest.approx(b, rel=1e-5, abs=1e-9)
+    residuals, lost = zip(*((r.report.energy_residual, r.report.energy.dissipated) for r in runs), strict=True)
+    assert residuals[0] == pytest.approx(residuals[1], rel=0.1, abs=1e-9)
+    assert lost[0] == pytest.approx(lost[1], rel=1e-4, abs=1e-9)
     assert np.ptp(runs[0]["x"]) > 1e-4
 
 
