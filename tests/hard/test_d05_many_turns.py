@@ -1,12 +1,15 @@
-"""D5 (statics): half a turn, whole turns, ten turns: no singular rotation, and an angle that does not wrap."""
+"""D5: half a turn, whole turns, a thousand turns: no singular rotation, and an angle that does not wrap."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from recorder import Absolute
 
 import flexctrl as fc
 from flexctrl.errors import StructureError
+
+PAGE = "hard"
 
 
 def rolled(turns: float, elements: int) -> fc.Rest:
@@ -65,3 +68,60 @@ def test_one_element_bent_by_half_a_turn_is_refused():
 def test_an_element_without_length_is_refused():
     with pytest.raises(StructureError, match="no length"):
         single().displace({"beam_1_u": -1.0})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", [fc.GeneralizedAlpha(0.04), fc.AdaptiveAlpha()], ids=lambda m: type(m).__name__)
+def test_a_thousand_turns(record, method):
+    """A body at a constant rate of ten turns a second about an axis askew, on a hinge, and free."""
+    axis = np.array([1.0, 2.0, 2.0]) / 3.0
+    body = fc.RigidBody("body", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
+    frame = fc.RigidBody("frame", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
+    structure = fc.Structure(
+        [frame, body],
+        [fc.Support(frame.node), fc.Hinge(frame.node, body.node, tuple(axis))],
+        outputs=[fc.Rotation("turn", body.node, tuple(axis), minus=frame.node)],
+    )
+    model = fc.assemble(structure, [fc.LargeRotation()])
+    rate = 20.0 * np.pi
+    run = fc.simulate(model, start=model.rest.with_(v=np.array([rate])), until=100.0, method=method)
+    name = type(method).__name__
+    record(
+        f"D5 body on a hinge after 1000 turns, {name}: angle [rad]",
+        ours=run["turn"][-1],
+        reference=6283.185307179586,
+        source="2000 π",
+        tolerance=1e-9,
+    )
+    R = run.final.R[1]
+    record(
+        f"D5 body on a hinge after 1000 turns, {name}: orientation less that at the start",
+        ours=np.abs(R - np.eye(3)).max(),
+        reference=0,
+        source="whole turns",
+        tolerance=Absolute(1e-6),
+    )
+    record(
+        f"D5 body on a hinge after 1000 turns, {name}: RᵀR less one",
+        ours=np.abs(R.T @ R - np.eye(3)).max(),
+        reference=0,
+        source="a rotation",
+        tolerance=Absolute(1e-12),
+    )
+
+
+@pytest.mark.slow
+def test_a_free_body_spun_a_thousand_turns(record):
+    body = fc.RigidBody("body", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
+    model = fc.assemble(fc.Structure([body]), [fc.LargeRotation()])
+    spin = 20.0 * np.pi * np.array([1.0, 2.0, 2.0]) / 3.0
+    start = model.rest.with_(v=np.concatenate([np.zeros(3), spin]))
+    run = fc.simulate(model, start=start, until=100.0, method=fc.GeneralizedAlpha(0.01))
+    R = run.final.R[0]
+    record(
+        "D5 free body after 1000 turns: orientation less that at the start, RᵀR less one",
+        ours=[np.abs(R - np.eye(3)).max(), 1e6 * np.abs(R.T @ R - np.eye(3)).max()],
+        reference=[0, 0],
+        source="whole turns; the second times 10⁶",
+        tolerance=Absolute(1e-6),
+    )
