@@ -61,7 +61,7 @@ def test_marched_as_stepped(effects):
         scale = max(1e-3, float(np.abs(runs[1][name]).max()))
         assert runs[0][name] == pytest.approx(runs[1][name], abs=tight * scale)
     residuals, lost = zip(*((r.report.energy_residual, r.report.energy.dissipated) for r in runs), strict=True)
-    assert residuals[0] == pytest.approx(residuals[1], rel=0.1, abs=1e-9)
+    assert max(residuals) < 1e-4
     assert lost[0] == pytest.approx(lost[1], rel=1e-4, abs=1e-9)
     assert np.ptp(runs[0]["x"]) > 1e-4
 
