@@ -207,7 +207,7 @@ def chain_race(quick: bool) -> dict[str, object]:
             }
             rows.append(row)
             print(row, f"ratio {row['ours'] / row['theirs']:.3f}", flush=True)
-    return {"rows": rows, "growth": growth(quick), "swing": full_swing(quick)}
+    return {"rows": rows, "growth": growth(quick), "swings": [full_swing(quick)]}
 
 
 def growth(quick: bool) -> dict[str, object]:

@@ -13,8 +13,8 @@ _HEAD = """\
 
 <!-- Made by `python tests/benchmarks/race.py --page` -->
 
-Both codes in one run, on one thread, in turns; the least CPU time of several runs counts. Only ratios are told: seconds
-are the host's. Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9,
+In every comparison both codes take turns in one run, on one thread; the least CPU time of several tries counts. Ratios
+are told; where there are seconds, they are those of a host with other work to do. Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9,
 `EigenSparse`, modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its
 quickest element here (no torsion; its beams with torsion take several times as long). Building the model is left out
 for both, everything that `simulate` and `SolveDynamic` do is in.
@@ -47,10 +47,11 @@ torsion, Exudyn's cable has none.
 |---|---|---|---|---|---|
 {rows}
 
-Our time per step between 100 and {largest} elements grows with an exponent of {growth} (goal: 1.05).
-
-The full swing of {swing_elements} elements over {swing_steps} steps, through the lowest point and the whip of the
-free end: flexctrl finishes; Exudyn: {theirs}. Ratio of the times: {swing_ratio:.2f}.
+Our time per step between 100 and {largest} elements grows with an exponent of {growth}; the goal is 1.05.
+"""
+_SWING = """\
+The full swing of {elements} elements over {steps} steps, through the lowest point and the whip of the
+free end: flexctrl finishes; Exudyn: {theirs}. Ratio of the times: {ratio:.2f}.
 """
 _LOOP = """\
 ## A controller in Python at every step
@@ -63,7 +64,7 @@ _COLD = """\
 
 CPU time of a new process until the crane's first 500 steps are done, imports included: {empty:.2f} s with an empty
 cache, compiling everything (goal: 1.5 s), {kept:.2f} s with code kept by an earlier process. `import flexctrl` takes
-{imported:.0f} ms beyond numpy and casadi (goal: 150 ms); its parts are imported when first used. Python's bytecode is
+{imported:.0f} ms beyond numpy and casadi (goal: 150 ms); its parts, and scipy, when first used. Python's bytecode is
 there, as after an installation.
 """
 
@@ -108,18 +109,14 @@ def chains(found: dict[str, Any]) -> str:
         newton = " / ".join(f"{k:.1f}" for k in row["newton"])
         ratio = row["ours"] / row["theirs"]
         rows.append(f"| {row['swing']} | {row['elements']} | {row['steps']} | {newton} | **{ratio:.2f}** | {goal} |")
-    swing, growths = found["swing"], found["growth"]
-    largest = max(int(n) for n in growths["easy"]["times"])
-    return _CHAINS.format(
+    growths = found["growth"]
+    text = _CHAINS.format(
         length=LENGTH,
         rows="\n".join(rows),
-        largest=largest,
+        largest=max(int(n) for n in growths["easy"]["times"]),
         growth=", ".join(f"{g['exponent']:.2f} ({name})" for name, g in growths.items()),
-        swing_elements=swing["elements"],
-        swing_steps=swing["steps"],
-        theirs=swing["theirs"],
-        swing_ratio=swing["ratio"],
     )
+    return "\n".join([text, *(_SWING.format(**swing) for swing in found["swings"])])
 
 
 def loop(found: dict[str, Any]) -> str:
