@@ -17,8 +17,8 @@ In every comparison both codes take turns in one run, on one thread; the least C
 are told; where there are seconds, they are those of a host with other work to do.
 
 Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9, `EigenSparse`,
-modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its quickest element here (no torsion; its beams with torsion take several times as long). Building the model is left out
-for both, everything that `simulate` and `SolveDynamic` do is in.
+modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its quickest element here
+(no torsion; its beams with torsion take several times as long). Building the model is left out for both, everything that `simulate` and `SolveDynamic` do is in.
 """
 _CRANE = """\
 ## The paper's crane, 50 ms
@@ -48,7 +48,8 @@ torsion, Exudyn's cable has none.
 |---|---|---|---|---|---|
 {rows}
 
-Our time per step between 100 and {largest} elements grows with an exponent of {growth}; the goal is 1.05.
+Our time per step between 100 and {largest} elements grows with an exponent of {growth};
+the goal is 1.05.
 """
 _SWING = """\
 The full swing of {elements} elements over {steps} steps, through the lowest point and the whip of the
