@@ -18,7 +18,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.spectrum import told_damping
-from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError
+from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.flows import flow_rates, flowing, without_flows
 from flexctrl.model.model import Model
@@ -282,8 +282,7 @@ class GeneralizedAlpha:
     rho: float = 0.9
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.step) and self.step > 0.0):
-            raise StructureError(f"GeneralizedAlpha: step = {self.step}; expected seconds > 0")
+        check_step(self.step, "GeneralizedAlpha")
         _check_rho(self.rho)
 
     @property

@@ -19,7 +19,7 @@ from flexctrl.dynamics.modal_equations import closed, opened
 from flexctrl.dynamics.propagator import NODES, Propagator
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
-from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError
+from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
 from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
@@ -55,8 +55,7 @@ class Exact:
     step: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.step) and self.step > 0.0):
-            raise StructureError(f"Exact: step = {self.step}; expected seconds > 0")
+        check_step(self.step, "Exact")
 
     @property
     def order(self) -> int:

@@ -17,7 +17,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import turning, yardsticks
-from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError
+from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.momenta import Momenta
@@ -54,8 +54,7 @@ class ConservingMidpoint:
     step: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.step) and self.step > 0.0):
-            raise StructureError(f"ConservingMidpoint: step = {self.step}; expected seconds > 0")
+        check_step(self.step, "ConservingMidpoint")
 
     @property
     def order(self) -> int:

@@ -15,6 +15,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
+from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
@@ -31,6 +32,7 @@ __all__ = [
     "Reusable",
     "StepError",
     "Stepper",
+    "check_step",
 ]
 
 
@@ -243,3 +245,9 @@ class Integrator(Protocol):
         -------
         Stepper
         """
+
+
+def check_step(step: float, owner: str) -> None:
+    """Raise StructureError for a step that is no number of seconds above zero."""
+    if not (np.isfinite(step) and step > 0.0):
+        raise StructureError(f"{owner}: step = {step}; expected seconds > 0")
