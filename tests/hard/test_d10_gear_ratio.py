@@ -63,9 +63,9 @@ def test_runs_are_the_same_from_either_side(record, inertia, ratio, method):
     )
     counts = [(x.steps, x.rejected_steps, x.newton_iterations) for x in (behind.report, reflected.report)]
     record(
-        f"D10 R = {ratio:g}, {name}: steps, rejections, Newton iterations",
-        ours=counts[0],
-        reference=counts[1],
-        source="reflected by hand",
+        f"D10 R = {ratio:g}, {name}: steps, rejections, Newton iterations more than reflected by hand",
+        ours=np.subtract(*counts),
+        reference=[0, 0, 0],
+        source="the same machine",
         tolerance=Absolute(0),
     )
