@@ -52,7 +52,16 @@ class RopeMass(Effect):
         object.__setattr__(self, "of", tuple(names))
 
     def weighs(self, part: Part) -> bool:
-        """Tell whether a part gets its mass from the effect."""
+        """Tell whether a part is a rope with a mass of its own.
+
+        Parameters
+        ----------
+        part : Part or Drive
+
+        Returns
+        -------
+        bool
+        """
         return isinstance(part, Rope) and part.rhoA > 0.0 and (not self.of or part.name in self.of)
 
     def check_on(self, structure: Structure) -> None:
