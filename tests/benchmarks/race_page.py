@@ -18,7 +18,8 @@ are told; where there are seconds, they are those of a host with other work to d
 
 Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9, `EigenSparse`,
 modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its quickest element here
-(no torsion; its beams with torsion take several times as long). Building the model is left out for both, everything that `simulate` and `SolveDynamic` do is in.
+(no torsion; its beams with torsion take several times as long). Building the model is left out
+for both, everything that `simulate` and `SolveDynamic` do is in.
 """
 _CRANE = """\
 ## The paper's crane, 50 ms
