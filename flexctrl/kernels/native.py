@@ -101,8 +101,16 @@ class Packed:
         return (self._reals if kind == "float" else self._words)[i : i + 1]
 
     def bound(self, function: Callable[[Any], int]) -> Callable[[], int]:
-        """Return a function of such records, compiled, on this one."""
-        return partial(compiled(function), ctypes.c_void_p(self._words.ctypes.data))
+        """Return a function of such records, compiled, on this one, which it keeps alive."""
+        bound = _Bound(compiled(function), ctypes.c_void_p(self._words.ctypes.data))
+        bound.owner = self
+        return bound
+
+
+class _Bound(partial):
+    """A call on the raw address of a record, and who owns the memory there."""
+
+    owner: Packed
 
 
 def assembly(function: Callable[..., int]) -> str:

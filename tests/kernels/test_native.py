@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import weakref
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -222,3 +224,14 @@ def test_what_cannot_be_compiled_is_refused_with_its_line(function, what):
     with pytest.raises(KernelError, match=what) as error:
         assembly(function)
     assert "test_native.py:" in str(error.value)
+
+
+def test_a_bound_function_keeps_its_record_alive():
+    """Else the memory it works on is somebody else's by the time it is called."""
+    packed = Packed(record())
+    kept = weakref.ref(packed)
+    bound = packed.bound(sums)
+    del packed
+    gc.collect()
+    assert kept() is not None
+    assert isinstance(bound(), int)
