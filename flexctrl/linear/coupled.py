@@ -10,7 +10,7 @@ import numpy as np
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.modal import ModalSystem
 from flexctrl.linear.modal_sum import divided, pole_sum
-from flexctrl.linear.resolvent import resolvent
+from flexctrl.linear.resolvent import cached_resolvent
 from flexctrl.linear.statespace import FirstOrder, first_order
 
 __all__ = ["coupled_transfer"]
@@ -93,7 +93,7 @@ def _resolvent(A: np.ndarray, B: np.ndarray, wanted: np.ndarray) -> Callable[[np
     """s ↦ wanted (s I - A)⁻¹ B, shape (rows, n_inputs, N)."""
     if not A.size:
         return lambda s: np.zeros((len(wanted), B.shape[1], s.size), dtype=complex)
-    form = resolvent(A)
+    form = cached_resolvent(A)
     if form.T.ndim == 1:
         residues = np.einsum("pk,km->kpm", wanted @ form.Q, form.inverse @ B).reshape(len(A), -1)
         return _summed(form.T, residues, (len(wanted), B.shape[1]))

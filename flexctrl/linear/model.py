@@ -309,8 +309,10 @@ class LinearModel:
     @cached_property
     def _coupled(self) -> Callable[[np.ndarray], np.ndarray]:
         from flexctrl.linear.coupled import coupled_transfer
+        from flexctrl.linear.refined import refined_transfer
 
-        return coupled_transfer(self._modal)
+        rough = coupled_transfer(self._modal)
+        return rough if self._scaled.massless.every.shape[1] else refined_transfer(self, self._modal, rough)
 
 
 def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, int]) -> None:

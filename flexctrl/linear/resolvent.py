@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg as la
 
-__all__ = ["Resolvent", "resolvent"]
+__all__ = ["Resolvent", "cached_resolvent", "resolvent"]
 
 WORST_BASIS = 1e3
 BLOCK = 32
@@ -71,6 +72,25 @@ def resolvent(A: np.ndarray) -> Resolvent:
         return Resolvent(poles, vectors, inverse)
     T, Q = la.schur(A, output="complex", check_finite=False)
     return Resolvent(T, Q, Q.conj().T)
+
+
+def cached_resolvent(A: np.ndarray) -> Resolvent:
+    """As `resolvent`; that of the last matrix is kept, for a response and its refinement.
+
+    Parameters
+    ----------
+    A : numpy.ndarray, shape (n, n)
+
+    Returns
+    -------
+    Resolvent
+    """
+    return _of_bytes(np.ascontiguousarray(A).tobytes(), len(A))
+
+
+@lru_cache(maxsize=1)
+def _of_bytes(data: bytes, n: int) -> Resolvent:
+    return resolvent(np.frombuffer(data).reshape(n, n))
 
 
 def _substituted(T: np.ndarray, start: np.ndarray, mu: np.ndarray) -> np.ndarray:

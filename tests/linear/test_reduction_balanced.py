@@ -12,7 +12,9 @@ import scipy.sparse as sp
 from fixtures import structures as s
 from fixtures.random_models import dense_response
 
+import flexctrl as fc
 from flexctrl.errors import ReductionError
+from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction import BalancedTruncation, RelativeError, hankel_singular_values
 from flexctrl.linear.reduction.gramian import balance, gramian_factor
 
@@ -183,3 +185,94 @@ def test_a_large_model_is_balanced_from_its_lowest_modes():
     assert np.isinf(reduced.bound).all()
     exact = full.Cq @ la.lu_solve(la.lu_factor(full.K.toarray()), full.B)
     np.testing.assert_allclose(reduced.transfer(0.0)(np.zeros(1))[..., 0], exact, rtol=0.02)
+
+
+def test_undamped_modes_that_no_signal_touches_cost_no_states():
+    """A rotor on springs: x and y are damped and coupled by the spin, z is undamped and out of reach."""
+    point = fc.PointMass("p", (0, 0, 0), 2.0)
+    springs = [
+        fc.Spring(f"s{axis}", (0, 0, 0), end, stiffness, damping=damping)
+        for axis, end, stiffness, damping in (
+            ("x", (1, 0, 0), 50.0, 0.3),
+            ("y", (0, 1, 0), 80.0, 0.1),
+            ("z", (0, 0, 1), 70.0, 0.0),
+        )
+    ]
+    structure = fc.Structure(
+        [point, *springs],
+        [*(fc.Pin(point.node, spring.start) for spring in springs), *(fc.Support(s.end, "u v w") for s in springs)],
+        inputs=[fc.Force("fx", point.node, "x"), fc.Force("fy", point.node, "y")],
+        outputs=[fc.Position("x", point.node, "x"), fc.Position("y", point.node, "y")],
+    )
+    effects = [fc.Flexible(), fc.LargeRotation(), fc.RotatingFrame((0, 0, 1.5))]
+    linear = fc.linearize(fc.assemble(structure, effects))
+    reduced = linear.reduce(BalancedTruncation(4))
+    assert (reduced.order, reduced.exact) == (4, 0)
+    assert reduced.error.worst < 1e-10
+
+
+def test_undamped_modes_that_are_touched_stay():
+    """Three uncoupled undamped oscillators; the second is driven but not seen."""
+    chain = s.model(np.eye(3), np.diag([1.0, 4.0, 9.0]), B=np.ones((3, 1)), Cq=np.array([[1.0, 0.0, 1.0]]))
+    reduced = chain.reduce(BalancedTruncation(4))
+    assert reduced.exact == 4
+    omega = np.array([0.3, 1.7, 2.4, 5.0])
+    expected = 1 / (1 - omega**2) + 1 / (9 - omega**2)
+    np.testing.assert_allclose(reduced.frequency_response(omega).values[0, 0], expected, rtol=1e-12)
+
+
+def slewer() -> LinearModel:
+    """A column on a soft slewing drive, with a dashpot: one pole at 1e-4 rad/s beside others at 1e4."""
+    tube = fc.Section.tube(fc.STEEL, 0.04, 0.003)
+    mast = fc.Beam("mast", (0, 0, 0), (0, 0, 3), tube, 3)
+    jib = fc.Beam("jib", mast.end, (2, 1, 3), tube, 2)
+    rope = fc.Rope("rope", jib.end, (2, 1, 1), EA=2e5, damping=50.0)
+    load = fc.PointMass("load", rope.end, 30.0)
+    drive = fc.RotaryDrive("slew", mast.start, axis="z", stiffness=5.0, ratio=60, inertia=2e-3)
+    dash = fc.Spring("dash", mast.node(2), (1, -1, 1), 10.0, damping=300.0)
+    structure = fc.Structure(
+        [mast, jib, rope, load, dash],
+        [
+            fc.Support(mast.start, "u v w rx ry"),
+            fc.Weld(mast.end, jib.start),
+            fc.Pin(jib.end, rope.start),
+            fc.Pin(rope.end, load.node),
+            fc.Pin(mast.node(2), dash.start),
+            fc.Support(dash.end, "u v w"),
+        ],
+        drives=[drive],
+        inputs=[fc.MotorTorque("tau", drive), fc.Force("wind", load.node, "x")],
+        outputs=[fc.DriveAngle("angle", drive), fc.SwayAngle("sway", jib.end, load.node, "x")],
+        name="slewer",
+    )
+    effects = [fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(0.05, 1e-4)]
+    return fc.linearize(fc.assemble(structure, effects))
+
+
+def test_the_bound_holds_at_the_peak_of_a_soft_pole_too():
+    """The rest of the error there is rounding in the slowest pole, 1e8 times slower than the fastest."""
+    full = slewer()
+    for order in (10, 24):
+        reduced = full.reduce(BalancedTruncation(order))
+        assert (reduced.error.absolute <= reduced.bound).all()
+        assert reduced.bound[0, 0] < 1e-5 * reduced.error.absolute[0, 0] / reduced.error.relative[0, 0]
+
+
+def test_responses_hold_nine_digits_in_silent_channels():
+    """Against 40 digits: modes of a machine with soft and stiff directions alone lose all but four."""
+    mpmath = pytest.importorskip("mpmath", reason="forty digits need mpmath")
+    mpmath.mp.dps = 40
+    full = slewer()
+    M, C, K = (A.toarray() for A in (full.M, full.C, full.K))
+    for omega in (2.2, 12.0, 50.0, 1500.0):
+        Z = sum(
+            (mpmath.matrix(A.tolist()) * f for A, f in ((K, 1), (C, 1j * omega), (M, -(omega**2)))),
+            0 * mpmath.eye(len(K)),
+        )
+        exact = np.zeros(full.D.shape, complex)
+        for k in range(full.B.shape[1]):
+            q = mpmath.lu_solve(Z, mpmath.matrix(full.B[:, k].tolist()))
+            rows = full.Cq.astype(complex) + 1j * omega * full.Cv
+            exact[:, k] = [complex(sum(mpmath.mpc(c) * x for c, x in zip(row, q, strict=True))) for row in rows]
+        found = full.frequency_response([omega]).values[..., 0]
+        assert (abs(found - exact) <= 1e-9 * abs(exact)).all()

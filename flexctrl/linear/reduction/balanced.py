@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import block_diag, eigvals, schur, solve_sylvester
+from scipy.linalg import block_diag, eig, eigvals, schur, solve_sylvester
 
 from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
@@ -16,11 +16,14 @@ from flexctrl.linear.reduction.low_frequency import low_frequency, undamped
 from flexctrl.linear.reduction.modal import modal_model
 from flexctrl.linear.reduction.states import ReducedStates, Triple
 from flexctrl.linear.statespace import FirstOrder, modal_first_order
+from flexctrl.linear.transfer import transfer
 
 __all__ = ["BalancedTruncation", "hankel_singular_values"]
 
 POOL = 5
 UNDAMPED = 1e-10
+UNTOUCHED = 1e-10
+WORST_BASIS = 1e6
 
 
 @dataclass(frozen=True)
@@ -28,9 +31,11 @@ class BalancedTruncation:
     """Keep the states that are easiest to reach and to observe (B. C. Moore, IEEE TAC 26 (1981) 17–32).
 
     The model is written in scaled modal coordinates and split exactly: free rigid-body motion becomes
-    pure integrators, unstable and undamped modes stay untouched, and the stable rest is balanced from
-    Gramian factors (never from squared Gramians, so that damping ratios of 1e-6 do no harm). The result
-    is first order. ‖G − G_r‖∞ ≤ 2 Σ σ_i over the Hankel singular values left out.
+    pure integrators, unstable and undamped modes stay untouched (undamped ones that no input moves or no output
+    sees are left out), and the stable rest is balanced from Gramian factors (never from squared Gramians, so that
+    damping ratios of 1e-6 do no harm). The result is first order. ‖G − G_r‖∞ ≤ 2 Σ σ_i over the Hankel singular
+    values left out, but for rounding: poles p of a first-order form are known to about ε max|p|, which shows at the
+    peak of a pole much slower than that. The ``bound`` contains both.
 
     Models of more than 1000 coordinates are first cut to their lowest modes with static correction; then
     there is no bound, only the measured error.
@@ -63,7 +68,7 @@ class BalancedTruncation:
         ReductionError
             If the order does not even hold the states that cannot be balanced.
         """
-        exact, stable, feedthrough, bases = _balanced(full, 0 if _complete(full) else POOL * self.order)
+        exact, stable, feedthrough, bases, rounding = _balanced(full, 0 if _complete(full) else POOL * self.order)
         kept = len(exact.A)
         if self.order < max(kept, 1):
             raise ReductionError(
@@ -73,7 +78,7 @@ class BalancedTruncation:
         room = self.order - kept
         small, direct = _truncated(stable, bases, room, self.match_dc)
         tail = 2.0 * bases.hankel[len(small.A) :].sum() if _complete(full) else np.inf
-        bound = np.full(full.D.shape, tail)
+        bound = tail + rounding
         return ReducedStates(full, self, _joined(exact, small), feedthrough + direct, kept, bases.hankel, bound)
 
 
@@ -98,10 +103,22 @@ def _complete(full: LinearModel) -> bool:
 
 
 @lru_cache(maxsize=1)
-def _balanced(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray, Balanced]:
-    """The model split and its stable part balanced: the same for every order that a search tries."""
+def _balanced(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray, Balanced, np.ndarray]:
+    """The model split, its stable part balanced, and its rounding: the same for every order that a search tries."""
     exact, stable, feedthrough = _split(full, pool)
-    return exact, stable, feedthrough, balance(stable.A, stable.B, stable.C, len(stable.A))
+    bases = balance(stable.A, stable.B, stable.C, len(stable.A))
+    return exact, stable, feedthrough, bases, _rounding(full, stable.A)
+
+
+def _rounding(full: LinearModel, A: np.ndarray) -> np.ndarray:
+    """What ε max|p| in the place of a pole makes of the response at its peak, channel by channel: |G| |δp|/|Re p|."""
+    if not (len(A) and _complete(full)):
+        return np.zeros(full.D.shape)
+    poles = eigvals(A)
+    poles = poles[poles.imag >= 0.0]
+    top = float(abs(poles).max())
+    peaks = abs(transfer(full, top)(1j * abs(poles)))
+    return np.asarray((peaks * (np.finfo(float).eps * top / abs(poles.real))).max(axis=-1))
 
 
 def _truncated(stable: Triple, bases: Balanced, room: int, match_dc: bool) -> tuple[Triple, np.ndarray]:
@@ -132,7 +149,7 @@ def _split(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray]:
     free, rest = _free_motion_apart(first, position[loose], position[~loose])
     integrators, autonomous = _integrators_apart(rest)
     marginal, stable = _marginal_apart(autonomous)
-    return _joined(free, integrators, marginal), stable, first.D + missing
+    return _joined(free, integrators, _touched(marginal, first)), stable, first.D + missing
 
 
 @dataclass(frozen=True)
@@ -178,6 +195,25 @@ def _marginal_apart(system: Triple) -> tuple[Triple, Triple]:
         Triple(T[:k, :k], B[:k] - X @ B[k:], C[:, :k]),
         Triple(T[k:, k:], B[k:], C[:, k:] + C[:, :k] @ X),
     )
+
+
+def _touched(marginal: Triple, first: FirstOrder) -> Triple:
+    """Without the undamped modes that no input moves or no output sees, to rounding; growing ones stay."""
+    A, B, C = marginal
+    poles, V = eig(A) if len(A) else (np.zeros(0), np.zeros((0, 0)))
+    if not len(A) or np.linalg.cond(V) > WORST_BASIS:
+        return marginal
+    W = np.linalg.inv(V)
+    moved = (abs(W @ B) > UNTOUCHED * abs(first.B).max(axis=0)).any(axis=1)
+    seen = (abs(C @ V) > UNTOUCHED * abs(first.C).max(axis=1)[:, None]).any(axis=0)
+    keep = (moved & seen) | (poles.real > UNDAMPED * abs(poles))
+    keep = np.array([keep[abs(poles - p.conj()) <= UNTOUCHED * abs(p)].any() for p in poles]) | keep
+    if keep.all():
+        return marginal
+    upper = keep & (poles.imag >= 0.0)
+    halves = np.hstack([V[:, upper].real, V[:, upper & (poles.imag > 0.0)].imag])
+    left = np.linalg.pinv(halves) @ (V[:, keep] @ W[keep]).real
+    return Triple(left @ A @ halves, left @ B, C @ halves)
 
 
 def _joined(*systems: Triple) -> Triple:

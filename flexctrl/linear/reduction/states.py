@@ -74,8 +74,8 @@ class ReducedStates(Reduced):
     hankel : numpy.ndarray
         Hankel singular values of the balanced part, decreasing.
     bound : numpy.ndarray, shape (n_outputs, n_inputs)
-        2 Σ of the Hankel singular values left out, which |G − G_r| cannot exceed at any frequency; infinite
-        for a model cut to its lowest modes beforehand.
+        2 Σ of the Hankel singular values left out, and the rounding of poles: what |G − G_r| cannot exceed at any
+        frequency; infinite for a model cut to its lowest modes beforehand.
     """
 
     system: Triple
