@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq
 
 __all__ = ["ClampedModes", "clamped_modes"]
 
@@ -86,6 +85,8 @@ def clamped_shapes(count: int, s: np.ndarray) -> np.ndarray:
 def _root(number: int) -> float:
     """The root of cos β cosh β = 1 near (number + ½) π."""
     middle = (number + 0.5) * np.pi
+    from scipy.optimize import brentq
+
     return brentq(lambda b: np.cos(b) - 1.0 / np.cosh(b), middle - 0.1, middle + 0.1, xtol=1e-15)
 
 
