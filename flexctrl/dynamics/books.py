@@ -71,7 +71,8 @@ class Books:
         self.lawful = self.model.large
         self.reach = yardsticks(self.model)
         probe = np.linspace(1.0, 2.0, self.model.n)
-        self.dissipates = bool(self.model.switches.names) or self.model.energy(state.with_(v=probe))[2] != 0.0
+        changing = bool(self.model.switches.names or self.model.kinks.names)  # what is loose now may damp later
+        self.dissipates = changing or self.model.energy(state.with_(v=probe))[2] != 0.0
         kinetic, stored, power = self.model.energy(state)
         self.sums = Sums(kinetic + stored, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n))
 
@@ -90,7 +91,12 @@ class Books:
 
     def jump(self, point: Point) -> None:
         """Note that rates have jumped with the inputs: what is dissipated jumps with them."""
-        if self.dissipates and self.model.motion.flows.size:
+        if self.model.motion.flows.size:
+            self.turn(point)
+
+    def turn(self, point: Point) -> None:
+        """Note that what is dissipated jumps."""
+        if self.dissipates:
             self.sums.power = self.model.energy(point.state)[2]
 
     def enter_block(self, before: Point, block: Block) -> None:

@@ -198,10 +198,11 @@ class Watch:
         """Note the side that each gauge is on at the start."""
         values = self.values(point.state, point.supply.u)
         self.sides, self.sizes = np.sign(values), np.abs(values)
-        self.sides[np.abs(values) <= self._dusts()] = 0.0
+        self.sides[np.abs(values) <= self.dusts] = 0.0
         self.switched()
 
-    def _dusts(self) -> np.ndarray:
+    @property
+    def dusts(self) -> np.ndarray:
         """What counts as zero of each gauge."""
         dust = _DUST * self.sizes
         if self.corner_names:
@@ -242,7 +243,7 @@ class Watch:
 
     def _through(self, gauge: int, corners: Sequence[tuple[float, float]], value: _Along) -> list[Crossing]:
         side, found = self.sides[gauge], []
-        dust = self._dusts()[gauge]
+        dust = self.dusts[gauge]
         direction = self.events[gauge].direction if gauge < len(self.events) else Direction.EITHER
         for (a, fa), (b, fb) in pairwise(corners):
             if abs(fb) <= dust or np.sign(fb) == side:
@@ -264,7 +265,7 @@ class Watch:
     def settle(self, after: Point) -> None:
         """Note the sides after a step."""
         values = self.values(after.state, after.supply.u)
-        clear = np.abs(values) > self._dusts()
+        clear = np.abs(values) > self.dusts
         self.sides = np.where(clear, np.sign(values), self.sides)
 
     def cross(self, crossing: Crossing) -> None:

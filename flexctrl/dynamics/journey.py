@@ -17,6 +17,7 @@ from flexctrl.dynamics.events import Crossing, Occurrence, Watch
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride
+from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Mark, Point, StepError, Stepper
@@ -30,6 +31,9 @@ _BLOCK = 1000
 _BLOCK_BYTES = 16e6
 _NEAR = 1e-9
 _LANDINGS = 5
+_SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
+_LEAD, _LEAD_MOST = 1e-9, 1e-6
+_NUDGES = 8
 _CHATTER = 20
 
 
@@ -263,11 +267,11 @@ class Journey:
     # -- what comes with every step
 
     def _accept(self, after: Point, stop: float) -> None:
-        before = self.point
+        before, corner = self.point, None
         if not self.watch.idle:
-            after = self._watched(before, after)
+            after, corner = self._watched(before, after)
             if after.state.t == before.state.t:
-                self.point = after
+                self.point = after if corner is None else self._beyond(after, corner)
                 return
         curve = self.track.curve(before, after)
         self.books.enter(before, after, curve)
@@ -275,9 +279,11 @@ class Journey:
         self.mark.steps += 1
         self.track.keep((after.state,), before, after)
         self.rows.within(before, after, stop - after.state.t <= self._tick)
+        if corner is not None:
+            self.point = self._beyond(after, corner)
 
-    def _watched(self, before: Point, after: Point) -> Point:
-        """Note what happens over a step; end it where the run stops or a law of force switches."""
+    def _watched(self, before: Point, after: Point) -> tuple[Point, Crossing | None]:
+        """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
         watch, curve = self.watch, self.track.curve(before, after)
         crossings = watch.crossings(curve, before, after)
         landing = next((c for c in crossings if watch.stops(c.gauge)), None)
@@ -289,7 +295,7 @@ class Journey:
             self._note(crossings, curve, before)
             watch.settle(after)
             self.mark.stuck = 0
-            return after
+            return after, None
         self._note([c for c in crossings if c.t < landing.t], curve, before)
         after, landing = self._land(before, after, landing)
         watch.settle(after)
@@ -297,18 +303,33 @@ class Journey:
         self.events.append(watch.occurrence(landing, after.state, after.supply.u))
         if end := watch.last_word(landing.gauge):
             self.status, self.message = Status.STOPPED, f"{end} at t = {landing.t:.6g} s"
-            return after
+            return after, None
         short = landing.t - before.state.t < 1e-6 * self.mark.size
         self.mark.stuck = self.mark.stuck + 1 if short else 0
-        return self._anew(after, switch)
+        return (after, landing) if switch >= len(watch.names) else (self._anew(after, switch), None)
 
     def _anew(self, at: Point, switch: int) -> Point:
         """Start anew under the law of force that holds from now on."""
-        supply, state = self.plan.feed.restart(at.state, at.supply), at.state
-        if switch < len(self.watch.names):
-            state = self.plan.model.switches.after(state, supply.u, switch)
-            self.watch.switched()
+        supply = self.plan.feed.restart(at.state, at.supply)
+        state = self.plan.model.switches.after(at.state, supply.u, switch)
+        self.watch.switched()
         return self.stepper.renew(replace(at, state=state), supply, self.mark.size)
+
+    def _beyond(self, at: Point, corner: Crossing) -> Point:
+        """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
+        watch, sign, span = self.watch, 1.0 if corner.rising else -1.0, _LEAD * self.mark.size
+        state, v = at.state, at.state.v
+        for _ in range(_NUDGES):
+            moved = self.plan.model.advance(at.state, span * v, v, at.state.t)
+            if sign * watch.values(moved, at.supply.u)[corner.gauge] > watch.dusts[corner.gauge]:
+                state = moved
+                break
+            span *= 4.0
+        stepper: Stepper[Any] = self.stepper.plain if isinstance(self.stepper, MarchingStepper) else self.stepper
+        supply = self.plan.feed.restart(state, at.supply)
+        point = stepper.renew(replace(at, state=state), supply, self.mark.size)
+        self.books.turn(point)
+        return point
 
     def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:
         for c in crossings:
@@ -316,15 +337,29 @@ class Journey:
             self.events.append(self.watch.occurrence(c, curve.at(c.t), before.supply.u))
 
     def _land(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
-        """Take the step again, to where a gauge is zero; where it is at once, there is none."""
+        """Take the step again, to where a gauge is zero; where it is at once, there is none.
+
+        Forces may jump at a corner: the step ends just before it, so that one law holds all along.
+        """
         t, h, gauge = before.state.t, after.state.t - before.state.t, crossing.gauge
-        at = crossing.t
+        corner = gauge >= len(self.watch.events) + len(self.watch.names)
+        lead = _LEAD * h if corner else 0.0
+        at = crossing.t - lead
         for _ in range(_LANDINGS):
             if at - t <= _SMALLEST * h:
                 return before, replace(crossing, t=t)
-            after = self.stepper.step(before, at - t)
+            after = self._towards(before, at - t) if corner else self.stepper.step(before, at - t)
             off = self.watch.offset(self.track.curve(before, after), before, after, gauge)
-            if abs(off) <= _NEAR * h:
+            if 0.0 <= off <= _LEAD_MOST * h if corner else abs(off) <= _NEAR * h:
                 break
-            at = min(max(at + off, t), t + h)
-        return after, replace(crossing, t=after.state.t)
+            at = min(max(after.state.t + off - lead, t), t + h)
+        return after, replace(crossing, t=after.state.t + off if corner else after.state.t)
+
+    def _towards(self, before: Point, h: float) -> Point:
+        """Take a step to a corner, or just short of it: where a force jumps there, no step ends on it."""
+        for short in _SHORT:
+            try:
+                return self.stepper.step(before, h * (1.0 - short))
+            except StepError as error:
+                failure = error
+        raise failure
