@@ -66,6 +66,7 @@ _HOMES = {
     "flexctrl.model.linearize": ("linearize",),
     "flexctrl.linear.model": ("LinearModel",),
     "flexctrl.linear.certificate": ("Certificate",),
+    "flexctrl.linear.matfile": ("Units",),
     "flexctrl.linear.modes": ("Modes",),
     "flexctrl.linear.response": ("FrequencyResponse",),
     "flexctrl.linear.statespace": ("ModalForm", "PhysicalForm"),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +15,43 @@ import scipy.sparse as sp
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.model import LinearModel, PartMatrices
 
-__all__ = ["load_mat", "save_mat"]
+__all__ = ["Units", "load_mat", "load_units", "save_mat"]
 
 FORMAT = "flexctrl linear model 1"
-UNITS = (
-    "SI: time s, displacement m, rotation rad, mass kg and kg m^2, force N and N m; "
-    "M q'' + C q' + K q = B u, y = Cq q + Cv q' + D u"
-)
+EQUATIONS = "M q'' + C q' + K q = B u, y = Cq q + Cv q' + D u"
 
 
-def save_mat(linear: LinearModel, path: str | Path) -> None:
+@dataclass(frozen=True)
+class Units:
+    """Names of the units that the numbers of a model are in; nothing is converted by them.
+
+    Attributes
+    ----------
+    length, mass, time, force : str
+        Consistent ones: force = mass · length/time², e.g. ``Units("mm", "t", "s", "N")``.
+    angle : str
+    """
+
+    length: str = "m"
+    mass: str = "kg"
+    time: str = "s"
+    force: str = "N"
+    angle: str = "rad"
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            name = getattr(self, field.name)
+            if not isinstance(name, str) or not name or set(name) & {",", ";", ":"} or name != name.strip():
+                raise LinearizationError(f"Units: {field.name} = {name!r}; give the name of a unit, e.g. 'mm'")
+
+    def __str__(self) -> str:
+        return ", ".join(f"{field.name} {getattr(self, field.name)}" for field in fields(self))
+
+
+SI = Units()
+
+
+def save_mat(linear: LinearModel, path: str | Path, units: Units = SI) -> None:
     """Write the matrices (sparse ones kept sparse), names and units.
 
     In MATLAB: ``s = load(path); sys = mechss(s.M, s.C, s.K, s.B, s.Cq, s.Cv, s.D)``; in Scilab:
@@ -31,13 +61,15 @@ def save_mat(linear: LinearModel, path: str | Path) -> None:
     ----------
     linear : LinearModel
     path : str or pathlib.Path
+    units : Units
+        What the model's numbers are in, if the machine was not described in SI units.
     """
     from scipy.io import savemat
 
     names = list(linear.parts)
     content: dict[str, Any] = {
         "format": FORMAT,
-        "units": UNITS,
+        "units": f"{units}; {EQUATIONS}",
         "name": linear.name,
         **{key: _sparse(getattr(linear, key)) for key in ("M", "C", "K")},
         **{key: np.asarray(getattr(linear, key), dtype=float) for key in ("B", "Cq", "Cv", "D")},
@@ -65,9 +97,7 @@ def load_mat(path: str | Path) -> LinearModel:
     LinearizationError
         If the file is not such a model.
     """
-    from scipy.io import loadmat
-
-    content = loadmat(str(path), chars_as_strings=True)
+    content = _content(path)
     missing = [key for key in ("M", "C", "K", "B", "Cq", "Cv", "D", "coordinates") if key not in content]
     if missing:
         raise LinearizationError(f"{path} is not a linear model written by save_mat: {', '.join(missing)} missing")
@@ -96,6 +126,45 @@ def load_mat(path: str | Path) -> LinearModel:
         name=str(np.ravel(content["name"])[0]),
         parts=parts,
     )
+
+
+def load_units(path: str | Path) -> Units:
+    """Read in which units a model written by :func:`save_mat` is.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+
+    Returns
+    -------
+    Units
+
+    Raises
+    ------
+    LinearizationError
+        If the file is not such a model.
+    """
+    content = _content(path)
+    text = str(np.ravel(content.get("units", [""]))[0]).split(";")[0]
+    found = dict(term.strip().split(" ", 1) for term in text.split(",") if " " in term.strip())
+    if set(found) != {field.name for field in fields(Units)}:
+        raise LinearizationError(f"{path} does not tell its units as save_mat writes them; it says {text!r}")
+    return Units(**found)
+
+
+def _content(path: str | Path) -> dict[str, Any]:
+    """What a MATLAB file holds."""
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        return dict(loadmat(str(path), chars_as_strings=True))
+    except FileNotFoundError as error:
+        raise LinearizationError(f"there is no file {path}") from error
+    except RuntimeError as error:
+        raise LinearizationError(f"{path} is a MATLAB 7.3 (HDF5) file; write it with save(…, '-v7')") from error
+    except (ValueError, TypeError, KeyError, IndexError, OSError, MatReadError, struct.error, zlib.error) as error:
+        raise LinearizationError(f"{path} is no MATLAB file ({error}); give one that save_mat wrote") from error
 
 
 def _sparse(A: sp.spmatrix) -> sp.csc_matrix:

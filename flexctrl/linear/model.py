@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flexctrl.linear.certificate import Certificate
     from flexctrl.linear.condense import Audit, Scaled
     from flexctrl.linear.discrete import Hold
+    from flexctrl.linear.matfile import Units
     from flexctrl.linear.modal import ModalSystem
     from flexctrl.linear.modes import Modes
     from flexctrl.linear.reduction import Method, Reduced, RelativeError
@@ -281,11 +282,18 @@ class LinearModel:
 
         return discretize(self, dt, hold)
 
-    def save_mat(self, path: str | Path) -> None:
-        """Write a MATLAB/Scilab file; see :func:`flexctrl.linear.matfile.save_mat`."""
-        from flexctrl.linear.matfile import save_mat
+    def save_mat(self, path: str | Path, units: Units | None = None) -> None:
+        """Write a MATLAB/Scilab file; see :func:`flexctrl.linear.matfile.save_mat`.
 
-        save_mat(self, path)
+        Parameters
+        ----------
+        path : str or pathlib.Path
+        units : Units, optional
+            Default: SI.
+        """
+        from flexctrl.linear.matfile import SI, save_mat
+
+        save_mat(self, path, units or SI)
 
     @classmethod
     def load_mat(cls, path: str | Path) -> LinearModel:

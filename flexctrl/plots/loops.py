@@ -26,6 +26,10 @@ __all__ = [
 ]
 
 
+_EDGE = 0.08
+"""Share of the window, at its frame, in which a label would be cut."""
+
+
 def mark_margins(axes: Sequence[Axes] | np.ndarray, margins: Margins) -> np.ndarray:
     """Mark gain and phase margin of a loop in its Bode plot (in dB).
 
@@ -122,7 +126,7 @@ def plot_nichols(
     low, high = 90.0 * np.floor(angles.min() / 90.0 - 0.5), 90.0 * np.ceil(angles.max() / 90.0 + 0.5)
     _closed_loop_grid(ax, (low, high), gain)
     turns = -180.0 + 360.0 * np.arange(np.ceil((low + 180.0) / 360.0), np.floor((high + 180.0) / 360.0) + 1.0)
-    ax.plot(turns, 0.0 * turns, "+", color=INK, markersize=10, markeredgewidth=1.6)
+    ax.plot(turns, 0.0 * turns, "+", color=INK, markersize=10, markeredgewidth=1.6, clip_on=False)
     tidy(ax).set(xlabel="phase of L (°)", ylabel="|L| (dB)", xlim=(low, high), ylim=gain)
     ax.xaxis.set_major_locator(
         MultipleLocator(90.0 if high - low <= 540.0 else 180.0 if high - low <= 1260.0 else 360.0)
@@ -137,7 +141,11 @@ def _closed_loop_grid(ax: Axes, phase: tuple[float, float], gain: tuple[float, f
     L = 10 ** (size / 20) * np.exp(1j * np.radians(angle))
     closed = _decibel(L / np.where(abs(1 + L) > 1e-9, 1 + L, 1e-9))
     lines = ax.contour(angle, size, closed, levels=[-20, -12, -6, -3, 0, 3, 6, 12], colors=PALE, linewidths=0.7)
-    ax.clabel(lines, fmt="%g dB", fontsize=7)
+    margins = _EDGE * (phase[1] - phase[0]), _EDGE * (gain[1] - gain[0])
+    for text in ax.clabel(lines, fmt="%g dB", fontsize=7):
+        x, y = text.get_position()
+        near = min(x - phase[0], phase[1] - x) < margins[0] or min(y - gain[0], gain[1] - y) < margins[1]
+        text.set_visible(not near)
 
 
 def plot_sensitivities(loops: Mapping[str, Loop], ax: Axes | None = None, *, margins: Margins | None = None) -> Axes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from flexctrl.linear.reduction import Reduced
 from flexctrl.plots.frequency import HZ, channel_values, line_style
-from flexctrl.plots.style import INK, new_figure, tidy
+from flexctrl.plots.style import CYCLE, INK, new_figure, tidy
 
 __all__ = ["plot_reduction", "reduction_figure"]
 
@@ -48,12 +49,21 @@ def plot_reduction(
         if isinstance(reduced, Reduced):
             ax.loglog(hertz, abs(mine), label=f"reduced, order {one.order}", **line_style(0))
         gap = np.maximum(abs(exact - mine), least)
-        ax.loglog(hertz, gap, label=label, **line_style(number + isinstance(reduced, Reduced)))
+        style = line_style(1) if isinstance(reduced, Reduced) else _apart(number, len(several))
+        ax.loglog(hertz, gap, label=label, **style)
         bottom = min(bottom, float(np.quantile(gap, 0.02)))
     ax.set_ylim(bottom=max(least, 0.3 * bottom))
     tidy(ax).set(xlabel="frequency (Hz)", ylabel="magnitude")
     ax.legend(frameon=False, fontsize="small")
     return ax
+
+
+def _apart(number: int, count: int) -> dict[str, Any]:
+    """A style of its own for each of many curves, thinner and thinner, so that one shows under another."""
+    dashes = ("-", (0, (5, 1.5)), (0, (2, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
+    turn = number // len(CYCLE) + number
+    width = 3.4 - 2.4 * number / max(count - 1, 1) if count > 1 else 1.4
+    return {"color": CYCLE[number % len(CYCLE)], "linewidth": width, "linestyle": dashes[turn % len(dashes)]}
 
 
 def reduction_figure(reduced: Reduced) -> Figure:

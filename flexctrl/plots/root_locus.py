@@ -61,7 +61,8 @@ def plot_root_locus(
         ax.plot(0.0, crossing.omega, "s", color=INK, markersize=5, zorder=5)
         if crossing.unstable_above:
             note = f"k = {crossing.gain:.3g}"
-            ax.annotate(note, (0.0, crossing.omega), (7, -4), textcoords="offset points", fontsize=9)
+            room = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+            ax.annotate(note, (0.0, crossing.omega), (9, 7), textcoords="offset points", fontsize=9, bbox=room)
     if len(loci) > 1:
         ax.legend(frameon=False, loc="upper left")
     return ax

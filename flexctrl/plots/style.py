@@ -13,7 +13,7 @@ DRIVE = "#b45309"
 ROPE = "#7c6f64"
 GROUND = "#3f7d58"
 
-CYCLE = ("#1d4ed8", "#d9480f", "#3f7d58", "#7048a8", "#b45309", "#0f766e", "#be185d", "#4b5563")
+CYCLE = ("#1d4ed8", "#d9480f", "#3f7d58", "#7048a8", "#d4a106", "#22a7a0", "#d6336c", "#8d6e63")
 """Line colours in order."""
 
 

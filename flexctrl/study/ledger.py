@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.run import Run, Status
-from flexctrl.errors import FlexctrlError, StructureError
+from flexctrl.errors import FlexctrlError, StructureError, did_you_mean
 from flexctrl.study.answers import Answer, Change, answer_of, change_between
 from flexctrl.study.omissions import Omission, Subject, omissions
 
@@ -118,8 +117,6 @@ class Ledger:
         return tuple(e.name for e in self.entries if e.keep)
 
     def __getitem__(self, name: str) -> Entry:
-        from flexctrl.errors import did_you_mean
-
         for entry in self.entries:
             if entry.name == name:
                 return entry
@@ -132,7 +129,9 @@ class Ledger:
         -------
         matplotlib.figure.Figure
         """
-        return importlib.import_module("flexctrl.plots.ledger").ledger_figure(self)
+        from flexctrl.plots.ledger import ledger_figure
+
+        return ledger_figure(self)
 
     def __str__(self) -> str:
         wide = max([len(e.name) for e in self.entries], default=6)
@@ -293,12 +292,11 @@ class _Auditor:
         return trial
 
     def _ratio(self, trial: _Trial) -> float:
-        """Time of the full scene over that of another, run in turn; each by its quickest run."""
+        """Time of the full scene over that of another, run once more in turn; each by its quickest run."""
         if trial is self.full:
             return 1.0
-        walls = [(self.full.scene.run().report.wall_s, trial.scene.run().report.wall_s) for _ in range(1)]
-        self.full.wall = min(self.full.wall, *(w[0] for w in walls))
-        trial.wall = min(trial.wall, *(w[1] for w in walls))
+        for one in (self.full, trial):
+            one.wall = min(one.wall, one.scene.run().report.wall_s)
         self._tick()
         return self.full.wall / trial.wall
 

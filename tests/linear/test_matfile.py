@@ -9,6 +9,7 @@ from fixtures import structures as s
 from scipy.io import loadmat, savemat
 
 from flexctrl.errors import LinearizationError
+from flexctrl.linear.matfile import Units, load_units
 from flexctrl.linear.model import LinearModel, PartMatrices
 
 
@@ -69,3 +70,28 @@ def test_another_file_is_refused(tmp_path):
     savemat(str(tmp_path / "other.mat"), {"A": np.eye(2)})
     with pytest.raises(LinearizationError, match="missing"):
         LinearModel.load_mat(tmp_path / "other.mat")
+
+
+def test_units_are_those_given(tmp_path):
+    path = tmp_path / "frame.mat"
+    machine().save_mat(path)
+    assert load_units(path) == Units()
+    assert "time s" in str(loadmat(path)["units"][0])
+    millimetres = Units("mm", "t", "s", "N")
+    machine().save_mat(path, millimetres)
+    assert load_units(path) == millimetres
+    text = str(loadmat(path)["units"][0])
+    assert "length mm, mass t" in text
+    assert "kg" not in text
+    with pytest.raises(LinearizationError, match="mass = ''"):
+        Units(mass="")
+
+
+@pytest.mark.parametrize("content", [b"", b"no model", b"x" * 4096, b"MATLAB 5.0 MAT-file" + b"\0" * 300])
+def test_a_file_that_is_not_matlabs_is_refused(tmp_path, content):
+    path = tmp_path / "notes.mat"
+    path.write_bytes(content)
+    with pytest.raises(LinearizationError, match=r"notes\.mat is no"):
+        LinearModel.load_mat(path)
+    with pytest.raises(LinearizationError, match="there is no file"):
+        LinearModel.load_mat(tmp_path / "nothing.mat")
