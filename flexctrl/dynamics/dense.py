@@ -92,16 +92,23 @@ class Stretched(Protocol):
     def after(self) -> Point: ...
 
 
-class Repeatable(Protocol):
-    """Many steps that can be done again: their stretches, when these start, and the bytes it takes to remember."""
+class Parted(Protocol):
+    """Steps in parts: the one at a time, and where the last one ends."""
+
+    def part(self, t: float) -> Stretched: ...
+
+    @property
+    def after(self) -> Point: ...
+
+
+class Repeatable(Parted, Protocol):
+    """Many steps that can be done again: where they start, and the bytes it takes to remember."""
 
     @property
     def bytes(self) -> float: ...
 
     @property
-    def starts(self) -> list[float]: ...
-
-    def stretches(self) -> Sequence[Stretched]: ...
+    def start(self) -> Point: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +118,10 @@ class Stretch:
     states: Sequence[State]
     before: Point
     after: Point
+
+    def part(self, t: float) -> Stretch:
+        """The only part."""
+        return self
 
 
 @dataclass
@@ -131,7 +142,7 @@ class Track:
     curve: Callable[[Point, Point], Curve]
     used: float = 0.0
     starts: list[float] = field(default_factory=list)
-    stretches: list[Stretched] = field(default_factory=list)
+    stretches: list[Parted] = field(default_factory=list)
 
     def keep(self, states: Sequence[State], before: Point, after: Point) -> None:
         """Keep one step or many."""
@@ -148,14 +159,14 @@ class Track:
         """Keep many steps that can be done again."""
         if self.used <= self.room:
             self.used += ride.bytes
-            self.starts += ride.starts
-            self.stretches += ride.stretches()
+            self.starts.append(ride.start.state.t)
+            self.stretches.append(ride)
         if self.used > self.room:
             self.starts, self.stretches = [], []
 
     def state(self, t: float) -> tuple[State, np.ndarray]:
         """Return the state and the inputs at a time."""
-        before, after = self._step(self.stretches[max(0, bisect_right(self.starts, t) - 1)], t)
+        before, after = self._step(self.stretches[max(0, bisect_right(self.starts, t) - 1)].part(t), t)
         for end in (after, before):
             if t == end.state.t:
                 return end.state, end.supply.u

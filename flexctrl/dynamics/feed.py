@@ -89,11 +89,15 @@ class Feed:
 
     def sampled(self, t: float, y: np.ndarray, supply: Supply) -> Supply:
         """Return the inputs from a sample instant on, of what the controller reads there."""
+        u, x = self.told(t, supply.x, y)
+        return Supply(np.array(u), x, supply.rate)
+
+    def told(self, t: float, x: np.ndarray, y: np.ndarray) -> tuple[list[float], np.ndarray]:
+        """Return the inputs from a sample instant on, and the controller's state."""
         c = self.controller
         assert c is not None
-        u = self._total(c.command(t, supply.x, y))
-        x = np.asarray(c.update(t, supply.x, y), dtype=float) if supply.x.size else supply.x
-        return Supply(u, x, supply.rate)
+        u = self._total(c.command(t, x, y))
+        return u, np.asarray(c.update(t, x, y), dtype=float) if x.size else x
 
     def restart(self, state: State, supply: Supply) -> Supply:
         """Return the inputs after a break of a continuous command."""
@@ -104,7 +108,7 @@ class Feed:
         assert self.controller is not None
         y = self.measured(state)
         rate = np.asarray(self.controller.rate(state.t, x, y), dtype=float) if x.size else x
-        return Supply(self._total(self.controller.command(state.t, x, y)), x, rate)
+        return Supply(np.array(self._total(self.controller.command(state.t, x, y))), x, rate)
 
     def between(self, before: Supply, after: Supply, share: tuple[float, float], state: State) -> Supply:
         """Return the inputs within a step: ``share`` of it done, and its length; the state there."""
@@ -116,16 +120,16 @@ class Feed:
         x = before.x + s * (first + s * (3.0 * step - 2.0 * first - last + s * (first + last - 2.0 * step)))
         return self.evaluate(state, x)
 
-    def _total(self, command: Any) -> np.ndarray:
+    def _total(self, command: Any) -> list[float]:
         u = self._base.copy()
         values, writes = np.asarray(command, dtype=float).ravel().tolist(), self._writes
         if len(values) != len(writes):
             raise ControllerError(
                 f"the controller's command has {len(values)} values; expected one for each of its {len(writes)} outputs"
             )
-        for i, value in zip(writes, values, strict=True):  # a few numbers: quicker in a list than in an array
+        for i, value in zip(writes, values):  # noqa: B905 - a few numbers, often: quicker in a list, unchecked again
             u[i] += value
-        return np.array(u)
+        return u
 
     def at(self, state: State, before: Supply, h: float) -> Supply:
         """Return the inputs at the end of a step of length h; the controller's state follows the trapezoidal rule."""
@@ -142,9 +146,9 @@ class Feed:
         c = self.controller
         assert c is not None
         if not before.x.size:
-            return Supply(self._total(c.command(t, before.x, y)), before.x, before.x)
+            return Supply(np.array(self._total(c.command(t, before.x, y))), before.x, before.x)
         x = _trapezoidal(c, t, y, before, h)
-        return Supply(self._total(c.command(t, x, y)), x, np.asarray(c.rate(t, x, y), dtype=float))
+        return Supply(np.array(self._total(c.command(t, x, y))), x, np.asarray(c.rate(t, x, y), dtype=float))
 
     def slope(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return ∂(generalised forces of the inputs)/∂(own motion) through a continuous controller."""

@@ -95,10 +95,10 @@ class Packed:
         i, kind = self._places[name]
         (self._reals if kind == "float" else self._words)[i] = value
 
-    def cell(self, name: str) -> np.ndarray:
-        """Return the place of a number, shape (1,): quicker where it is read or written often."""
+    def cell(self, name: str) -> Any:
+        """Return the place of a number, a memoryview of length one: quick where it is read or written often."""
         i, kind = self._places[name]
-        return (self._reals if kind == "float" else self._words)[i : i + 1]
+        return memoryview(self._reals if kind == "float" else self._words)[i : i + 1]
 
     def bound(self, function: Callable[[Any], int]) -> Callable[[], int]:
         """Return a function of such records, compiled, on this one, which it keeps alive."""

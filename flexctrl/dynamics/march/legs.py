@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,8 +21,8 @@ __all__ = ["Leg", "Legs", "Span", "same"]
 
 
 def same(u: np.ndarray, v: np.ndarray) -> bool:
-    """Tell whether inputs are the same to the last bit."""
-    return u.tobytes() == v.tobytes()
+    """Tell whether inputs are the same."""
+    return bool(u.tolist() == v.tolist())
 
 
 class Leg(NamedTuple):
@@ -43,6 +44,33 @@ class Leg(NamedTuple):
     steps: int
 
 
+class Held(NamedTuple):
+    """Legs from sample to sample, written down as they come.
+
+    Attributes
+    ----------
+    rate : numpy.ndarray
+        See `Supply`.
+    samples : list
+        Where each starts, the length of its steps, their number, its inputs and the controller's state.
+    """
+
+    rate: np.ndarray
+    samples: list[tuple[float, float, int, list[float], np.ndarray]]
+
+    def legs(self) -> list[Leg]:
+        """The legs."""
+        return [Leg(Supply(np.array(u), x, self.rate), t, h, steps) for t, h, steps, u, x in self.samples]
+
+    def commands(self, after: np.ndarray) -> np.ndarray:
+        """Return the inputs in force from each step's end on; after the last sample others may be."""
+        told = np.array([*(u for _, _, _, u, _ in self.samples), after.tolist()])
+        steps = np.array([n for _, _, n, _, _ in self.samples])
+        found = np.repeat(told[:-1], steps, axis=0)
+        found[np.cumsum(steps) - 1] = told[1:]
+        return found
+
+
 @dataclass(eq=False)
 class Legs:
     """What a ride has done.
@@ -54,7 +82,7 @@ class Legs:
     memory : Memory
     first, moved : numpy.ndarray, shape (n,)
         Where the degrees of freedom were at first, and how far they had been from there.
-    legs : list of Leg
+    parts : list of Leg or Held
     """
 
     stepper: MarchingStepper
@@ -62,7 +90,7 @@ class Legs:
     memory: Memory
     first: np.ndarray
     moved: np.ndarray
-    legs: list[Leg] = field(default_factory=list)
+    parts: list[Leg | Held] = field(default_factory=list)
     end: AlphaPoint = field(init=False)
 
     def __post_init__(self) -> None:
@@ -72,16 +100,26 @@ class Legs:
     def bytes(self) -> float:
         """What it takes to remember the ride."""
         march, size = self.memory.march, self.start.state.q.size
-        return 500.0 * (1 + len(self.legs)) + march.tangent.nbytes + march.mass.nbytes + 8.0 * (9 * size)
+        count = sum(len(part.samples) if isinstance(part, Held) else 1 for part in self.parts)
+        return 500.0 * (1 + count) + march.tangent.nbytes + march.mass.nbytes + 8.0 * (9 * size)
 
-    @property
-    def starts(self) -> list[float]:
-        """When the legs start."""
+    @cached_property
+    def legs(self) -> list[Leg]:
+        """All legs; once they are, no others are to come."""
+        return [leg for part in self.parts for leg in (part.legs() if isinstance(part, Held) else [part])]
+
+    @cached_property
+    def _starts(self) -> list[float]:
         return [leg.t for leg in self.legs]
 
-    def stretches(self) -> list[Span]:
-        """The legs, as the track knows stretches of steps."""
-        return [Span(self, i) for i in range(len(self.legs))]
+    def part(self, t: float) -> Span:
+        """Return the leg at a time."""
+        return Span(self, max(0, bisect_right(self._starts, t) - 1))
+
+    @property
+    def after(self) -> Point:
+        """Where the last leg ends."""
+        return self.end
 
     @cached_property
     def states(self) -> list[list[State]]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from array import array
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -132,11 +133,13 @@ class Marcher:
         self.march = Packed(_march(self.flattened, method))
         m = self.march
         self._run = m.bound(run)
-        self._task, self._h, self._wanted, self._done = (m.cell(name) for name in ("task", "h", "wanted", "done"))
-        self._jumping = m.cell("jumping")
+        self._task, self._h, self._wanted, self._jumping = (m.cell(n) for n in ("task", "h", "wanted", "jumping"))
+        self._inputs: Any = self.flattened.flat.u.data
+        self.steps, self.clock = m.cell("done"), m.cell("t")
         self._kept = _NOTHING
         self.width = 1 + len(model.outputs)
         self.rows = m.rows.reshape(-1, self.width)
+        self.times: Any = m.rows.data[:: self.width]
 
     @classmethod
     def of(cls, model: Model, method: Method) -> Marcher:
@@ -253,14 +256,15 @@ class Marcher:
         """Begin rows and states anew."""
         self.march.done = self.march.kept = 0
 
-    def on(self, h: float, wanted: int) -> tuple[int, int]:
-        """Go on with steps of one length until as many as wanted are done; return how it ended, and how many are."""
-        self._h[0], self._wanted[0] = h, wanted
-        return self._through(FIXED), int(self._done[0])
+    def on(self, h: float, wanted: int) -> int:
+        """Go on with steps of one length until as many as wanted are done; return how it ended."""
+        self._h[0], self._wanted[0], self._task[0] = h, wanted, FIXED
+        status = self._run()
+        return status if status == DONE else self._answered(status, FIXED)
 
-    def jumps(self, u: np.ndarray) -> None:
+    def jumps(self, u: list[float]) -> None:
         """Let the inputs jump before the next step of one length."""
-        self.supply(u)
+        self._inputs[:] = array("d", u)
         self._jumping[0] = 1
 
     def travelled(self, pacing: float | Pacing, count: int) -> list[State]:
@@ -300,17 +304,20 @@ class Marcher:
 
     def _through(self, task: int) -> int:
         """Do a task, with the matrices it asks for."""
-        while True:
-            status = self._do(task)
+        return self._answered(self._do(task), task)
+
+    def _answered(self, status: int, task: int) -> int:
+        """Go on with a task as long as it asks for matrices."""
+        while status in (WANTS_TANGENT, WANTS_MASS):
             if status == WANTS_TANGENT:
                 made = self._made(self.march.tangent, self._seeds, REFACTOR)
-            elif status == WANTS_MASS:
-                made = self._made(self.march.mass, (0.0, 0.0, 1.0), WEIGH)
             else:
-                return status
+                made = self._made(self.march.mass, (0.0, 0.0, 1.0), WEIGH)
             if made != DONE:
                 self.march.phase = FRESH
                 return SINGULAR
+            status = self._do(task)
+        return status
 
     @property
     def _seeds(self) -> tuple[float, float, float]:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.march.legs import Leg, Legs, same
+from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.march.legs import Held, Leg, Legs, same
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper
@@ -51,6 +52,7 @@ class _Ride:
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
+        self.steps = j.mark.steps
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
@@ -90,41 +92,43 @@ class _Ride:
 
         With a controller at every step this is most of a run, so what is done for a sample is done here at once.
         """
-        marcher, m, stops, mark = self.marcher, self.marcher.march, self.journey.stops, self.journey.mark
-        feed, legs, times, y = self.journey.plan.feed, self.legs.legs, self.marcher.rows[:, 0], self.marcher.rows[:, 1:]
-        pace, reads, supply = self.pace, feed.reads, self.supply
-        room, clock = marcher.room, m.cell("t")
-        commands = np.empty((room, len(supply.u)))
-        t, done, status = m.t, 0, DONE
+        marcher, stops, mark = self.marcher, self.journey.stops, self.journey.mark
+        last, nearly, pace, room = self.until + self.tick, self.until - self.tick, self.pace, marcher.room
+        told, reads, sample = self.journey.plan.feed.told, self.journey.plan.feed.reads, stops.sample
+        clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.rows[:, 1:]
+        held = Held(self.supply.rate, [])
+        t, h, u, x, done, status = clock[0], mark.size, self.supply.u.tolist(), self.supply.x, 0, DONE
         marcher.begin()
         while time.perf_counter() < deadline:
-            stop = stops.next
-            wanted = done + max(1, math.ceil((stop - t) / pace - 1e-6))
-            if wanted > room or stop > self.until + self.tick:
+            stop = (stops.passed + 1) * sample
+            count = math.ceil((stop - t) / pace - 1e-6) or 1
+            wanted = done + count
+            if wanted > room or stop > last:
                 break
-            mark.size, start = (stop - t) / (wanted - done), done
-            status, done = marcher.on(mark.size, wanted)
+            h, start = (stop - t) / count, done
+            status = marcher.on(h, wanted)
+            done = steps[0]
             if done > start:
-                commands[start:done] = supply.u
-                legs.append(Leg(supply, t, mark.size, done - start))
-            if done < wanted or stop >= self.until - self.tick:
+                held.samples.append((t, h, done - start, u, x))
+            if done < wanted or stop >= nearly:
                 mark.left = wanted - done
                 break
             t = clock[0] = times[done - 1] = stop
             stops.passed += 1
-            before, supply = supply, feed.sampled(stop, y[done - 1, reads], supply)
-            commands[done - 1] = supply.u
-            if not same(supply.u, before.u):
-                marcher.jumps(supply.u)
-        self.supply = supply
-        return self._sampled(commands[:done], status)
+            before, (u, x) = u, told(stop, x, y[done - 1].take(reads))
+            if u != before:
+                marcher.jumps(u)
+        mark.size, self.supply = h, Supply(np.array(u), x, held.rate)
+        return self._sampled(held, done, status)
 
-    def _sampled(self, commands: np.ndarray, status: int) -> bool:
+    def _sampled(self, held: Held, done: int, status: int) -> bool:
         """Enter samples in marks and rows, and let the inputs jump if they are about to; tell whether all is well."""
         marcher, m, mark = self.marcher, self.marcher.march, self.journey.mark
-        mark.steps += len(commands)
-        if len(commands):
-            self.journey.rows.sampled(marcher.rows[: len(commands)], commands, marcher.states(), 1e-6 * mark.size)
+        mark.steps += done
+        if done:
+            self.legs.parts.append(held)
+            commands = held.commands(self.supply.u)
+            self.journey.rows.sampled(marcher.rows[:done], commands, marcher.states(), 1e-6 * mark.size)
         if m.jumping:
             self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
             m.jumping = 0
@@ -147,7 +151,7 @@ class _Ride:
     def _passed(self, leg: Leg, stop: float) -> None:
         """Enter a leg in marks and rows."""
         marcher, mark, rows = self.marcher, self.journey.mark, self.journey.rows
-        self.legs.legs.append(leg)
+        self.legs.parts.append(leg)
         mark.steps += leg.steps
         mark.left -= leg.steps if mark.left > 0 else 0
         if isinstance(leg.pacing, Pacing):
@@ -174,14 +178,14 @@ class _Ride:
 
     def _end(self) -> bool:
         """Hand over to the journey; tell whether there were any steps."""
-        j, m, legs = self.journey, self.marcher.march, self.legs.legs
+        j, m = self.journey, self.marcher.march
         self.stepper.count()
         self.marcher.watch(np.zeros(0))
         j.mark.rejected += m.rejected - self.rejected
-        if not legs:
+        if not self.legs.parts:
             return False
         self.legs.end = j.point = self.stepper.leave(self.supply)
-        j.books.enter_ride(sum(leg.steps for leg in legs), self.marcher.books(), j.point)
+        j.books.enter_ride(j.mark.steps - self.steps, self.marcher.books(), j.point)
         j.track.remember(self.legs)
         if not j.watch.idle:
             j.watch.settle(j.point)
