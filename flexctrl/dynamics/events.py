@@ -142,6 +142,11 @@ class Watch:
                 raise StructureError(f"event {event.name!r}: the model has no signal {event.of!r}{hint}")
 
     @property
+    def count(self) -> int:
+        """Number of gauges."""
+        return len(self.events) + len(self.names) + len(self.corner_names)
+
+    @property
     def idle(self) -> bool:
         """Whether there is nothing to look for."""
         return self.quiet and not self.corner_names

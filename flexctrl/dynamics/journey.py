@@ -65,6 +65,10 @@ class Plan:
     began: float
 
 
+class _Missed(StepError):
+    """A step that was to end where something happens, and did not converge: shorter ones may."""
+
+
 @dataclass
 class Journey:
     """One run under way.
@@ -227,9 +231,21 @@ class Journey:
             self.mark.rejected += 1
             if h < 2e-3 * self.mark.size or h < _SMALLEST:
                 raise
-            self._take(0.5 * h, stop)
-            return self._take(0.5 * h, stop)
-        self._accept(after, stop)
+            return self._halved(h, stop)
+        try:
+            self._accept(after, stop)
+        except _Missed:
+            self.mark.rejected += 1
+            if h < 2e-3 * self.mark.size or h < _SMALLEST:
+                raise
+            self._halved(h, stop)
+
+    def _halved(self, h: float, stop: float) -> None:
+        """Take a step in two; what ends the first short of its half is made up by the second."""
+        end = self.point.state.t + h
+        self._take(0.5 * h, stop)
+        if self.status is Status.FINISHED and (left := end - self.point.state.t) > _SMALLEST * h:
+            self._take(left, stop)
 
     # -- steps of controlled length
 
@@ -262,7 +278,11 @@ class Journey:
         elif factor < 1.0:
             size = h * factor
         mark.size = size
-        self._accept(after, stop)
+        try:
+            self._accept(after, stop)
+        except _Missed:
+            mark.rejected += 1
+            mark.size = 0.25 * h
 
     # -- what comes with every step
 
@@ -296,8 +316,9 @@ class Journey:
             watch.settle(after)
             self.mark.stuck = 0
             return after, None
-        self._note([c for c in crossings if c.t < landing.t], curve, before)
+        earlier = [c for c in crossings if c.t < landing.t]
         after, landing = self._land(before, after, landing)
+        self._note(earlier, curve, before)
         watch.settle(after)
         watch.cross(landing)
         self.events.append(watch.occurrence(landing, after.state, after.supply.u))
@@ -348,7 +369,10 @@ class Journey:
         for _ in range(_LANDINGS):
             if at - t <= _SMALLEST * h:
                 return before, replace(crossing, t=t)
-            after = self._towards(before, at - t) if corner else self.stepper.step(before, at - t)
+            try:
+                after = self._towards(before, at - t) if corner else self.stepper.step(before, at - t)
+            except StepError as error:
+                raise _Missed(error.worst, str(error)) from error
             off = self.watch.offset(self.track.curve(before, after), before, after, gauge)
             if 0.0 <= off <= _LEAD_MOST * h if corner else abs(off) <= _NEAR * h:
                 break

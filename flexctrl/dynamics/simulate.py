@@ -201,11 +201,12 @@ def _resumed(
     plan: Plan, stepper: Stepper[Any], start: Checkpoint, events: tuple[Event, ...], rows: Rows, track: Track
 ) -> Journey:
     """A run that goes on."""
+    watch = _watch(plan, events)
     for what, now, before in (
         ("model", machine_of(plan.model), start.machine),
         ("method", repr(plan.method), start.method),
         ("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x)),
-        ("events", len(events), len(start.sides)),
+        ("number of events", watch.count, len(start.sides)),
     ):
         if now != before:
             raise StructureError(
@@ -213,7 +214,6 @@ def _resumed(
             )
     stepper.recall(start.memory)
     stepper.counts.take(start.counts)
-    watch = _watch(plan, events)
     watch.sides, watch.sizes = start.sides.copy(), start.sizes.copy()
     books = Books(plan.feed, start.point.state, plan.method.order)
     books.sums, books.first = replace(start.sums), start.first

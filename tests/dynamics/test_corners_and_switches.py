@@ -1,0 +1,71 @@
+"""Runs over corners and switches of laws of force: retried where a landing fails, resumed where they were stopped."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+
+def sling(slack: float, damping: float) -> fc.Model:
+    """A heavy rope of three elements with a load, drawn with some slack."""
+    rope = fc.Rope("sling", (0, 0, 0), (0, 0, slack - 3), EA=2e5, damping=damping, rhoA=0.5, elements=3, length=3.0)
+    load = fc.PointMass("load", rope.end, 10.0)
+    s = fc.Structure(
+        [rope, load],
+        [fc.Support(rope.start), fc.Pin(rope.end, load.node)],
+        outputs=[fc.Position("z", load.node, "z")],
+    )
+    effects = [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch(), fc.RopeMass(), fc.RayleighDamping(beta=1e-4)]
+    return fc.assemble(s, effects)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("slack", "damping", "method"),
+    [(0.0, 20.0, fc.AdaptiveAlpha()), (0.5, 0.0, fc.GeneralizedAlpha(5e-4)), (0.5, 0.0, fc.AdaptiveAlpha())],
+)
+def test_a_landing_that_fails_is_tried_with_shorter_steps(slack, damping, method):
+    run = fc.simulate(sling(slack, damping), until=1.0, method=method)
+    assert run.status is fc.Status.FINISHED
+    assert run.report.energy_residual < 0.1
+    assert np.isfinite(run["z"]).all()
+
+
+def bouncing() -> fc.Model:
+    """A mass that falls into its rope."""
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -1.3), EA=4e3, length=2.0)
+    bob = fc.PointMass("bob", (0, 0, -1.3), 3.0)
+    s = fc.Structure(
+        [rope, bob],
+        [fc.Support(rope.start), fc.Support(bob.node, "u v"), fc.Pin(rope.end, bob.node)],
+        outputs=[fc.Position("z", bob.node, "z")],
+    )
+    return fc.assemble(s, [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()])
+
+
+def sliding() -> fc.Model:
+    """A block that is pulled against dry friction."""
+    block = fc.PointMass("block", (0, 0, 0), 2.0)
+    s = fc.Structure(
+        [block],
+        [fc.Support(block.node, "v w")],
+        inputs=[fc.Force("pull", block.node, "x")],
+        outputs=[fc.Position("z", block.node, "x")],
+    )
+    return fc.assemble(s, [fc.LargeRotation(), fc.CoulombFriction({"block.u": 2.0})])
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(2e-3)], ids=["adaptive", "fixed"])
+@pytest.mark.parametrize("model", [bouncing, sliding])
+@pytest.mark.parametrize("events", [(), (fc.Event("passes", "z", at=-1.5),)], ids=["", "event"])
+def test_a_run_with_switches_goes_on_bit_for_bit(model, method, events):
+    machine = model()
+    pull = fc.OpenLoop({"pull": lambda t: 5.0 if t < 0.3 else 0.0}, sample_time=0.1) if model is sliding else None
+    runs = {}
+    for name, until in (("whole", 1.0), ("half", 0.5)):
+        runs[name] = fc.simulate(machine, pull, until=until, method=method, events=events)
+    rest = fc.simulate(machine, pull, until=1.0, method=method, events=events, start=runs["half"].checkpoint)
+    assert np.array_equal(rest.final.q, runs["whole"].final.q)
+    assert np.array_equal(rest.final.v, runs["whole"].final.v)
