@@ -15,7 +15,13 @@ from fixtures.random_models import dense_response
 import flexctrl as fc
 from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.reduction import BalancedTruncation, RelativeError, hankel_singular_values
+from flexctrl.linear.reduction import (
+    BalancedTruncation,
+    ModalTruncation,
+    MomentMatching,
+    RelativeError,
+    hankel_singular_values,
+)
 from flexctrl.linear.reduction.gramian import balance, gramian_factor
 
 HANKEL = [
@@ -276,3 +282,31 @@ def test_responses_hold_nine_digits_in_silent_channels():
             exact[:, k] = [complex(sum(mpmath.mpc(c) * x for c, x in zip(row, q, strict=True))) for row in rows]
         found = full.frequency_response([omega]).values[..., 0]
         assert (abs(found - exact) <= 1e-9 * abs(exact)).all()
+
+
+def test_a_column_under_a_follower_load_is_reduced():
+    """Beck's column at three quarters of its flutter load: K is not symmetric."""
+    section = fc.Section.rectangle(fc.STEEL, 0.02, 0.02)
+    column = fc.Beam("column", (0, 0, 0), (2, 0, 0), section, 8)
+    structure = fc.Structure(
+        [column],
+        [fc.Support(column.start)],
+        inputs=[fc.FollowerForce("push", column.end, "-x"), fc.Force("f", column.end, "y")],
+        outputs=[fc.Position("y", column.end, "y")],
+    )
+    model = fc.assemble(fc.planar(structure), [fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(alpha=0.5)])
+    load = 15.0 * fc.STEEL.E * 0.02**4 / 12 / 4
+    full = fc.linearize(model, inputs={"push": load}).select(inputs=["f"])
+    assert abs(full.K - full.K.T).max() > 1e-6 * abs(full.K).max()
+    omega = np.array([1.0, 30.0, 60.0, 100.0])
+    exact = dense_response(full, 1j * omega)
+    for method in (BalancedTruncation(8), MomentMatching((0.0, 50j), 8), MomentMatching((30.0,), 8)):
+        reduced = full.reduce(method)
+        gap = abs(reduced.frequency_response(omega).values - exact).max()
+        assert gap <= 1e-2 * abs(exact).max()
+        assert gap <= 1.001 * reduced.error.absolute.max()
+        assert (reduced.damped_poles().real < 0.0).all()
+    balanced = full.reduce(BalancedTruncation(8))
+    assert (balanced.error.absolute <= balanced.bound).all()
+    with pytest.raises(ReductionError, match="loads follow"):
+        full.reduce(ModalTruncation(4))

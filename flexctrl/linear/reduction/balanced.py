@@ -12,7 +12,7 @@ from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes
 from flexctrl.linear.reduction.gramian import Balanced, balance
-from flexctrl.linear.reduction.low_frequency import low_frequency, undamped
+from flexctrl.linear.reduction.low_frequency import low_frequency, undamped, unsymmetric
 from flexctrl.linear.reduction.modal import modal_model
 from flexctrl.linear.reduction.states import ReducedStates, Triple
 from flexctrl.linear.statespace import FirstOrder, modal_first_order
@@ -143,6 +143,9 @@ def _split(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray]:
     few = full.modes(max(pool, 100)) if len(full.coordinates) > COMPLETE else None
     first = modal_first_order(full, few)
     missing = np.zeros_like(first.D) if few is None else _missing_static(full, few)
+    if unsymmetric(full):
+        marginal, stable = _marginal_apart(Triple(first.A, first.B, first.C))
+        return _touched(marginal, first), stable, first.D
     modes = full.modes() if few is None else few
     position = 2 * modes.unstable + 2 * np.arange(modes.rigid)
     loose = undamped(full, modes.shapes[:, modes.unstable : modes.unstable + modes.rigid])

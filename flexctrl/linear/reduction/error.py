@@ -15,7 +15,7 @@ from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes
 from flexctrl.linear.poles import second_order_roots
-from flexctrl.linear.reduction.low_frequency import low_frequency, rigid_basis, undamped
+from flexctrl.linear.reduction.low_frequency import low_frequency, nearest_modes, rigid_basis, undamped
 from flexctrl.linear.reduction.modal import ModalTruncation
 from flexctrl.linear.transfer import Transfer, transfer
 
@@ -219,7 +219,7 @@ def _band(full: LinearModel, top: float, kept: Callable[[], float] | None = None
     if np.isfinite(top):
         return top
     if len(full.coordinates) <= COMPLETE:
-        return 3.0 * float(np.sqrt(abs(full.modes().omega_squared).max()))
+        return 3.0 * float(np.sqrt(abs(nearest_modes(full).omega_squared).max()))
     if kept is None:
         raise ReductionError(f"{len(full.coordinates)} coordinates: say up to which frequency, up_to_hz")
     return 3.0 * kept()
@@ -235,7 +235,7 @@ def _kept(reduced: Reduced) -> float:
 
 
 def _modes_below(full: LinearModel, top: float) -> Modes:
-    modes = full.modes()
+    modes = nearest_modes(full)
     while len(full.coordinates) > COMPLETE and modes.omega[-1] < top and len(modes) < COMPLETE:
         modes = full.modes(2 * len(modes))
     return modes

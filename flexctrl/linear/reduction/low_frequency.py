@@ -10,8 +10,17 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from flexctrl.linear.model import LinearModel
+from flexctrl.linear.modes import ROUND_OFF, Modes
 
-__all__ = ["LowFrequency", "flexibility", "low_frequency", "rigid_basis", "undamped"]
+__all__ = [
+    "LowFrequency",
+    "flexibility",
+    "low_frequency",
+    "nearest_modes",
+    "rigid_basis",
+    "undamped",
+    "unsymmetric",
+]
 
 ROUNDING = 1e-12
 
@@ -101,10 +110,40 @@ def rigid_basis(full: LinearModel) -> np.ndarray:
     Returns
     -------
     numpy.ndarray, shape (n, n_rigid)
-        M-orthonormal.
+        M-orthonormal. None where loads follow: their K is not symmetric, and nothing moves without resistance.
     """
+    if unsymmetric(full):
+        return np.zeros((len(full.coordinates), 0))
     modes = full.modes(min(12, len(full.coordinates)))
     return modes.shapes[:, modes.unstable : modes.unstable + modes.rigid]
+
+
+def unsymmetric(linear: LinearModel) -> bool:
+    """Tell whether loads that follow the machine make K unsymmetric: there are no real undamped modes then.
+
+    Parameters
+    ----------
+    linear : LinearModel
+
+    Returns
+    -------
+    bool
+    """
+    return linear._scaled.stiffness[1] > ROUND_OFF
+
+
+def nearest_modes(linear: LinearModel) -> Modes:
+    """Return the modes; where loads follow, those of the symmetric part of K, in which the model is still complete.
+
+    Parameters
+    ----------
+    linear : LinearModel
+
+    Returns
+    -------
+    Modes
+    """
+    return linear._modal.modes if unsymmetric(linear) else linear.modes()
 
 
 def undamped(linear: LinearModel, rigid: np.ndarray) -> np.ndarray:

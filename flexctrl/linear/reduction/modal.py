@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes
-from flexctrl.linear.reduction.low_frequency import undamped
+from flexctrl.linear.reduction.low_frequency import undamped, unsymmetric
 from flexctrl.linear.reduction.result import ReducedModel, corrected
 from flexctrl.linear.reduction.selection import BelowFrequency, Lowest, Selection
 
@@ -88,6 +88,11 @@ def _soft(modes: Modes) -> int:
 
 def _enough_modes(full: LinearModel, rule: Selection) -> Modes:
     """All modes of a small model; of a large one, as many as the rule can need."""
+    if unsymmetric(full):
+        raise ReductionError(
+            "K is not symmetric (loads follow the machine): it has no real undamped modes to keep; reduce it by "
+            "BalancedTruncation or MomentMatching"
+        )
     if len(full.coordinates) <= COMPLETE:
         return full.modes()
     order = getattr(rule, "order", 20)

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.reduction.low_frequency import flexibility, rigid_basis
+from flexctrl.linear.reduction.low_frequency import flexibility, rigid_basis, unsymmetric
 from flexctrl.linear.reduction.result import ReducedModel, galerkin
 
 __all__ = ["MomentMatching"]
@@ -120,7 +120,7 @@ def _krylov(solve: Solver, first: sp.spmatrix, M: sp.spmatrix, load: np.ndarray)
 
 
 def _solvers(full: LinearModel, rigid: np.ndarray, s: complex) -> tuple[Solver, Solver]:
-    if s == 0:
+    if s == 0 and not unsymmetric(full):
         solve = flexibility(full, rigid)
         return solve, solve
     try:
