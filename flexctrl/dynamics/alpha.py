@@ -241,7 +241,7 @@ class Stepper:
         h = after.state.t - before.state.t
         c = self.coefficients
         local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self.weight
-        allowed = tolerance.absolute + tolerance.relative * float((moved * self.weight).max(initial=0.0))
+        allowed = tolerance.of(float((moved * self.weight).max(initial=0.0)))
         return float(local.max(initial=0.0)) / allowed
 
 

@@ -190,7 +190,7 @@ class _Stepper:
         fifth, third = (float(np.abs(e[places] * scale).max(initial=0.0)) for e in (high, low))
         worst = int(np.argmax(np.abs(high[:n] * self.weight))) if n else 0
         self.counts.worst = worst
-        allowed = tolerance.absolute + tolerance.relative * float((moved * self.weight).max(initial=0.0))
+        allowed = tolerance.of(float((moved * self.weight).max(initial=0.0)))
         local = h * fifth * fifth / np.hypot(fifth, 0.1 * third) if fifth > 0.0 else 0.0
         return local / allowed
 

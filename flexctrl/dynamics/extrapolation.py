@@ -165,7 +165,7 @@ class _Stepper:
     def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the error that the step added to the finer run, over what is allowed."""
         local = self.weight * np.abs(after.gap - before.gap) * self.yard
-        allowed = tolerance.absolute + tolerance.relative * float((moved * self.yard).max(initial=0.0))
+        allowed = tolerance.of(float((moved * self.yard).max(initial=0.0)))
         return float(local.max(initial=0.0)) / allowed
 
     def curve(self, before: _Point, after: _Point) -> Curve:

@@ -37,7 +37,8 @@ class Tolerance:
     Parameters
     ----------
     relative : float
-        Local error per step over the distance moved so far.
+        Local error per step over the distance moved so far: that of the freedom that has moved most, but no more than a
+        radian or the size of the machine, or what spins or travels far would excuse errors of all else.
     absolute : float
         Local error per step below which nothing is asked [rad, and m over the size of the machine].
 
@@ -56,6 +57,20 @@ class Tolerance:
                 f"Tolerance: relative = {self.relative}, absolute = {self.absolute}; expected relative ≥ 0 and "
                 "absolute > 0"
             )
+
+    def of(self, moved: float) -> float:
+        """Return the error allowed after a motion.
+
+        Parameters
+        ----------
+        moved : float
+            Largest distance of a freedom so far [rad, and m over the size of the machine].
+
+        Returns
+        -------
+        float
+        """
+        return self.absolute + self.relative * min(moved, 1.0)
 
 
 @dataclass(frozen=True)

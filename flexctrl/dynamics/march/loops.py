@@ -108,7 +108,7 @@ def controlled(m: March) -> int:
         error = 0.0
         if status == DONE:
             judge(m)
-            error = m.error / (m.absolute + m.relative * m.reached)
+            error = m.error / (m.absolute + m.relative * min(m.reached, 1.0))
         if status != DONE or error > 1.0:
             m.rejected += 1
             m.size = 0.25 * m.h if status != DONE else m.h * max(0.2, 0.9 * growth(error))
