@@ -15,6 +15,7 @@ from flexctrl.linear.eigen import coordinate_scales
 from flexctrl.linear.massless import Massless, as_dense, massless, pivots, solved
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.pattern import congruent, symmetric
+from flexctrl.linear.words import motions_in_words
 
 __all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map"]
 
@@ -41,11 +42,14 @@ class Audit:
     labels : tuple of Freedom
     mechanisms : tuple of tuple of str
         For each motion without mass and stiffness, the coordinates that move, most first.
+    motions : tuple of str
+        The same in words: which nodes turn about or move along which axis.
     """
 
     coordinates: tuple[str, ...]
     labels: tuple[Freedom, ...]
     mechanisms: tuple[tuple[str, ...], ...]
+    motions: tuple[str, ...] = ()
 
     def named(self, kind: Freedom) -> tuple[str, ...]:
         """Names of the coordinates with this label.
@@ -67,6 +71,7 @@ class Audit:
             shown = "" if kind is Freedom.DYNAMIC else ": " + ", ".join(names)
             if names:
                 lines.append(f"  {len(names)} {kind.value}{shown}")
+        lines += [f"  nothing holds or weighs: {motion}" for motion in self.motions]
         return "\n".join(lines)
 
 
@@ -110,7 +115,8 @@ def audit(linear: LinearModel) -> Audit:
     Audit
         Never raises for a mechanism; :func:`condense` does.
     """
-    kinds = linear._scaled.massless
+    base, names = linear._scaled, linear.coordinates
+    kinds = base.massless
     labels = [Freedom.DYNAMIC] * len(linear.coordinates)
     for basis, kind in (
         (kinds.static, Freedom.STATIC),
@@ -119,7 +125,8 @@ def audit(linear: LinearModel) -> Audit:
     ):
         for i in pivots(basis):
             labels[i] = kind
-    return Audit(linear.coordinates, tuple(labels), _moving(kinds.mechanisms, linear.coordinates))
+    loose = _moving(kinds.mechanisms, names)
+    return Audit(names, tuple(labels), loose, motions_in_words(kinds.mechanisms, names, base.scales))
 
 
 def scaled(linear: LinearModel) -> Scaled:
@@ -141,7 +148,8 @@ def scaled(linear: LinearModel) -> Scaled:
     result = linear._scaled
     loose = _moving(result.massless.mechanisms, linear.coordinates)
     if loose:
-        motions = "; ".join(" with ".join(names) for names in loose)
+        words = motions_in_words(result.massless.mechanisms, linear.coordinates, result.scales)
+        motions = "; ".join(f"{' with '.join(names)} ({said})" for names, said in zip(loose, words, strict=True))
         raise MechanismError(
             f"{len(loose)} motion(s) with neither mass nor stiffness: {motions}. "
             "Hold the freedom, or give it stiffness or inertia."

@@ -33,9 +33,7 @@ def audit(model: Model, at: Rest | State | None = None) -> Audit:
         nor stiffness. Never raises for one; `linearize` and `simulate` do.
     """
     state = (model.rest if at is None else at.state if isinstance(at, Rest) else at).loose
-    still, n = np.zeros(model.n), model.n
-    u = at.inputs if isinstance(at, Rest) else np.zeros(len(model.inputs))
-    seeds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
-    M, C, K = ((-model.slope(state, still, still, seed, u)).tocsc() for seed in seeds)
+    u, n = at.inputs if isinstance(at, Rest) else np.zeros(len(model.inputs)), model.n
+    M, C, K = model.tangents(state, u)
     none = np.zeros((n, 0)), np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, 0))
-    return audit_linear(LinearModel(0.5 * (M + M.T), C, 0.5 * (K + K.T), *none, model.coordinates, (), ()))
+    return audit_linear(LinearModel(M, C, 0.5 * (K + K.T), *none, model.coordinates, (), ()))

@@ -10,13 +10,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.model.mixed import Excess
-from flexctrl.model.model import Model
+from flexctrl.model.model import TURNS, Model
 from flexctrl.model.motion import State
 
 __all__ = ["Balance"]
 
 _LASTING = ("free", "fixed", "still", "turning", "lever", "unit", "inertia", "heaviest")
-_TURNS = ("_rx", "_ry", "_rz", "_turn")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,7 @@ class Balance:
     @cached_property
     def turning(self) -> np.ndarray:
         """Which coordinates are angles."""
-        return np.array([name.endswith(_TURNS) for name in self.model.coordinates], dtype=bool)
+        return np.array([name.endswith(TURNS) for name in self.model.coordinates], dtype=bool)
 
     @cached_property
     def lever(self) -> np.ndarray:
@@ -116,9 +115,17 @@ class Balance:
 
     def noise(self, state: State) -> float:
         """Return the relative residual that round-off of the positions alone makes: |K| times their last digits."""
+        return float((self._round_off(state) / self.lever[self.free]).max(initial=0.0)) / self.scale(state)
+
+    def idle(self, state: State) -> bool:
+        """Tell whether every force is the round-off of its own coordinate's neighbourhood: nothing is at work."""
+        force = np.abs(self.force(state))
+        return self.astray(state) == 0.0 and not (force > self._round_off(state)).any()
+
+    def _round_off(self, state: State) -> np.ndarray:
+        """Forces on the free coordinates that the last digits of the places make."""
         reach = np.where(self.turning, 1.0, max(self.size, float(np.abs(state.x).max(initial=0.0))))
-        force = (abs(self.slope(state)) @ (reach * np.finfo(float).eps)) / self.lever
-        return 4.0 * float(force[self.free].max(initial=0.0)) / self.scale(state)
+        return 4.0 * (abs(self.slope(state)) @ (reach * np.finfo(float).eps))[self.free]
 
     def relative(self, force: np.ndarray, scale: float) -> float:
         """Return the largest of some forces on the free coordinates over the forces at work; infinite for NaN."""

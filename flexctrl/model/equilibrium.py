@@ -141,6 +141,8 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
     """The search: straight on from a shape that stands by itself, else by masses."""
     if not np.isfinite(balance.force(start)).all():
         raise EquilibriumError("no equilibrium found: the start's own forces are not finite; start from another shape")
+    if balance.idle(start):
+        return Found(start, balance.residual(start), 0, True, True, True)
     if holds(balance.among_free(balance.slope(start))):
         straight = Newton(balance, tolerance).run(start, 60, watch=True)
         if straight.done and straight.steady:

@@ -157,6 +157,28 @@ class Forces:
         owners = np.concatenate([np.array(f.parts) for f in self.families])
         return parts_of(owners, [f.scatter(self.motion.source_base) for f in self.families], stiffness, mass, reach)
 
+    def inertias(self, state: State) -> np.ndarray:
+        """Return the largest inertia about any axis at each raw freedom: of its node's three displacements or turns.
+
+        What an inertia about one axis may be the rounding of.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        numpy.ndarray, shape (raw,)
+            [kg] or [kg m²].
+        """
+        still, (rows, columns), motion = np.zeros(self.motion.n), self.pattern, self.motion
+        blocks = np.abs(self._blocks(self.slots(state, still, still), (0.0, 0.0, 1.0)))
+        own = rows == columns
+        sizes = np.bincount(rows[own], weights=blocks[own], minlength=motion.raw)
+        nodes = sizes[: motion.source_base].reshape(-1, 3)
+        nodes[:] = nodes.max(axis=1, keepdims=True)
+        return sizes
+
     def _blocks(self, z: np.ndarray, seeds: tuple[float, float, float]) -> np.ndarray:
         seeded, blocks = np.append(z, seeds), np.zeros(self.pattern[0].size)
         for batch in self._tangent:

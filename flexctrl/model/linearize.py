@@ -80,13 +80,11 @@ def _without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:
 def _derivative(
     model: Model, state: State, u: np.ndarray, free: np.ndarray, unsymmetric: bool
 ) -> tuple[LinearModel, float]:
-    zero = np.zeros(model.n)
-    seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    K, C, M = (-model.slope(state, zero, zero, seed, u)[free][:, free] for seed in seeds)
+    M, C, K = (A[free][:, free] for A in model.tangents(state, u))
     largest = float(abs(K).max()) if K.nnz else 0.0
     asymmetry = float(abs(K - K.T).max()) / max(largest, 1e-300) if K.nnz else 0.0
     T = model.motion.jacobian(state if model.large else model.rest)[:, free]
-    on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=zero)), model.motion.raw)
+    on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=np.zeros(model.n))), model.motion.raw)
     linear = LinearModel(
         M=_symmetric(M),
         C=C.tocsc(),

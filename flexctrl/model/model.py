@@ -15,6 +15,7 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.kernels.kernel import Backend
+from flexctrl.linear.dust import clean_mass, clean_stiffness
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.assembly import assembled, mass_blocks, modal_blocks, stiffness_blocks
 from flexctrl.model.families import families_of
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from flexctrl.model.equilibrium import Rest
+
+TURNS = ("_rx", "_ry", "_rz", "_turn")
+_LAST_DIGITS, _CAUTION = 1e-14, 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +155,48 @@ class Model:
     def mass(self) -> sp.csc_matrix:
         """Return M at rest from the consistent element matrices, shape (n, n), in the order of `coordinates`."""
         return self.about.M if self.about else self._mass
+
+    def tangents(self, state: State, u: np.ndarray) -> tuple[sp.csc_matrix, sp.csc_matrix, sp.csc_matrix]:
+        """Return M, C and K in a state at rest, without the rounding of what has no mass or no stiffness at all.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        tuple of 3 scipy.sparse.csc_matrix, shape (n, n)
+            M symmetric; the others as they come.
+        """
+        still, place = np.zeros(self.n), state if self.large else self.rest
+        seeds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+        M, C, K = ((-self.slope(state, still, still, seed, u)).tocsc() for seed in seeds)
+        sizes = abs(self.motion.jacobian(place)).T @ np.sqrt(self.forces.inertias(place))
+        M = clean_mass(0.5 * (M + M.T), sizes, self._triples)
+        return M, C, clean_stiffness(K, self._unsure(state, u, K), self._triples) if self.large else K
+
+    def _unsure(self, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.ndarray:
+        """By how much entries in each row of K change with the last digits of the places, with some caution."""
+        reach = max(self.structure.size, float(np.abs(state.x).max(initial=0.0)))
+        still, largest = np.zeros(self.n), np.zeros(self.n)
+        turning = np.array([name.endswith(TURNS) for name in self.coordinates], dtype=bool)
+        for seed in range(2):
+            signs = np.random.default_rng(seed).choice((-1.0, 1.0), self.n)
+            near = self.advance(state, _LAST_DIGITS * signs * np.where(turning, 1.0, reach), still, 0.0)
+            change = abs(K + self.slope(near, still, still, (1.0, 0.0, 0.0), u))
+            largest = np.maximum(largest, change.max(axis=1).toarray().ravel())
+        return _CAUTION * largest
+
+    @cached_property
+    def _triples(self) -> np.ndarray:
+        """Triples of coordinates that are the displacements or the turns of one node, shape (k, 3)."""
+        number = {name: i for i, name in enumerate(self.coordinates)}
+        found = []
+        for triple in (("_u", "_v", "_w"), ("_rx", "_ry", "_rz")):
+            heads = [name.removesuffix(triple[0]) for name in self.coordinates if name.endswith(triple[0])]
+            found += [[number.get(head + end, -1) for end in triple] for head in heads]
+        return np.array([t for t in found if min(t) >= 0], dtype=int).reshape(-1, 3)
 
     def stiffness(self) -> sp.csc_matrix:
         """Return K at rest from the element matrices, shape (n, n); it may be singular.
