@@ -36,9 +36,10 @@ def clean_mass(M: sp.csc_matrix, sizes: np.ndarray, triples: np.ndarray) -> sp.c
     """
     inverse = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
     heavy = M.diagonal() * inverse**2 > RANK
+    heavy[triples] = True
     scale = inverse[triples]
     values, vectors = np.linalg.eigh(_diagonal_blocks(M, triples) * scale[:, :, None] * scale[:, None, :])
-    light = (values <= RANK * values[:, -1:]) & heavy[triples].all(axis=1)[:, None]
+    light = (values <= RANK * values[:, -1:]) & (values[:, -1:] > 0.0)
     if heavy.all() and not light.any():
         return M
     W = sp.lil_matrix(sp.diags(heavy.astype(float)))

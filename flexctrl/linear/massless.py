@@ -86,13 +86,15 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
         raise LinearizationError(
             "a massless freedom without damping of its own is moved by velocities of others; give it inertia or damping"
         )
-    free, _ = null_split(_restricted(K, static), STIFFNESS_RANK)
+    free, _ = null_split(_restricted(K, static), STIFFNESS_RANK, size=_size(K, static).diagonal())
     if relaxing.shape[1] and static.shape[1] and not free.shape[1]:
         relaxing = relaxing - static @ solved(static.T @ K @ static, static.T @ K @ relaxing)
     return Massless(sp.csc_matrix(static), sp.csc_matrix(relaxing), sp.csc_matrix(static @ free))
 
 
-def null_split(A: sp.spmatrix, tolerance: float, semidefinite: bool = False) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+def null_split(
+    A: sp.spmatrix, tolerance: float, semidefinite: bool = False, size: np.ndarray | None = None
+) -> tuple[sp.csc_matrix, sp.csc_matrix]:
     """Bases of the null space of a symmetric matrix and of a complement.
 
     Parameters
@@ -102,6 +104,8 @@ def null_split(A: sp.spmatrix, tolerance: float, semidefinite: bool = False) -> 
         Eigenvalues of the matrix scaled to unit diagonal under this are zero.
     semidefinite : bool
         Refuse a negative eigenvalue.
+    size : numpy.ndarray, shape (n,), optional
+        What the diagonal was rounded from, where that is larger: then it is scaled by that.
 
     Returns
     -------
@@ -110,11 +114,11 @@ def null_split(A: sp.spmatrix, tolerance: float, semidefinite: bool = False) -> 
     """
     A = sp.csc_matrix(A)
     n = A.shape[0]
-    size = np.sqrt(abs(A).max(axis=1).toarray().ravel()) if n else np.zeros(0)
-    diagonal = np.sqrt(np.abs(A.diagonal()))
-    scale = np.where(diagonal > 0, diagonal, size)
-    empty = np.flatnonzero(size == 0.0)
-    full = np.flatnonzero(size > 0.0)
+    largest = np.sqrt(abs(A).max(axis=1).toarray().ravel()) if n else np.zeros(0)
+    diagonal = np.sqrt(np.abs(A.diagonal()) if size is None else np.maximum(np.abs(A.diagonal()), size))
+    scale = np.where(diagonal > 0, diagonal, largest)
+    empty = np.flatnonzero(largest == 0.0)
+    full = np.flatnonzero(largest > 0.0)
     unit = sp.identity(n, format="csc")
     if not full.size:
         return unit[:, empty], unit[:, full]
@@ -184,8 +188,12 @@ def _heavy(M: sp.csc_matrix) -> bool:
 def _restricted(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
     """Nᵀ A N without the entries that are only rounding."""
     full = sp.csc_matrix(N.T @ A @ N)
-    size = sp.csc_matrix(abs(N).T @ abs(A) @ abs(N))
-    return sp.csc_matrix(full.multiply(abs(full) > DUST * size))
+    return sp.csc_matrix(full.multiply(abs(full) > DUST * _size(A, N)))
+
+
+def _size(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
+    """The terms of Nᵀ A N without their signs."""
+    return sp.csc_matrix(abs(N).T @ abs(A) @ abs(N))
 
 
 def _peak(A: sp.spmatrix) -> float:
