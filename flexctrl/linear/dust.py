@@ -9,6 +9,9 @@ Wᵀ M W has n in its null space to the last digit of every entry.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TypeAlias
+
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -17,8 +20,10 @@ __all__ = ["clean_mass", "clean_stiffness"]
 
 RANK = 1e-12
 
+Groups: TypeAlias = Sequence[np.ndarray]
 
-def clean_mass(M: sp.csc_matrix, sizes: np.ndarray, triples: np.ndarray) -> sp.csc_matrix:
+
+def clean_mass(M: sp.csc_matrix, sizes: np.ndarray, groups: Groups) -> sp.csc_matrix:
     """Take out of a mass matrix the rounding that looks like mass.
 
     Parameters
@@ -27,28 +32,26 @@ def clean_mass(M: sp.csc_matrix, sizes: np.ndarray, triples: np.ndarray) -> sp.c
         Symmetric.
     sizes : numpy.ndarray, shape (n,)
         Square root of the largest inertia that each diagonal entry may have been rounded from.
-    triples : numpy.ndarray of int, shape (k, 3)
-        Displacements or turns of each node.
+    groups : sequence of numpy.ndarray of int, shapes (k, size)
+        Displacements or turns of each node; every coordinate once.
 
     Returns
     -------
     scipy.sparse.csc_matrix, shape (n, n)
     """
     inverse = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
-    heavy = M.diagonal() * inverse**2 > RANK
-    heavy[triples] = True
-    scale = inverse[triples]
-    values, vectors = np.linalg.eigh(_diagonal_blocks(M, triples) * scale[:, :, None] * scale[:, None, :])
-    light = (values <= RANK * values[:, -1:]) & (values[:, -1:] > 0.0)
-    if heavy.all() and not light.any():
-        return M
-    W = sp.lil_matrix(sp.diags(heavy.astype(float)))
-    for node in np.flatnonzero(light.any(axis=1)):
-        _take_out(W, triples[node], scale[node][:, None] * vectors[node][:, light[node]])
-    return _congruent(sp.csc_matrix(W), M)
+    nulls = []
+    for places in groups:
+        scale = inverse[places]
+        values, vectors = np.linalg.eigh(_diagonal_blocks(M, places) * scale[:, :, None] * scale[:, None, :])
+        most = values[:, -1:] if places.shape[1] > 1 else 1.0
+        light = (values <= RANK * most) & (values[:, -1:] != 0.0)
+        for node in np.flatnonzero(light.any(axis=1)):
+            nulls.append((places[node], scale[node][:, None] * vectors[node][:, light[node]]))
+    return _without(nulls, M)
 
 
-def clean_stiffness(K: sp.csc_matrix, noise: np.ndarray, triples: np.ndarray) -> sp.csc_matrix:
+def clean_stiffness(K: sp.csc_matrix, noise: np.ndarray, groups: Groups) -> sp.csc_matrix:
     """Take out of a stiffness matrix what stands for a node that nothing holds in some direction.
 
     Parameters
@@ -56,42 +59,44 @@ def clean_stiffness(K: sp.csc_matrix, noise: np.ndarray, triples: np.ndarray) ->
     K : scipy.sparse.csc_matrix, shape (n, n)
     noise : numpy.ndarray, shape (n,)
         By how much the entries of each row are unsure.
-    triples : numpy.ndarray of int, shape (k, 3)
-        Displacements or turns of each node.
+    groups : sequence of numpy.ndarray of int, shapes (k, size)
+        Displacements or turns of each node; every coordinate once.
 
     Returns
     -------
     scipy.sparse.csc_matrix, shape (n, n)
     """
-    even = sp.csr_matrix(0.5 * (K + K.T))
-    values, vectors = np.linalg.eigh(_diagonal_blocks(even, triples))
-    limit = noise[triples].max(axis=1, initial=0.0)
-    idle = np.abs(values) <= limit[:, None]
-    W = sp.lil_matrix(sp.identity(K.shape[0]))
-    found = False
-    for node in np.flatnonzero(idle.any(axis=1) & (limit > 0.0)):
-        null = vectors[node][:, idle[node]]
-        if np.abs(even[triples[node]].T @ null).max() <= limit[node]:
-            _take_out(W, triples[node], null)
-            found = True
-    return _congruent(sp.csc_matrix(W), K) if found else K
+    even, nulls = sp.csr_matrix(0.5 * (K + K.T)), []
+    for places in groups:
+        values, vectors = np.linalg.eigh(_diagonal_blocks(even, places))
+        limit = noise[places].max(axis=1)
+        idle = np.abs(values) <= limit[:, None]
+        for node in np.flatnonzero(idle.any(axis=1) & (limit > 0.0)):
+            null = vectors[node][:, idle[node]]
+            if np.abs(even[places[node]].T @ null).max() <= limit[node]:
+                nulls.append((places[node], null))
+    return _without(nulls, K)
 
 
-def _take_out(W: sp.lil_matrix, places: np.ndarray, null: np.ndarray) -> None:
-    """Let W take directions (columns) of some coordinates to zero, and leave what is across them."""
-    pivot = la.qr(null.T, mode="r", pivoting=True)[1][: null.shape[1]]
-    kept = np.setdiff1d(np.arange(len(places)), pivot)
-    W[np.ix_(places[kept], places[pivot])] = -la.solve(null[pivot].T, null[kept].T).T
-    W[places[pivot], places[pivot]] = 0.0
-
-
-def _congruent(W: sp.csc_matrix, A: sp.csc_matrix) -> sp.csc_matrix:
+def _without(nulls: list[tuple[np.ndarray, np.ndarray]], A: sp.csc_matrix) -> sp.csc_matrix:
+    """Return Wᵀ A W with W = 0 along some directions (columns) of some coordinates, and 1 across them."""
+    if not nulls:
+        return A
+    W = sp.lil_matrix(sp.identity(A.shape[0]))
+    for places, null in nulls:
+        pivot = la.qr(null.T, mode="r", pivoting=True)[1][: null.shape[1]]
+        kept = np.setdiff1d(np.arange(len(places)), pivot)
+        if kept.size:
+            W[np.ix_(places[kept], places[pivot])] = -la.solve(null[pivot].T, null[kept].T).T
+        W[places[pivot], places[pivot]] = 0.0
+    W = sp.csc_matrix(W)
     clean = sp.csc_matrix(W.T @ A @ W)
     clean.eliminate_zeros()
     return clean
 
 
-def _diagonal_blocks(A: sp.spmatrix, triples: np.ndarray) -> np.ndarray:
-    """Blocks of a matrix on some triples of coordinates, shape (k, 3, 3)."""
-    rows, columns = np.repeat(triples, 3, axis=1).ravel(), np.tile(triples, (1, 3)).ravel()
-    return np.asarray(A[rows, columns]).reshape(-1, 3, 3)
+def _diagonal_blocks(A: sp.spmatrix, groups: np.ndarray) -> np.ndarray:
+    """Blocks of a matrix on some groups of coordinates, shape (k, size, size)."""
+    count, size = groups.shape
+    rows, columns = np.repeat(groups, size, axis=1).ravel(), np.tile(groups, (1, size)).ravel()
+    return np.asarray(A[rows, columns]).reshape(count, size, size)

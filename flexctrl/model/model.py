@@ -173,8 +173,8 @@ class Model:
         seeds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
         M, C, K = ((-self.slope(state, still, still, seed, u)).tocsc() for seed in seeds)
         sizes = abs(self.motion.jacobian(place)).T @ np.sqrt(self.forces.inertias(place))
-        M = clean_mass(0.5 * (M + M.T), sizes, self._triples)
-        return M, C, clean_stiffness(K, self._unsure(state, u, K), self._triples) if self.large else K
+        M = clean_mass(0.5 * (M + M.T), sizes, self._groups)
+        return M, C, clean_stiffness(K, self._unsure(state, u, K), self._groups) if self.large else K
 
     def _unsure(self, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.ndarray:
         """By how much entries in each row of K change with the last digits of the places, with some caution."""
@@ -189,14 +189,15 @@ class Model:
         return _CAUTION * largest
 
     @cached_property
-    def _triples(self) -> np.ndarray:
-        """Triples of coordinates that are the displacements or the turns of one node, shape (k, 3)."""
-        number = {name: i for i, name in enumerate(self.coordinates)}
-        found = []
-        for triple in (("_u", "_v", "_w"), ("_rx", "_ry", "_rz")):
-            heads = [name.removesuffix(triple[0]) for name in self.coordinates if name.endswith(triple[0])]
-            found += [[number.get(head + end, -1) for end in triple] for head in heads]
-        return np.array([t for t in found if min(t) >= 0], dtype=int).reshape(-1, 3)
+    def _groups(self) -> tuple[np.ndarray, ...]:
+        """The coordinates that are the displacements or the turns of one node together; others by themselves."""
+        kinds = {end: kind for kind in (("_u", "_v", "_w"), ("_rx", "_ry", "_rz")) for end in kind}
+        nodes: dict[tuple[str, tuple[str, ...]], list[int]] = {}
+        for i, name in enumerate(self.coordinates):
+            head, end = name[: name.rfind("_")], name[name.rfind("_") :]
+            nodes.setdefault((head, kinds[end]) if end in kinds else (name, ()), []).append(i)
+        sizes = {len(places) for places in nodes.values()}
+        return tuple(np.array([p for p in nodes.values() if len(p) == size], dtype=int) for size in sorted(sizes))
 
     def stiffness(self) -> sp.csc_matrix:
         """Return K at rest from the element matrices, shape (n, n); it may be singular.
