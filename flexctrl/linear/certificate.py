@@ -26,6 +26,8 @@ class Certificate:
         Condition numbers (1-norm) after scaling by the diagonal; infinite where singular.
     loads : tuple of str
         Loads at work without a potential; they may make K unsymmetric, and what they add is kept.
+    frequency_error : float
+        Bound of the relative error of the lowest 20 undamped frequencies by the rounding of K.
     gyroscopic : float
         max |C − Cᵀ| / 2 max |C|: 0 for dampers, 1 for Coriolis forces alone (`RotatingFrame`). Undamped modes do
         not know of it, damped poles do.
@@ -40,6 +42,7 @@ class Certificate:
     condition_stiffness: float
     loads: tuple[str, ...] = ()
     gyroscopic: float = 0.0
+    frequency_error: float = 0.0
 
     def __str__(self) -> str:
         rigid = "; ".join(self.rigid_modes) or "none"
@@ -48,6 +51,7 @@ class Certificate:
         return (
             f"equilibrium residual {self.residual:.1e}, asymmetry of K {self.asymmetry:.1e}{why}, "
             f"smallest pivot of M {self.definiteness:.1e}, Taylor slope {self.taylor_slope:.2f}, "
-            f"condition of M {self.condition_mass:.1e}, of K {self.condition_stiffness:.1e}{turning}; "
+            f"condition of M {self.condition_mass:.1e}, of K {self.condition_stiffness:.1e}{turning}, "
+            f"lowest frequencies within {self.frequency_error:.1e}; "
             f"rigid-body modes: {rigid}"
         )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,8 +31,17 @@ if TYPE_CHECKING:
 __all__ = ["LinearModel", "PartMatrices", "Place"]
 
 
-Machine = TypeVar("Machine")
 Shape = TypeVar("Shape")
+
+
+class Elastic(Protocol):
+    """A machine that can tell its stiffness along some motions better than a matrix of doubles holds it."""
+
+    def strain(self, state: Any, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of motions Φ, shape (n, k), about a state under inputs u."""
+
+
+Machine = TypeVar("Machine", bound=Elastic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +55,27 @@ class Place(Generic[Machine, Shape]):
         The equilibrium.
     basis : scipy.sparse.csc_matrix, shape (model.n, n)
         Displacements of the machine's degrees of freedom for one of each coordinate.
+    inputs : numpy.ndarray, shape (inputs,)
+        What it is in equilibrium with.
     """
 
     model: Machine
     state: Shape
     basis: sp.csc_matrix
+    inputs: np.ndarray
+
+    def strain(self, shapes: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of displacements of the coordinates, from the machine itself.
+
+        Parameters
+        ----------
+        shapes : numpy.ndarray, shape (n, k)
+
+        Returns
+        -------
+        numpy.ndarray, shape (k, k)
+        """
+        return self.model.strain(self.state, self.inputs, self.basis @ shapes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.linear.basis import canonical, clusters
 from flexctrl.linear.condense import Scaled, scaled, static_map
-from flexctrl.linear.eigen import EPS, Eigenpairs, complete_pairs, lowest_pairs
+from flexctrl.linear.eigen import EPS, RIGID_NOISE, Eigenpairs, complete_pairs, lowest_pairs
 from flexctrl.linear.massless import STIFFNESS_RANK, null_split
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.linear.parts import energies_by_part
@@ -27,6 +27,9 @@ COMPLETE = 1000
 DEFAULT_COUNT = 20
 BLURRED = 1e-13
 ROUND_OFF = 2e-13
+UNSURE, UNSEEN = 1e-7, 1e-2
+STRESS_NOISE = 5.0
+EXTENDED_EPS = float(np.finfo(np.longdouble).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +264,27 @@ def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
         K = sp.csc_matrix(K + _grounded(base))
     dense = n <= DENSE or wanted + 30 > finite // 2
     pairs = _complete(K, M, null) if dense else lowest_pairs(K, M, wanted)
-    return _described(linear, base, _settled_basis(base, _sharpened(K, M, pairs)), wanted)
+    known = _recalculated(linear, base, _sharpened(K, M, pairs))
+    return _described(linear, base, _settled_basis(base, known), wanted)
+
+
+def _recalculated(linear: LinearModel, base: Scaled, pairs: Eigenpairs) -> Eigenpairs:
+    """Soft modes whose λ is unsure by the rounding of K, by Rayleigh–Ritz with the stiffness of the machine itself."""
+    faint = np.where(pairs.rigid, RIGID_NOISE * pairs.noise > UNSEEN, pairs.noise > UNSURE * np.abs(pairs.values))
+    unsure = np.flatnonzero(faint)
+    if linear.place is None or not unsure.size:
+        return pairs
+    exact = linear.place.strain(base.scales[:, None] * pairs.shapes[:, unsure])
+    if (np.abs(exact.diagonal() - pairs.values[unsure]) > 100.0 * pairs.noise[unsure]).any():
+        return pairs  # the machine has another K by now
+    values, shapes, noise, rigid = (a.copy() for a in (pairs.values, pairs.shapes, pairs.noise, pairs.rigid))
+    values[unsure], turned = np.linalg.eigh(0.5 * (exact + exact.T))
+    shapes[:, unsure] = shapes[:, unsure] @ turned
+    spread = (turned**2).T @ noise[unsure]
+    rigid[unsure] = (np.abs(values[unsure]) <= STRESS_NOISE * spread) & rigid[unsure].any()
+    values[rigid], noise[unsure] = 0.0, spread * EXTENDED_EPS / EPS
+    order = np.argsort(values, kind="stable")
+    return Eigenpairs(values[order], shapes[:, order], rigid[order], noise[order])
 
 
 def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenpairs:

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.effects.gravity import Gravity
+from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import TURNS, Model
 from flexctrl.model.motion import State
@@ -113,14 +115,21 @@ class Balance:
         weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
         return float(max(loads, weights, np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0), 1e-300))
 
+    def pull(self, state: State) -> float:
+        """Return the ω² at which the machine would swing as a whole under the forces at work [(rad/s)²]."""
+        mass = float(self.inertia[~self.turning].sum()) or self.heaviest
+        return self.scale(state) / (mass * self.size)
+
     def noise(self, state: State) -> float:
         """Return the relative residual that round-off of the positions alone makes: |K| times their last digits."""
         return float((self._round_off(state) / self.lever[self.free]).max(initial=0.0)) / self.scale(state)
 
     def idle(self, state: State) -> bool:
-        """Tell whether every force is the round-off of its own coordinate's neighbourhood: nothing is at work."""
-        force = np.abs(self.force(state))
-        return self.astray(state) == 0.0 and not (force > self._round_off(state)).any()
+        """Tell whether nothing is at work: no loads, no weights, and every force is round-off where it acts."""
+        loaded = self.u.any() or any(isinstance(e, Gravity | RotatingFrame) for e in self.model.effects)
+        if loaded or self.astray(state):
+            return False
+        return not (np.abs(self.force(state)) > self._round_off(state)).any()
 
     def _round_off(self, state: State) -> np.ndarray:
         """Forces on the free coordinates that the last digits of the places make."""

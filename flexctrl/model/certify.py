@@ -11,12 +11,16 @@ from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.certificate import Certificate
+from flexctrl.linear.eigen import RIGID_NOISE, stiffness_noise
 from flexctrl.linear.model import LinearModel
+from flexctrl.linear.modes import EXTENDED_EPS, UNSURE, Modes
+from flexctrl.linear.pencil import EPS
 from flexctrl.model.motion import Motion, State
 
 _ASYMMETRY = 1e-6
 _SLOPE = 1.9
 _ROUND_OFF = 1e-12
+_LOWEST, _LOST = 20, 0.05
 _VANISHING, _CAUTION = (1e-12, 3e-13), 100.0
 
 
@@ -69,8 +73,9 @@ def certify(
     loads: tuple[str, ...],
     motion: Motion,
     state: State,
+    pull: float,
 ) -> Certificate:
-    """Return the certificate of a linear model.
+    """Return the certificate of a linear model; ``pull`` is the ω² of what hangs or stands by the loads at work.
 
     Raises
     ------
@@ -90,17 +95,38 @@ def certify(
             f"linearize: the forces have no derivative here (Taylor slope {slope:.2f}, 2 expected): on one side of "
             "this place they are others than on the other. Linearise beside it"
         )
+    linear = replace(linear, K=(0.5 * (linear.K + linear.K.T)).tocsc())
+    modes = linear.modes(min(linear.M.shape[0], _LOWEST))
     return Certificate(
         residual,
         asymmetry,
         definiteness,
         slope,
-        rigid_modes(linear, motion, state),
+        rigid_modes(linear, modes, motion, state),
         _condition(linear.M),
         _condition(linear.K),
         loads,
         _skew_share(linear.C),
+        _frequency_error(linear, modes, pull),
     )
+
+
+def _frequency_error(linear: LinearModel, modes: Modes, pull: float) -> float:
+    """The bound of the lowest frequencies' relative error; refuses what the rounding of K has swallowed."""
+    noise = stiffness_noise(linear.K, modes.shapes)
+    values = np.abs(modes.omega_squared)
+    errors = np.divide(noise, 2.0 * values, out=np.zeros_like(noise), where=values > 0.0)
+    errors = np.where(errors > UNSURE, errors * EXTENDED_EPS / EPS, errors)
+    lost = (errors > _LOST) | ((values == 0.0) & (RIGID_NOISE * noise > _LOST * pull) & (pull > 0.0))
+    if lost.any():
+        i = int(np.argmax(lost))
+        raise LinearizationError(
+            f"linearize: the stiffness of the softest motions is lost in the rounding of the stiffest entries of K "
+            f"({abs(linear.K).max():.1e}): the motion of {modes.dominant_coordinate(i)} shows "
+            f"{modes.omega_squared[i]:.3g} (rad/s)², give or take {RIGID_NOISE * noise[i]:.1e}. "
+            "Use fewer elements, or a rigid part in place of the stiffest one"
+        )
+    return float(errors.max(initial=0.0))
 
 
 def _skew_share(C: sp.csc_matrix) -> float:
@@ -139,10 +165,8 @@ def _condition(A: sp.csc_matrix) -> float:
     return condition if condition < 1e15 else np.inf
 
 
-def rigid_modes(linear: LinearModel, motion: Motion, state: State) -> tuple[str, ...]:
+def rigid_modes(linear: LinearModel, modes: Modes, motion: Motion, state: State) -> tuple[str, ...]:
     """Say in words which motions have no stiffness: of the whole machine first, then of what is left."""
-    linear = replace(linear, K=(0.5 * (linear.K + linear.K.T)).tocsc())
-    modes = linear.modes(min(linear.M.shape[0], 20))
     if not modes.rigid:
         return ()
     shapes = modes.shapes[:, modes.unstable : modes.unstable + modes.rigid]

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.kernels.extended import EXTENDED, evaluate
 from flexctrl.kernels.kernel import Backend, Run
 from flexctrl.linear.parts import Parts, parts_of
 from flexctrl.model.families import Family
@@ -156,6 +157,32 @@ class Forces:
         stiffness, mass = (-self._blocks(z, seed) for seed in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
         owners = np.concatenate([np.array(f.parts) for f in self.families])
         return parts_of(owners, [f.scatter(self.motion.source_base) for f in self.families], stiffness, mass, reach)
+
+    def strain(self, state: State, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of raw motions Φ, piece by piece in extended precision; levers of followers left out.
+
+        Entries of K grow as the cube of the number of elements, what they leave to a motion that bends nothing
+        does not.
+
+        Parameters
+        ----------
+        state : State
+        motions : numpy.ndarray, shape (raw, k)
+
+        Returns
+        -------
+        numpy.ndarray, shape (k, k)
+        """
+        still = np.zeros(self.motion.n)
+        z = np.append(self.slots(state, still, still), (1.0, 0.0, 0.0))
+        seeds, reach = self.slot_count + np.arange(3), np.vstack([motions, 0.0 * motions[:1]])
+        total = np.zeros((motions.shape[1],) * 2, dtype=EXTENDED)
+        for f in self.families:
+            gather = np.hstack([f.gather(self.drive_base), np.tile(seeds, (f.count, 1))])
+            blocks = evaluate(f.kernels.tangent, z[gather], f.parameters).reshape(f.count, f.kernels.kind.width, -1)
+            own = reach[f.scatter(self.motion.source_base)].astype(EXTENDED)
+            total -= np.einsum("eik,eji,ejl->kl", own, blocks, own)
+        return total.astype(float)
 
     def inertias(self, state: State) -> np.ndarray:
         """Return the largest inertia about any axis at each raw freedom: of its node's three displacements or turns.

@@ -67,7 +67,8 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     loads = _without_energy(model, u)
     linear, asymmetry = _derivative(model, state, u, free, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
-    return replace(linear, certificate=certify(linear, residual, asymmetry, slope, loads, model.motion, state))
+    pull = 0.0 if balance.idle(model.rest) else balance.pull(state)
+    return replace(linear, certificate=certify(linear, residual, asymmetry, slope, loads, model.motion, state, pull))
 
 
 def _without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:
@@ -98,7 +99,7 @@ def _derivative(
         outputs=model.outputs,
         name=model.structure.name,
         parts=model.forces.parts(state, T) if model.large else {},
-        place=Place(model, state, sp.identity(model.n, format="csc")[:, free]),
+        place=Place(model, state, sp.identity(model.n, format="csc")[:, free], u),
     )
     return linear, asymmetry
 

@@ -176,6 +176,30 @@ class Model:
         M = clean_mass(0.5 * (M + M.T), sizes, self._groups)
         return M, C, clean_stiffness(K, self._unsure(state, u, K), self._groups) if self.large else K
 
+    def strain(self, state: State, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of some motions in a state at rest, where that can be had without the rounding of K's entries.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+        motions : numpy.ndarray, shape (n, k)
+
+        Returns
+        -------
+        numpy.ndarray, shape (k, k)
+        """
+        if not self.large:
+            return motions.T @ (self._small.K @ motions)
+        raw, loads = self.motion.jacobian(state) @ motions, self.signals.loads_at(state) @ u
+        total = self.forces.strain(state, raw)
+        if not self.motion.plain:
+            still = np.zeros(self.n)
+            total = total - motions.T @ (
+                self.motion.stiffening(state, self.forces.raw(state, still, still) + loads) @ motions
+            )
+        return total - raw.T @ (self.signals.turning(state, u) @ raw) if self.signals.follows else total
+
     def _unsure(self, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.ndarray:
         """By how much entries in each row of K change with the last digits of the places, with some caution."""
         reach = max(self.structure.size, float(np.abs(state.x).max(initial=0.0)))
