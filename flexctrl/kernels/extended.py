@@ -13,7 +13,7 @@ from flexctrl.kernels.kernel import Kernel
 __all__ = ["EXTENDED", "evaluate"]
 
 EXTENDED = np.longdouble
-_BINARY = {
+_BINARY: dict[str, Callable[..., Any]] = {
     "ADD": np.add,
     "SUB": np.subtract,
     "MUL": np.multiply,
@@ -31,7 +31,7 @@ _BINARY = {
     "CONSTPOW": np.power,
     "IF_ELSE_ZERO": lambda condition, value: np.where(condition != 0, value, 0),
 }
-_UNARY = {
+_UNARY: dict[str, Callable[..., Any]] = {
     "ASSIGN": np.positive,
     "NEG": np.negative,
     "SQ": np.square,

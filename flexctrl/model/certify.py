@@ -13,7 +13,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.linear.certificate import Certificate
 from flexctrl.linear.eigen import RIGID_NOISE, stiffness_noise
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import EXTENDED_EPS, UNSURE, Modes
+from flexctrl.linear.modes import EXTENDED_EPS, UNSEEN, UNSURE, Modes
 from flexctrl.linear.pencil import EPS
 from flexctrl.model.motion import Motion, State
 
@@ -117,7 +117,8 @@ def _frequency_error(linear: LinearModel, modes: Modes, pull: float) -> float:
     values = np.abs(modes.omega_squared)
     errors = np.divide(noise, 2.0 * values, out=np.zeros_like(noise), where=values > 0.0)
     errors = np.where(errors > UNSURE, errors * EXTENDED_EPS / EPS, errors)
-    lost = (errors > _LOST) | ((values == 0.0) & (RIGID_NOISE * noise > _LOST * pull) & (pull > 0.0))
+    hidden = (values == 0.0) & (RIGID_NOISE * noise > max(_LOST * pull, UNSEEN)) & (pull > 0.0)
+    lost = hidden | (errors > _LOST)
     if lost.any():
         i = int(np.argmax(lost))
         raise LinearizationError(
