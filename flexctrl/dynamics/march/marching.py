@@ -94,7 +94,7 @@ class Remembered:
     made_for : float
         Step of the tangent [s].
     numbers : tuple of float
-        Newton's habit and trust, and his tolerance.
+        Newton's habit and trust, and his tolerance; what the mass has missed, and the trust in that.
     """
 
     tangent: np.ndarray
@@ -166,7 +166,7 @@ class Marcher:
             tangent = m.tangent.place.copy() if m.made_for > 0.0 else np.zeros(0)
             mass = m.mass.place.copy() if m.mass_for == 1.0 else np.zeros(0)
             self._kept = kept = ((m.factorisations, m.weighings), tangent, mass)
-        return Remembered(kept[1], kept[2], m.made_for, (m.habit, m.trusted, m.tolerance))
+        return Remembered(kept[1], kept[2], m.made_for, (m.habit, m.trusted, m.tolerance, m.missed, m.believed))
 
     def recall(self, memory: Remembered) -> None:
         """Go on as the march whose memory this is."""
@@ -177,8 +177,8 @@ class Marcher:
                 f.z[:], m.h = place, memory.made_for
                 self._make(factors, mass)
         m.factorisations, m.made_for = made, memory.made_for
-        habit, trusted, m.tolerance = memory.numbers
-        m.habit, m.trusted = habit, int(trusted)
+        m.habit, trusted, m.tolerance, m.missed, believed = memory.numbers
+        m.trusted, m.believed = int(trusted), int(believed)
 
     def _make(self, factors: Factors, mass: bool) -> None:
         if self.march.asking:

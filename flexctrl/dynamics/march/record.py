@@ -83,13 +83,13 @@ class March:
         Whether accelerations are expected to go on as they went.
     made_for, mass_for : float
         Step for which the tangent was made; 1 once the mass has been.
+    missed, believed : float, int
+        What share of accelerations the mass got wrong when that was last looked at (−1: not yet known), and in how many
+        jumps of the inputs it was only believed.
     newton, factorisations, weighings, worst : int
     losing, asking, watching, jumping : int
         Whether power is dissipated; whether tangents are asked for; whether steps end before corners;
         whether inputs jump before the next step.
-    keeping, due, spacing, kept, shelf : int, float
-        Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many
-        there are, and how many there is room for.
     keeping, due, spacing, kept, shelf : int, float
         Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many
         there are, and how many there is room for.
@@ -164,6 +164,8 @@ class March:
     trending: int = 0
     made_for: float = -1.0
     mass_for: float = 0.0
+    missed: float = -1.0
+    believed: int = 0
     newton: int = 0
     factorisations: int = 0
     weighings: int = 0
