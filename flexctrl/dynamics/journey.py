@@ -148,6 +148,7 @@ class Journey:
         autosave = self.plan.autosave
         if autosave is not None and now - self._kept > autosave.seconds:
             self._kept = now
+            self.rows.recorder.flush()
             (self.saved or self.snapshot()).save(autosave.path)
 
     def snapshot(self) -> Checkpoint:

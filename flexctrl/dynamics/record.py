@@ -27,6 +27,9 @@ class Recorder(Protocol):
     def table(self) -> np.ndarray:
         """Return what the run shall hold: rows of (t, y, u)."""
 
+    def flush(self) -> None:
+        """Put what has been written where it outlives the process."""
+
     def close(self) -> None:
         """Let go of what is held open; nothing is written afterwards."""
 
@@ -42,8 +45,8 @@ class Record(Protocol):
     def states(self) -> float:
         """Bytes of states that may be kept for `Run.at`."""
 
-    def start(self, signals: Sequence[str]) -> Recorder:
-        """Return a recorder of time and some signals."""
+    def start(self, signals: Sequence[str], after: int = 0) -> Recorder:
+        """Return a recorder of time and some signals; ``after`` rows were written before the run was stopped."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class InMemory:
     def every(self) -> None:
         return None
 
-    def start(self, signals: Sequence[str]) -> _Table:
+    def start(self, signals: Sequence[str], after: int = 0) -> _Table:
         return _Table(1 + len(signals))
 
 
@@ -79,7 +82,9 @@ class InMemory:
 class CsvStream:
     """Curves are written to a file as they come; the run itself holds their first and last rows.
 
-    A file that exists is replaced. Lines are on the disk when the run ends, however it ends.
+    A file that exists is replaced, unless the run goes on from a checkpoint: then lines follow those that were
+    written until there, and what was written since is dropped. Lines are on the disk when the run ends, however it
+    ends, and whenever it is saved by `Autosave`.
 
     Parameters
     ----------
@@ -104,9 +109,22 @@ class CsvStream:
     def states(self) -> float:
         return 0.0
 
-    def start(self, signals: Sequence[str]) -> _Stream:
-        file = Path(self.path).open("w", encoding="utf-8")  # noqa: SIM115 (the run closes it)
-        file.write(",".join(["t", *signals]) + "\n")
+    def start(self, signals: Sequence[str], after: int = 0) -> _Stream:
+        path, header = Path(self.path), ",".join(["t", *signals]) + "\n"
+        if not (after and path.exists()):
+            file = path.open("w", encoding="utf-8")
+            file.write(header)
+            return _Stream(file, 1 + len(signals))
+        file = path.open("r+", encoding="utf-8")
+        found = file.readline()
+        if found != header or sum(1 for _ in zip(range(after), iter(file.readline, ""), strict=False)) < after:
+            file.close()
+            raise StructureError(
+                f"CsvStream: {path} is not what the checkpoint goes on from: expected {after} rows of "
+                f"{header.strip()}; give that file, or the name of a new one"
+            )
+        file.seek(file.tell())
+        file.truncate()
         return _Stream(file, 1 + len(signals))
 
 
@@ -138,6 +156,9 @@ class _Table:
     def table(self) -> np.ndarray:
         return self.held[: self.count].copy()
 
+    def flush(self) -> None:
+        return
+
     def close(self) -> None:
         self.held = self.held[: self.count]
 
@@ -160,6 +181,9 @@ class _Stream:
 
     def table(self) -> np.ndarray:
         return np.array(self.ends).reshape(-1, self.width)
+
+    def flush(self) -> None:
+        self.file.flush()
 
     def close(self) -> None:
         self.file.close()

@@ -115,7 +115,7 @@ def simulate(
     )
     stepper = plan.method.stepper(model, feed, plan.tolerance)
     curve = curves_of(model, stepper)
-    recorder = record.start((*model.outputs, *model.inputs))
+    recorder = record.start((*model.outputs, *model.inputs), start.rows if isinstance(start, Checkpoint) else 0)
     try:
         rows = Rows(feed, spacing, until, recorder, curve)
         track = Track(feed, record.states, curve)

@@ -1,0 +1,157 @@
+"""Machines of the tests of long runs, and what these do in a process: ``python long_running.py TASK …``."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import flexctrl as fc
+
+SAMPLE = 1e-3
+
+
+class Servo:
+    """A sampled controller with a state: position with integral, towards a reference that swings."""
+
+    inputs = ("angle", "speed")
+    outputs = ("torque",)
+    sample_time = SAMPLE
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(1)
+
+    def _error(self, t: float, y: np.ndarray) -> float:
+        return 0.5 * np.sin(0.7 * t) - y[0]
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([4.0 * self._error(t, y) - 0.8 * y[1] + x[0]])
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return x + SAMPLE * self._error(t, y)
+
+
+def arm(*effects, backend=None) -> fc.Model:
+    """A link behind an elastic gear, and a pendulum on it."""
+    link = fc.RigidBody("link", (0.5, 0, 0), 1.0, (0.01, 0.1, 0.1), {"hinge": (0, 0, 0), "tip": (1, 0, 0)})
+    load = fc.RigidBody("load", (1, 0, -0.4), 0.5, (0.01, 0.01, 0.01), {"hook": (1, 0, 0)})
+    hinge = link.point("hinge")
+    motor = fc.RotaryDrive("motor", hinge, axis="z", stiffness=2000.0, ratio=1.0, inertia=0.05, damping=1.0)
+    machine = fc.Structure(
+        [link, load],
+        [fc.Support(hinge, "u v w rx ry"), fc.Hinge(link.point("tip"), load.point("hook"), "x")],
+        [motor],
+        [fc.MotorTorque("torque", motor)],
+        [fc.DriveAngle("angle", motor), fc.DriveSpeed("speed", motor), fc.Position("load_y", load.node, "y")],
+    )
+    return fc.assemble(machine, [fc.LargeRotation(), fc.Gravity(), fc.ShaftElasticity(), *effects], backend)
+
+
+FIXED = fc.GeneralizedAlpha(SAMPLE)
+DRY = fc.CoulombFriction({"motor": fc.Coulomb(0.2, static=0.3)})
+CASES = {
+    "marched": (lambda: arm(), None, FIXED, {"torque": 0.8}),
+    "plain": (lambda: arm(backend=fc.CasadiVM()), None, FIXED, {"torque": 0.8}),
+    "adaptive": (lambda: arm(), None, fc.AdaptiveAlpha(), {"torque": 0.8}),
+    "adaptive_sampled": (lambda: arm(), Servo, fc.AdaptiveAlpha(), {}),
+    "friction": (lambda: arm(DRY), Servo, FIXED, {}),
+    "sampled": (lambda: arm(), Servo, FIXED, {}),
+    "sampled_plain": (lambda: arm(backend=fc.CasadiVM()), Servo, FIXED, {}),
+    "midpoint": (lambda: arm(), Servo, fc.ConservingMidpoint(SAMPLE), {}),
+    "explicit": (lambda: arm(), Servo, fc.ExplicitRungeKutta(SAMPLE), {}),
+}
+
+
+def ran(name: str, until: float, folder: Path, label: str, start: fc.Checkpoint | None = None) -> fc.dynamics.run.Run:
+    """A case until some time, with its rows in a file."""
+    model, controller, method, inputs = CASES[name]
+    stream = fc.CsvStream(folder / f"{name}_{label}.csv", every=0.01)
+    given = {"inputs": inputs} if start is None else {"start": start}
+    law = controller() if controller else None
+    return fc.simulate(model(), law, until=until, method=method, record=stream, **given)
+
+
+def resume(folder: str, until: str) -> None:
+    """Go on with every case from its checkpoint in a folder, and write how each ends."""
+    place = Path(folder)
+    for name in CASES:
+        run = ran(name, float(until), place, "parts", fc.load_checkpoint(place / f"{name}.checkpoint"))
+        np.savez(place / f"{name}.npz", **ends(run))
+
+
+def ends(run: fc.dynamics.run.Run) -> dict[str, np.ndarray]:
+    """What a run ends with."""
+    e, final = run.report.energy, run.final
+    books = np.array([e.work, e.dissipated, e.kinetic, e.stored, run.report.steps])
+    return {"x": final.x, "R": final.R, "q": final.q, "v": final.v, "books": books, "t": np.array(final.t)}
+
+
+def forever(folder: str) -> None:
+    """A run that ends only when it is stopped; tells when it is under way, and what it kept."""
+    place = Path(folder)
+    autosave = fc.Autosave(place / "autosave", seconds=0.2)
+    stream = fc.CsvStream(place / "forever.csv", every=0.01)
+
+    def tell(share: float) -> None:
+        (place / "begun").touch()
+
+    run = fc.simulate(
+        arm(), Servo(), until=1e5, method=FIXED, every=0.01, record=stream, autosave=autosave, progress=tell
+    )
+    print(run.status.name, run.t[-1], run.final.t, run.checkpoint.t)
+
+
+class Stuck(Servo):
+    """A controller that does not come back."""
+
+    def __init__(self, flag: Path) -> None:
+        self.flag = flag
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        if t > 0.5:
+            self.flag.touch()
+            time.sleep(600.0)
+        return super().command(t, x, y)
+
+
+def stuck(folder: str) -> None:
+    """A run whose controller hangs at 0.5 s."""
+    run = fc.simulate(arm(), Stuck(Path(folder) / "begun"), until=1.0, method=FIXED, every=0.01)
+    print(run.status.name, len(run.t), run.t[-1], run.final.t)
+
+
+def resident() -> float:
+    """Resident memory now [MB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+def closed_loop(folder: str, kind: str, until: str) -> None:
+    """A closed loop at 1 kHz; prints times and resident memory [MB] on the way, and the most there was."""
+    kept = fc.CsvStream(Path(folder) / "rows.csv") if kind == "streamed" else fc.InMemory(states=1e6)
+    marks: list[tuple[float, float]] = []
+    end = float(until)
+    run = fc.simulate(
+        arm(), Servo(), until=end, method=FIXED, every=0.1, record=kept,
+        progress=lambda share: marks.append((share * end, resident())),
+    )  # fmt: skip
+    half = next(m for m in marks if m[0] > 0.4 * end)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+    print(run.status.name, *half, *marks[-1], peak)
+
+
+def chain(folder: str, elements: str) -> None:
+    """Twenty steps of a long chain; prints status and the most memory there was [MB]."""
+    section = fc.Section(EA=1e5, EI_y=10.0, EI_z=10.0, GJ=10.0, rhoA=1.0, rhoJ=1e-3)
+    beam = fc.Beam("chain", (0, 0, 0), (0.1 * int(elements), 0, 0), section, int(elements))
+    machine = fc.Structure([beam], [fc.Support(beam.start, "u v w")], outputs=[fc.Position("tip", beam.end, "z")])
+    model = fc.assemble(machine, [fc.LargeRotation(), fc.Gravity(), fc.Flexible()])
+    run = fc.simulate(model, until=20e-4, method=fc.GeneralizedAlpha(1e-4))
+    print(run.status.name, run.report.steps, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6)
+
+
+if __name__ == "__main__":
+    globals()[sys.argv[1]](*sys.argv[2:])

@@ -1,0 +1,178 @@
+"""Long runs: stopped by Ctrl-C or killed, gone on from a checkpoint bit for bit, in bounded memory."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from long_running import CASES, FIXED, Servo, arm, ends, ran
+
+import flexctrl as fc
+
+HERE = Path(__file__).parent
+UNTIL = 0.4
+
+
+def process(*task: object) -> subprocess.Popen[str]:
+    words = [sys.executable, str(HERE / "long_running.py"), *map(str, task)]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def printed(*task: object) -> list[str]:
+    child = process(*task)
+    out, error = child.communicate(timeout=300)
+    assert child.returncode == 0, error
+    return out.split()
+
+
+def wait_for(path: Path) -> None:
+    for _ in range(3000):
+        if path.exists():
+            return
+        time.sleep(0.02)
+    raise TimeoutError(path)
+
+
+# -- interrupted
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_the_trajectory(tmp_path):
+    child = process("forever", tmp_path)
+    wait_for(tmp_path / "begun")
+    child.send_signal(signal.SIGINT)
+    out, error = child.communicate(timeout=60)
+    assert child.returncode == 0, error
+    status, last, final, checkpoint = out.split()
+    assert status == "INTERRUPTED"
+    assert float(last) == float(final) == float(checkpoint) > 0.0
+    rows = np.loadtxt(tmp_path / "forever.csv", delimiter=",", skiprows=1)
+    assert rows[-1, 0] == float(last)
+    assert np.allclose(rows[:-1, 0], 0.01 * np.arange(len(rows) - 1), rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_second_ctrl_c_does_not_wait_for_the_controller(tmp_path):
+    child = process("stuck", tmp_path)
+    wait_for(tmp_path / "begun")
+    child.send_signal(signal.SIGINT)
+    time.sleep(0.3)
+    assert child.poll() is None
+    child.send_signal(signal.SIGINT)
+    out, error = child.communicate(timeout=60)
+    assert child.returncode == 0, error
+    status, rows, last, final = out.split()
+    assert status == "INTERRUPTED"
+    assert int(rows) >= 1
+    assert 0.0 <= float(final) <= 0.51
+    assert 0.0 <= float(last) <= 0.51
+
+
+SCENE = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {here!r})
+from long_running import FIXED, Servo, arm
+import flexctrl as fc
+
+class Telling(Servo):
+    def command(self, t, x, y):
+        if 0.2 < t < 0.21:
+            Path({flag!r}).touch()
+        return super().command(t, x, y)
+
+model = arm()
+run = fc.Simulation(until=1e5, method=FIXED, every=0.1)
+scene = fc.Scene(model.structure, effects=list(model.effects), controller=Telling(), simulation=run)
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c_on_the_command_line_writes_what_there_is(tmp_path):
+    scene, flag, out = tmp_path / "scene.py", tmp_path / "begun", tmp_path / "out"
+    scene.write_text(SCENE.format(here=str(HERE), flag=str(flag)))
+    code = "import sys; from flexctrl.cli import main; sys.exit(main(sys.argv[1:]))"
+    words = [sys.executable, "-c", code, "run", str(scene), "--out", str(out)]
+    child = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    wait_for(flag)
+    child.send_signal(signal.SIGINT)
+    text, error = child.communicate(timeout=120)
+    assert child.returncode == 1
+    assert "interrupted at t = " in error
+    assert "interrupted" in text
+    rows = np.loadtxt(out / "run.csv", delimiter=",", skiprows=1)
+    assert rows[-1, 0] >= 0.2
+    assert np.isfinite(rows).all()
+    assert (out / "outputs.png").stat().st_size > 5_000
+
+
+# -- gone on with
+
+
+def same(part: str, found: np.ndarray, value: np.ndarray) -> bool:
+    """The motion to the last bit; books are added up in batches by the clock."""
+    return np.allclose(found, value, rtol=1e-10, atol=1e-12) if part == "books" else np.array_equal(found, value)
+
+
+@pytest.mark.slow
+def test_runs_go_on_in_another_process_bit_for_bit(tmp_path):
+    for name in CASES:
+        half = ran(name, 0.5 * UNTIL, tmp_path, "parts")
+        assert half.status is fc.Status.FINISHED
+        half.checkpoint.save(tmp_path / f"{name}.checkpoint")
+    printed("resume", tmp_path, UNTIL)
+    for name in CASES:
+        once = ran(name, UNTIL, tmp_path, "once")
+        with np.load(tmp_path / f"{name}.npz") as found:
+            for part, value in ends(once).items():
+                assert same(part, found[part], value), (name, part)
+        parts, whole = ((tmp_path / f"{name}_{label}.csv").read_bytes() for label in ("parts", "once"))
+        assert parts == whole, name
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on_from_its_autosave(tmp_path):
+    child = process("forever", tmp_path)
+    wait_for(tmp_path / "autosave")
+    child.kill()
+    child.communicate(timeout=60)
+    saved = fc.load_checkpoint(tmp_path / "autosave")
+    how = {"until": saved.t + 0.1234, "method": FIXED, "every": 0.01}
+    stream = fc.CsvStream(tmp_path / "forever.csv", every=0.01)
+    resumed = fc.simulate(arm(), Servo(), start=saved, record=stream, **how)
+    once = fc.simulate(arm(), Servo(), record=fc.CsvStream(tmp_path / "once.csv", every=0.01), **how)
+    for part, value in ends(once).items():
+        assert same(part, ends(resumed)[part], value), part
+    assert (tmp_path / "forever.csv").read_bytes() == (tmp_path / "once.csv").read_bytes()
+
+
+def test_a_stream_of_something_else_is_not_gone_on_with(tmp_path):
+    half = ran("marched", 0.05, tmp_path, "parts")
+    (tmp_path / "marched_parts.csv").write_text("t,other\n0.0,1.0\n")
+    with pytest.raises(fc.errors.StructureError, match="expected 6 rows of t,angle"):
+        ran("marched", 0.1, tmp_path, "parts", half.checkpoint)
+
+
+# -- memory
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["streamed", "decimated"])
+def test_an_hour_of_closed_loop_stays_within_300_megabytes(kind, tmp_path):
+    """What it grows by in a second, 3600 times, on top of what it takes at most."""
+    status, t, before, end, after, peak = printed("closed_loop", tmp_path, kind, 25.0)
+    assert status == "FINISHED"
+    growth = (float(after) - float(before)) / (float(end) - float(t))
+    assert float(peak) + 3600.0 * max(growth, 0.0) < 300.0
+
+
+@pytest.mark.slow
+def test_ten_thousand_elements_stay_within_a_gigabyte(tmp_path):
+    status, steps, peak = printed("chain", tmp_path, 10_000)
+    assert (status, steps) == ("FINISHED", "20")
+    assert float(peak) < 1000.0
