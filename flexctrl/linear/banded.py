@@ -10,9 +10,11 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-__all__ = ["Band", "Factor", "band_of"]
+__all__ = ["Band", "Factor", "band_of", "prominent"]
 
 WIDEST = 64
+TRIES = 4
+UNCLEAR = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,11 +25,14 @@ class Factor:
     ----------
     pivots : numpy.ndarray, shape (n,)
         Squares of the diagonal of L, in the band's order.
+    order : numpy.ndarray of int, shape (n,)
+        Freedoms in the band's order.
     solve : callable
         rhs ↦ A⁻¹ rhs.
     """
 
     pivots: np.ndarray
+    order: np.ndarray
     solve: Callable[[np.ndarray], np.ndarray]
 
 
@@ -63,10 +68,8 @@ class Band:
         -------
         Factor or None
         """
-        n, order = self.order.size, self.order
-        storage = np.zeros(n * (self.width + 1))
-        storage[self.places] = data[self.lower]
-        L, info = lapack.dpbtrf(storage.reshape(n, -1).T, lower=1, overwrite_ab=1)
+        order = self.order
+        L, info = lapack.dpbtrf(self._stored(data).T, lower=1, overwrite_ab=1)
         if info:
             return None
 
@@ -75,7 +78,82 @@ class Band:
             x[order] = lapack.dpbtrs(L, rhs[order], lower=1)[0]
             return x
 
-        return Factor(L[0] ** 2, solve)
+        return Factor(L[0] ** 2, order, solve)
+
+    def negative(self, data: np.ndarray, held: np.ndarray) -> int | None:
+        """How many negative eigenvalues the matrix with these entries has, if it is definite with some freedoms held.
+
+        They are then those of the Schur complement of the held ones (E. Haynsworth, Linear Algebra Appl. 1 (1968)
+        73–81). More freedoms are held where that turns out to be needed.
+
+        Parameters
+        ----------
+        data : numpy.ndarray
+            Entries in the order of the pattern.
+        held : numpy.ndarray of int
+            Freedoms.
+
+        Returns
+        -------
+        int or None
+            None if it is not definite, or the complement singular to rounding.
+        """
+        storage, places = self._stored(data), np.empty_like(self.order)
+        places[self.order] = np.arange(self.order.size)
+        held = places[held]
+        for _ in range(TRIES):
+            rest, columns, own = _without(storage, held)
+            L, info = lapack.dpbtrf(rest.T, lower=1, overwrite_ab=1)
+            if not info:
+                half = lapack.dtbtrs(L, columns, uplo="L", overwrite_b=1)[0]
+                values = np.linalg.eigvalsh(own - half.T @ half)
+                clear = np.abs(values).min(initial=np.inf) > UNCLEAR * np.abs(values).max(initial=0.0)
+                return int(np.count_nonzero(values < 0.0)) if clear else None
+            held = np.append(held, info - 1)
+        return None
+
+    def _stored(self, data: np.ndarray) -> np.ndarray:
+        """Lower band column by column, shape (n, width + 1)."""
+        n = self.order.size
+        storage = np.zeros(n * (self.width + 1))
+        storage[self.places] = data[self.lower]
+        return storage.reshape(n, -1)
+
+
+def _without(storage: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The band with some rows and columns those of the identity; what stood in these columns, and where they meet."""
+    n, width = storage.shape[0], storage.shape[1] - 1
+    rest, columns, steps = storage.copy(), np.zeros((n + 2 * width, held.size), order="F"), np.arange(width + 1)
+    number = np.arange(held.size)[:, None]
+    above = held[:, None] - steps
+    inside = above >= 0
+    columns[held[:, None] + steps + width, number] = storage[held]
+    columns[above + width, number] = np.where(inside, storage[above, steps], 0.0)
+    columns = columns[width : n + width]
+    own = columns[held].copy()
+    columns[held] = 0.0
+    rest[held] = 0.0
+    rest[above[inside], np.broadcast_to(steps, above.shape)[inside]] = 0.0
+    rest[held, 0] = 1.0
+    return rest, columns, own
+
+
+def prominent(vectors: np.ndarray) -> np.ndarray:
+    """Freedoms, one for each vector, that tell the vectors apart: the pivots of an elimination.
+
+    Parameters
+    ----------
+    vectors : numpy.ndarray, shape (n, k)
+
+    Returns
+    -------
+    numpy.ndarray of int, shape (k,)
+    """
+    swaps = lapack.dgetrf(vectors)[1]
+    order = np.arange(len(vectors))
+    for i, j in enumerate(swaps.tolist()):
+        order[i], order[j] = order[j], order[i]
+    return order[: swaps.size]
 
 
 def band_of(A: sp.csc_matrix) -> Band | None:

@@ -11,8 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, MechanismError
+from flexctrl.linear.banded import Band, band_of
 from flexctrl.linear.eigen import coordinate_scales
-from flexctrl.linear.massless import Massless, as_dense, massless, pivots, solved
+from flexctrl.linear.massless import DENSE_BLOCK, Massless, as_dense, massless, pivots, solved
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.pattern import congruent, symmetric
 from flexctrl.linear.words import motions_in_words
@@ -85,11 +86,14 @@ class Scaled:
         In scaled coordinates z; q = scales · z. It knows neither parts nor place.
     scales : numpy.ndarray, shape (n,)
     massless : Massless
+    band : Band or None
+        Of the common pattern of M and K, in a larger model where it is narrow.
     """
 
     model: LinearModel
     scales: np.ndarray
     massless: Massless
+    band: Band | None
 
     @cached_property
     def stiffness(self) -> tuple[sp.csc_matrix, float]:
@@ -256,9 +260,10 @@ def scaled_any(linear: LinearModel) -> Scaled:
     Scaled
     """
     s = coordinate_scales(linear.M, linear.C, linear.K)
-    M, C, K = congruent(s, linear.M, linear.C, linear.K)
+    (M, K), (C,) = congruent(s, linear.M, linear.K), congruent(s, linear.C)
+    band = band_of(K) if len(s) > DENSE_BLOCK else None
     signals = {"B": s[:, None] * linear.B, "Cq": linear.Cq * s, "Cv": linear.Cv * s}
-    return Scaled(replace(linear, M=M, C=C, K=K, parts={}, place=None, **signals), s, massless(M, C, K))
+    return Scaled(replace(linear, M=M, C=C, K=K, parts={}, place=None, **signals), s, massless(M, C, K, band), band)
 
 
 def _moving(basis: sp.csc_matrix, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:

@@ -15,7 +15,8 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
-from flexctrl.linear.pencil import EPS, HIDDEN, DensePencil, Pencil, ShiftedPencil, faint_shift, stiffness_noise
+from flexctrl.linear.banded import Band
+from flexctrl.linear.pencil import EPS, HIDDEN, DensePencil, Matrix, Pencil, ShiftedPencil, faint_shift, stiffness_noise
 
 __all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
 
@@ -50,12 +51,12 @@ class Eigenpairs:
     noise: np.ndarray
 
 
-def coordinate_scales(M: sp.spmatrix, C: sp.spmatrix, K: sp.spmatrix) -> np.ndarray:
+def coordinate_scales(M: Matrix, C: Matrix, K: Matrix) -> np.ndarray:
     """Scales s (powers of two, so that scaling rounds nothing) with diag(S (K + w²M) S) about 1.
 
     Parameters
     ----------
-    M, C, K : sparse matrices, shape (n, n)
+    M, C, K : arrays or sparse matrices, shape (n, n)
 
     Returns
     -------
@@ -112,7 +113,7 @@ def _scouted(pencil: DensePencil, phi: np.ndarray, count: int) -> tuple[ShiftedP
     return shifted, lam[0] - shifted.sigma
 
 
-def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
+def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int, band: Band | None = None) -> Eigenpairs:
     """At least `count` lowest eigenpairs by shift-invert Lanczos; none is missed (Sturm count).
 
     Parameters
@@ -120,6 +121,8 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
     K, M : sparse matrices, shape (n, n), symmetric, scaled
         M may be singular; K may be indefinite.
     count : int
+    band : Band, optional
+        Of their common pattern, where that is known.
 
     Returns
     -------
@@ -131,22 +134,25 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int) -> Eigenpairs:
     LinearizationError
         If the Sturm count of K − μM never agrees with the modes found.
     """
-    n, pencil = K.shape[0], Pencil(K, M)
-    wanted, width = min(count, n - 2), WIDTH
-    shifted = pencil.below_all(faint_shift(K, M))
+    n, pencil = K.shape[0], Pencil(K, M, band)
+    wanted, shifted = min(count, n - 2), pencil.below_all(faint_shift(K, M))
+    # one vector at a time is quickest, but finds equal eigenvalues, such as those of free motion, one by one
+    width = 1 if shifted.firm else WIDTH
     start = _noise(n, width)
     for _ in range(20):
-        found = _found(pencil, shifted, *shifted.lanczos(start, wanted))
+        near, shapes, space = shifted.lanczos(start, wanted)
+        found = _found(pencil, shifted, near, shapes)
         better = _better_shift(found, shifted.sigma)
         if better == 0.0 and 2 * wanted < n - 2:
             wanted, start = 2 * wanted, np.hstack([found.phi, _noise(n, width)])
         elif better not in (0.0, shifted.sigma):
             shifted, start = pencil.below_all(better), np.hstack([found.phi, _noise(n, width)])
-        elif _none_missed(pencil, np.sort(found.lam), count):
-            return _settled(pencil, found.without_last())
         else:
+            missed = _missed(pencil, np.sort(found.lam), count, space)
+            if missed == 0:
+                return _settled(pencil, found.without_last())
             # more equal modes than the block is wide, or a start that does not hold one
-            width = min(2 * width, n // 4)
+            width = min(max(2 * width, missed + 1), n // 4)
             start = _noise(n, width)
     raise LinearizationError("the lowest modes could not be certified by a Sturm count; ask for another count")
 
@@ -212,13 +218,14 @@ def _better_shift(found: _Found, sigma: float) -> float:
     return sigma if small_enough and (clear.all() or 0.01 * scale <= -sigma) else -2.0 * scale
 
 
-def _none_missed(pencil: Pencil, lam: np.ndarray, count: int) -> bool:
-    """Whether as many λ lie under some gap beyond `count` as were found there."""
+def _missed(pencil: Pencil, lam: np.ndarray, count: int, space: np.ndarray) -> int:
+    """How many more λ lie under some gap beyond `count` than were found there; 1 if that cannot be told."""
     for i in range(min(count, lam.size - 1), lam.size):
         gap = lam[i] - lam[i - 1] if i else 0.0
         if gap > 1e-6 * abs(lam[i]):
-            return pencil.below(0.5 * (lam[i] + lam[i - 1])) in (i, HIDDEN)
-    return True
+            below = pencil.below(0.5 * (lam[i] + lam[i - 1]), space)
+            return 0 if below == HIDDEN else max(below - i, 1) if below != i else 0
+    return 0
 
 
 def _settled(pencil: Pencil | DensePencil, found: _Found) -> Eigenpairs:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["krylov"]
+__all__ = ["Krylov", "krylov"]
 
 STILL = 1e-10
 ROUGH = 1e-3
@@ -17,14 +18,34 @@ PARALLEL = 1e-12
 ORTHOGONAL = 1e-2
 
 
+@dataclass(frozen=True, eq=False)
+class Krylov:
+    """What `krylov` found.
+
+    Attributes
+    ----------
+    theta : numpy.ndarray, shape (k,)
+        Descending.
+    vectors : numpy.ndarray, shape (n, k)
+        M-orthonormal, A⁻¹M y = θ y.
+    basis : numpy.ndarray, shape (n, j)
+        The whole space, M-orthonormal.
+    """
+
+    theta: np.ndarray
+    vectors: np.ndarray
+    basis: np.ndarray
+
+
 def krylov(
     inverse: Callable[[np.ndarray], np.ndarray], M: np.ndarray | sp.csc_matrix, start: np.ndarray, count: int
-) -> np.ndarray:
-    """Vectors for the `count` largest θ of A⁻¹M y = θ y, and on to the next gap; M-orthonormal, largest θ first.
+) -> Krylov:
+    """The `count` largest θ of A⁻¹M y = θ y, and on to the next gap.
 
     The space grows by blocks until the residuals of the pairs wanted are 1e-10 of their θ, so that θ has all its
-    digits (G. H. Golub, R. Underwood, Mathematical Software III (1977) 361–377). A multiple θ is found as often
-    as the block is wide. The last pair, beyond the gap, is known to some six digits.
+    digits (G. H. Golub, R. Underwood, Mathematical Software III (1977)
+    361–377). A multiple θ is found as often as the block is wide. The last pair, beyond the gap, is known to some six
+    digits.
 
     Parameters
     ----------
@@ -38,23 +59,24 @@ def krylov(
 
     Returns
     -------
-    numpy.ndarray, shape (n, count + 1) or more
-        Fewer columns if M has no more rank.
+    Krylov
+        Fewer pairs if M has no more rank.
     """
-    space = _Space(M, start.shape[0])
-    width, _ = space.grown(inverse(M @ start), 0.0)
+    space = _Space(M, start.shape[0], 3 * (count + start.shape[1]))
+    width, _ = space.grown(inverse(M @ start), 0)
     check = 2 * count + width
     while True:
-        Z = inverse(space.images[:, -width:])
-        known = space.project(Z, width)
-        fresh, R = space.grown(Z, space.largest)
+        known = space.size
+        fresh, R = space.grown(inverse(space.images[:, -width:]), width)
         if not fresh or known >= check:
             theta, s = np.linalg.eigh(space.projected[:known, :known])
-            miss = np.linalg.norm(R @ s[-width:, ::-1], axis=0) / np.maximum(theta[::-1], NOTHING * space.largest)
-            wanted = _to_the_gap(theta[::-1], count)
+            theta, s = theta[::-1], s[:, ::-1]
+            miss = np.sqrt(np.square(R @ s[-width:]).sum(axis=0)) / np.maximum(theta, NOTHING * space.largest)
+            wanted = _to_the_gap(theta, count)
             if not fresh or (wanted < known and (miss[:wanted] <= STILL).all() and miss[wanted] <= ROUGH):
-                return space.vectors[:, :known] @ s[:, : -wanted - 2 : -1]
-            check = known + max(width, count // 2)
+                basis, kept = space.vectors[:, :known], slice(None, wanted + 1)
+                return Krylov(theta[kept], basis @ s[:, kept], basis)
+            check = known + max(width, count // 3)
         width = fresh
 
 
@@ -68,46 +90,50 @@ def _to_the_gap(theta: np.ndarray, count: int) -> int:
 class _Space:
     """An M-orthonormal basis Q that grows by blocks, with M Q and Qᵀ M A⁻¹ M Q."""
 
-    def __init__(self, M: np.ndarray | sp.csc_matrix, n: int) -> None:
-        self._M, self._size, self.largest = M, 0, 0.0
-        self._Q, self._MQ = np.empty((n, 0), order="F"), np.empty((n, 0), order="F")
-        self.projected = np.zeros((0, 0))
+    def __init__(self, M: np.ndarray | sp.csc_matrix, n: int, room: int) -> None:
+        self._M, self.size, self.largest = M, 0, 0.0
+        self._Q, self._MQ = np.empty((n, room), order="F"), np.empty((n, room), order="F")
+        self.projected = np.zeros((room, room))
 
     @property
     def vectors(self) -> np.ndarray:
         """Q."""
-        return self._Q[:, : self._size]
+        return self._Q[:, : self.size]
 
     @property
     def images(self) -> np.ndarray:
         """M Q."""
-        return self._MQ[:, : self._size]
+        return self._MQ[:, : self.size]
 
-    def project(self, Z: np.ndarray, width: int) -> int:
-        """Note what A⁻¹M makes of the last columns; return how many columns there are."""
-        column, size = self.images.T @ Z, self._size
-        self.projected[size - width : size, :size] = column.T
-        self.projected[:size, size - width : size] = column
-        self.largest = max(self.largest, float(np.abs(column).max(initial=0.0)))
-        return size
+    def grown(self, Z: np.ndarray, width: int) -> tuple[int, np.ndarray]:
+        """Add what is new of Z, which A⁻¹M made of the last `width` columns.
 
-    def grown(self, Z: np.ndarray, size: float) -> tuple[int, np.ndarray]:
-        """Add what of Z is new beside vectors of length `size`; return how many columns, and R in Z = … + new R."""
-        for _ in range(2 if self._size else 0):
-            Z = Z - self.vectors @ (self.images.T @ Z)
-        image = self._M @ Z
-        new, image, R = _orthonormal(Z, image, NOTHING * size)
-        count = min(new.shape[1], self._Q.shape[0] - self._size)
+        Returns how many columns that are, and R in Z = … + new R.
+        """
+        Q, MQ = self.vectors, self.images.T
+        if width:
+            column = MQ @ Z
+            self._note(column, width)
+            Z = Z - Q @ column
+            Z = Z - Q @ (MQ @ Z)
+        new, image, R = _orthonormal(Z, self._M @ Z, NOTHING * self.largest)
+        count = min(new.shape[1], self._Q.shape[0] - self.size)
         self._append(new[:, :count], image[:, :count])
         return count, R[:count]
 
+    def _note(self, column: np.ndarray, width: int) -> None:
+        last = slice(self.size - width, self.size)
+        self.projected[last, : self.size] = column.T
+        self.projected[: self.size, last] = column
+        self.largest = max(self.largest, float(np.abs(column).max(initial=0.0)))
+
     def _append(self, new: np.ndarray, image: np.ndarray) -> None:
-        wanted = self._size + new.shape[1]
+        wanted = self.size + new.shape[1]
         if wanted > self._Q.shape[1]:
-            self._Q, self._MQ = (_wider(A, 2 * wanted + 40, self._size) for A in (self._Q, self._MQ))
-            self.projected = np.pad(self.projected, (0, self._Q.shape[1] - len(self.projected)))
-        self._Q[:, self._size : wanted], self._MQ[:, self._size : wanted] = new, image
-        self._size = wanted
+            self._Q, self._MQ = (_wider(A, 2 * wanted, self.size) for A in (self._Q, self._MQ))
+            self.projected = np.pad(self.projected, (0, 2 * wanted - len(self.projected)))
+        self._Q[:, self.size : wanted], self._MQ[:, self.size : wanted] = new, image
+        self.size = wanted
 
 
 def _orthonormal(Z: np.ndarray, image: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -129,6 +155,8 @@ def _once_orthonormal(
     """N, M N, R, and the smallest over the largest eigenvalue of the Gram matrix of the columns kept."""
     gram = Z.T @ image
     length = np.sqrt(np.maximum(gram.diagonal(), 0.0))
+    if length.size == 1 and length[0] > least:
+        return Z / length, image / length, length[:, None], 1.0
     long = np.flatnonzero(length > least)
     scale = length[long]
     values, turn = np.linalg.eigh(gram[long[:, None], long] / (scale[:, None] * scale))

@@ -16,8 +16,7 @@ from scipy.linalg import lapack
 from scipy.sparse.csgraph import connected_components
 
 from flexctrl.errors import LinearizationError
-from flexctrl.linear.banded import band_of
-from flexctrl.linear.pattern import congruent
+from flexctrl.linear.banded import Band, band_of
 
 __all__ = ["Massless", "as_dense", "massless", "null_split", "pivots", "solved"]
 
@@ -55,13 +54,15 @@ class Massless:
         return sp.csc_matrix(sp.hstack([self.static, self.relaxing]))
 
 
-def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
+def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix, band: Band | None = None) -> Massless:
     """Sort the null space of M.
 
     Parameters
     ----------
     M, C, K : sparse matrices, shape (n, n)
         Scaled to about unit diagonal.
+    band : Band, optional
+        Of the pattern of M, where that is known.
 
     Returns
     -------
@@ -73,7 +74,7 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> Massless:
         If M is not positive semidefinite, or a massless freedom without damping of its own is pushed by
         velocities of others (gyroscopic), which would need the derivative of the inputs.
     """
-    if _heavy(M):
+    if _heavy(M, band):
         none = sp.csc_matrix((M.shape[0], 0))
         return Massless(none, none, none)
     null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
@@ -124,7 +125,7 @@ def null_split(
         return unit[:, empty], unit[:, full]
     invert = sp.diags(1.0 / scale[full])
     block = sp.csc_matrix(invert @ A[full][:, full] @ invert)
-    if _definite(block):
+    if _definite(block, np.ones(full.size)):
         return unit[:, empty], unit[:, full]
     null, rest = _split_components(block, tolerance, semidefinite)
     back = unit[:, full] @ invert
@@ -177,12 +178,12 @@ def _without_dust(M: sp.csc_matrix) -> sp.csc_matrix:
     return sp.csc_matrix(keep @ M @ keep)
 
 
-def _heavy(M: sp.csc_matrix) -> bool:
+def _heavy(M: sp.csc_matrix, band: Band | None) -> bool:
     """Whether M is plainly positive definite."""
     diagonal = M.diagonal()
     if not diagonal.size or diagonal.min() <= MASS_DUST * diagonal.max():
         return False
-    return _definite(congruent(1.0 / np.sqrt(diagonal), M)[0])
+    return _definite(M, diagonal, band)
 
 
 def _restricted(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
@@ -200,19 +201,21 @@ def _peak(A: sp.spmatrix) -> float:
     return float(abs(A).max()) if A.shape[0] and A.shape[1] and A.nnz else 0.0
 
 
-def _definite(block: sp.csc_matrix) -> bool:
-    """Whether all pivots of the unit-diagonal matrix stand clear of zero."""
+def _definite(block: sp.csc_matrix, size: np.ndarray, band: Band | None = None) -> bool:
+    """Whether all pivots stand clear of zero beside the sizes of their rows."""
+    least = SMALL_PIVOT * size
     if block.shape[0] <= DENSE_BLOCK:
         root, info = lapack.dpotrf(block.toarray(), lower=1)
-        return bool(info == 0 and np.square(root.diagonal()).min() > SMALL_PIVOT)
-    if (band := band_of(block)) is not None:
+        return bool(info == 0 and (np.square(root.diagonal()) > least).all())
+    band = band or band_of(block)
+    if band is not None:
         factor = band.factorise(block.data)
-        return factor is not None and bool(factor.pivots.min() > SMALL_PIVOT)
+        return factor is not None and bool((factor.pivots > least[factor.order]).all())
     try:
         lu = _symmetric_lu(block)
     except RuntimeError:
         return False
-    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > SMALL_PIVOT).all())
+    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > least[np.argsort(lu.perm_c)]).all())
 
 
 def _groups(A: sp.spmatrix) -> list[np.ndarray]:

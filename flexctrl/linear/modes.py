@@ -263,7 +263,7 @@ def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
     if base.massless.relaxing.shape[1]:
         K = sp.csc_matrix(K + _grounded(base))
     dense = n <= DENSE or wanted + 30 > finite // 2
-    pairs = _complete(K, M, null) if dense else lowest_pairs(K, M, wanted)
+    pairs = _complete(K, M, null) if dense else lowest_pairs(K, M, wanted, base.band)
     known = _recalculated(linear, base, _sharpened(K, M, pairs))
     return _described(linear, base, _settled_basis(base, known), wanted)
 

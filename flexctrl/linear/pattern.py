@@ -63,7 +63,10 @@ def symmetric(A: sp.csc_matrix) -> tuple[sp.csc_matrix, float]:
     """
     if A.shape[0] <= SMALL and np.array_equal(dense := A.toarray(), dense.T):
         return _canonical(A), 0.0
-    A, T = aligned(A, A.T)
+    A, T = _canonical(A), A.T.tocsc()
+    if _same_pattern(A, T) and np.array_equal(A.data, T.data):
+        return A, 0.0
+    A, T = aligned(A, T)
     gap = float(np.abs(A.data - T.data).max(initial=0.0))
     if gap == 0.0:
         return A, gap

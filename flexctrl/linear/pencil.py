@@ -13,7 +13,7 @@ import scipy.sparse.linalg as sla
 from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
-from flexctrl.linear.banded import Band, band_of
+from flexctrl.linear.banded import Band, band_of, prominent
 from flexctrl.linear.krylov import krylov
 from flexctrl.linear.pattern import aligned
 
@@ -22,6 +22,7 @@ __all__ = [
     "HIDDEN",
     "SINGULAR",
     "DensePencil",
+    "Matrix",
     "Pencil",
     "ShiftedPencil",
     "faint_shift",
@@ -31,6 +32,7 @@ __all__ = [
 EPS = float(np.finfo(float).eps)
 HIDDEN, SINGULAR = -1, -2
 TINY = 1e-12
+FIRM = 1e-9
 
 Matrix: TypeAlias = "np.ndarray | sp.csc_matrix"
 
@@ -72,6 +74,8 @@ class ShiftedPencil:
         rhs ↦ (K − σM)⁻¹ rhs.
     below : int
         How many λ lie under σ (Sylvester); HIDDEN if the pivoting does not tell.
+    firm : bool
+        Whether no motion is nearly without stiffness, as far as the pivots tell; False if they are not looked at.
     """
 
     K: Matrix
@@ -79,6 +83,7 @@ class ShiftedPencil:
     sigma: float
     inverse: Callable[[np.ndarray], np.ndarray]
     below: int
+    firm: bool = False
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """(K − σM)⁻¹ rhs with one step of refinement."""
@@ -92,13 +97,22 @@ class ShiftedPencil:
     def ritz(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """One refined step of subspace iteration, and the pairs within the space; ascending when λ > σ."""
         image = self.M @ x
-        after = self.solve(image)
+        return self._within(x, image, self.solve(image))
+
+    def _within(self, x: np.ndarray, image: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The pairs within the space of x, given M x and (K − σM)⁻¹ M x."""
         theta, z, _ = lapack.dsygvd(image.T @ after, x.T @ image)
         return self.sigma + 1.0 / theta[::-1], (after @ z / theta)[:, ::-1]
 
-    def lanczos(self, start: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """The `count` pairs nearest to σ, which must lie under all of them, and on to the next gap; ascending."""
-        return self.ritz(krylov(self.inverse, self.M, start, count))
+    def lanczos(self, start: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The `count` pairs nearest to σ, which must lie under all of them, and on to the next gap; ascending.
+
+        With them, the Krylov space that they come from.
+        """
+        found = krylov(self.inverse, self.M, start, count)
+        image, near = self.M @ found.vectors, found.theta * found.vectors
+        after = near + self.inverse(image - self.K @ near + self.sigma * (self.M @ near))
+        return *self._within(found.vectors, image, after), found.basis
 
 
 class Pencil:
@@ -107,10 +121,13 @@ class Pencil:
     Parameters
     ----------
     K, M : scipy.sparse.csc_matrix, shape (n, n), symmetric
+    band : Band, optional
+        Of their common pattern, where that is known already.
     """
 
-    def __init__(self, K: sp.csc_matrix, M: sp.csc_matrix) -> None:
+    def __init__(self, K: sp.csc_matrix, M: sp.csc_matrix, band: Band | None = None) -> None:
         self.K, self.M = aligned(K, M)
+        self._known = band
 
     @cached_property
     def _squares(self) -> Matrix:
@@ -128,7 +145,7 @@ class Pencil:
         LinearizationError
             If it is singular: a freedom with neither mass nor stiffness, or σ an eigenvalue.
         """
-        A = sp.csc_matrix((self.K.data - sigma * self.M.data, self.K.indices, self.K.indptr), self.K.shape)
+        A = sp.csc_matrix((self._data(sigma), self.K.indices, self.K.indptr), self.K.shape)
         options = {"SymmetricMode": True}
         try:
             lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options=options)
@@ -142,19 +159,32 @@ class Pencil:
 
     @cached_property
     def _band(self) -> Band | None:
-        return band_of(self.K)
+        return band_of(self.K) if self._known is None else self._known
+
+    def _data(self, sigma: float) -> np.ndarray:
+        return np.asarray(self.K.data - sigma * self.M.data)
 
     def _under(self, sigma: float) -> ShiftedPencil:
         """As `at` for σ under all λ, in a band where that is narrow."""
         if self._band is None:
             return self.at(sigma)
-        factor = self._band.factorise(self.K.data - sigma * self.M.data)
+        data = self._data(sigma)
+        factor = self._band.factorise(data)
         if factor is None:
             raise LinearizationError(f"K - ({sigma:.3g}) M is not positive definite")
-        return ShiftedPencil(self.K, self.M, sigma, factor.solve, 0)
+        diagonal = sp.csc_matrix((data, self.K.indices, self.K.indptr), self.K.shape).diagonal()
+        firm = bool((factor.pivots > FIRM * diagonal[factor.order]).all())
+        return ShiftedPencil(self.K, self.M, sigma, factor.solve, 0, firm)
 
-    def below(self, sigma: float) -> int:
-        """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell."""
+    def below(self, sigma: float, near: np.ndarray | None = None) -> int:
+        """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell.
+
+        Vectors that span about the eigenvectors of these λ, and more, make it quicker where the band is narrow.
+        """
+        if near is not None and self._band is not None:
+            found = self._band.negative(self._data(sigma), prominent(near))
+            if found is not None:
+                return found
         try:
             return self.at(sigma).below
         except LinearizationError:

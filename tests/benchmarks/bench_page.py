@@ -23,8 +23,8 @@ MODES = """## Modes of a lattice girder
 A crane girder of welded tubes on supports every 20 m; Exudyn is given the same matrices, sparse, as an
 `ObjectGenericODE2`. By default its `ComputeODE2Eigenvalues` solves for all modes, dense; with `useSparseSolver` it
 calls scipy's `eigsh` on the matrices it has exported dense. flexctrl's time holds the audit of the freedoms, the Sturm
-count that no mode is missed, gains of inputs and outputs and the shares of energy of every member; the others' hold
-none of these. The goal, 50 times Exudyn, is not reached by either route.
+count that no mode is missed, and gains of inputs and outputs; the others' hold none of these.
+The goal, 50 times Exudyn, is not reached by either route.
 """
 
 RESPONSES = """## A response of 1000 points at 130 states
