@@ -122,7 +122,9 @@ class Feed:
 
     def _total(self, command: Any) -> list[float]:
         u = self._base.copy()
-        values, writes = np.asarray(command, dtype=float).ravel().tolist(), self._writes
+        column = type(command) is np.ndarray and command.ndim == 1 and command.dtype == float
+        values = command.tolist() if column else np.asarray(command, dtype=float).ravel().tolist()
+        writes = self._writes
         if len(values) != len(writes):
             raise ControllerError(
                 f"the controller's command has {len(values)} values; expected one for each of its {len(writes)} outputs"

@@ -15,7 +15,6 @@ from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track, curves_of
 from flexctrl.dynamics.events import Event, Watch
-from flexctrl.dynamics.exact import Exact
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_plant import LinearPlant
@@ -103,8 +102,8 @@ def simulate(
         raise StructureError(f"simulate: every = {every}; expected seconds > 0")
     record = record or InMemory()
     if isinstance(model, LinearModel):
-        method = method or Exact(every or until / _ROWS)
-        model = cast(Model, _plant(model, method))
+        plant, method = _plant(model, method, every or until / _ROWS)
+        model = cast(Model, plant)
     elif isinstance(start, State):
         check_state(model, start, "simulate: start")
     feed = feed_of(model, controller, _base(model, start, inputs))
@@ -126,11 +125,14 @@ def simulate(
             stepper.done()
 
 
-def _plant(linear: LinearModel, method: Integrator) -> LinearPlant:
-    """A linear model as a machine; outputs that feel inputs at once are known to the exact method only."""
+def _plant(linear: LinearModel, method: Integrator | None, step: float) -> tuple[LinearPlant, Integrator]:
+    """A linear model as a machine, and its method; outputs that feel inputs at once are known to the exact one only."""
+    from flexctrl.dynamics.exact import Exact
+
+    method = method or Exact(step)
     if linear.D.any() and not isinstance(method, Exact):
         raise StructureError(f"simulate: an output of {linear.name} feels inputs at once (D ≠ 0); use the method Exact")
-    return LinearPlant(linear)
+    return LinearPlant(linear), method
 
 
 def _untold(share: float) -> None:

@@ -205,7 +205,7 @@ def _node_motion(slot: ca.SX, d: ca.SX, seeds: ca.SX) -> NodeMotion:
 def _kernel(name: str, inputs: ca.SX, parameters: ca.SX, outputs: ca.SX) -> Kernel:
     import casadi as ca
 
-    return Kernel(name, inputs, parameters, ca.cse(ca.densify(outputs)))
+    return Kernel(name, inputs, parameters, ca.densify(outputs))
 
 
 @cache
