@@ -14,7 +14,7 @@ _HEAD = """\
 <!-- Made by `python tests/benchmarks/race.py --page` -->
 
 In every comparison both codes take turns in one run, on one thread; the least CPU time of several tries counts. Ratios
-are told; where there are seconds, they are those of a host with other work to do.
+are told; where there are seconds, they are those of a host with other work to do. Sections may be of runs of their own.
 
 Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9, `EigenSparse`,
 modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its quickest element here
