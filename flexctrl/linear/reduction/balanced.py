@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -68,6 +68,7 @@ class BalancedTruncation:
         ReductionError
             If the order does not even hold the states that cannot be balanced.
         """
+        full = replace(full, place=None)  # of these matrices, not of what the machine tells beyond their digits
         exact, stable, feedthrough, bases, rounding = _balanced(full, 0 if _complete(full) else POOL * self.order)
         kept = len(exact.A)
         if self.order < max(kept, 1):
