@@ -195,7 +195,8 @@ class Stepper:
         c = self.coefficients
         self.counts.worst = worst
         state = self.model.advance(point.state, step, v, point.state.t + h)
-        if self.model.motion.dead_point(state):
+        motion = self.model.motion
+        if motion.dead_point(state) or motion.turned_back(point.state, point.rate, state, rate):
             raise StepError(
                 worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part of it bend"
             )

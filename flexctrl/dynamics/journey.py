@@ -259,12 +259,14 @@ class Journey:
         if t + h > until + self._tick:
             self.saved = self.saved or self.snapshot()
             h = until - t
+        why = ""
         while True:
             if h < _SMALLEST * max(1.0, t):
-                raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s")
+                raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
             try:
                 after = self.stepper.step(self.point, h)
-            except StepError:
+            except StepError as failure:
+                why = f": {failure}"
                 mark.rejected += 1
                 size = h = 0.25 * h
                 continue

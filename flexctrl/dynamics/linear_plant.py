@@ -60,6 +60,10 @@ class _Flat:
         """There are no loops."""
         return False
 
+    def turned_back(self, before: State, pull: np.ndarray, after: State, pulled: np.ndarray) -> bool:
+        """There are no loops."""
+        return False
+
     def closure_error(self, state: State) -> float:
         """There are no loops."""
         return 0.0

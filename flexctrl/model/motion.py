@@ -25,6 +25,8 @@ DENSE_UP_TO = 60
 """Degrees of freedom up to which matrices are worked as plain arrays."""
 
 _DEAD = 200.0
+_FULL = 0.1
+_UNEXPLAINED = 5.0
 _BRANCHES = 1e-9
 
 
@@ -410,6 +412,23 @@ class Motion:
             return True
         moved, reach = np.abs(np.linalg.solve(within, onto)).max(axis=0), np.abs(onto).max(axis=0)
         return bool((moved > _DEAD * reach).any())
+
+    def turned_back(self, before: State, pull: np.ndarray, after: State, pulled: np.ndarray) -> bool:
+        """Tell whether parts of a loop have turned back over a step though nothing pulled them so.
+
+        At a dead point the own freedoms turn back while the loop moves on into its other branch. A step across it that
+        stays in the branch sends what moves fastest back the way it came: its rate changes sign at full size, which
+        its accelerations ``pull`` and ``pulled`` at both ends do not explain.
+        """
+        if not self.linkage.loops:
+            return False
+        h, span = after.t - before.t, slice(0, self.source_base)
+        first, last = (self.rates(s, s.v)[span] for s in (before, after))
+        change, most = np.abs(last - first), np.maximum(np.abs(first), np.abs(last))
+        gains = (self.accelerations(s, s.v, a)[span] for s, a in ((before, pull), (after, pulled)))
+        explained = _UNEXPLAINED * h * np.maximum(*(np.abs(gain) for gain in gains))
+        back = (first * last < 0.0) & (most > _FULL * most.max(initial=0.0))
+        return bool((back & (change > most) & (change > explained)).any())
 
     def closure_error(self, state: State) -> float:
         """Return how far the conditions that close rigid loops are violated [m or rad]."""

@@ -40,3 +40,23 @@ def test_a_rocker_stops_where_its_coupler_and_crank_are_in_line():
         assert "dead point" in run.report.message
     assert np.isfinite(run.y).all()
     assert run.report.closure_error < 1e-9
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-3), fc.GeneralizedAlpha(1e-2)])
+def test_a_loop_is_not_sent_back_from_a_dead_point(method):
+    """A mass on two rigid ropes swings about the line of its supports as a pendulum: what cannot go on is told."""
+    left, right = fc.Rope("left", (-1, 0, 0), (0, 0, -1), EA=1e5), fc.Rope("right", (1, 0, 0), (0, 0, -1), EA=1e5)
+    mass = fc.PointMass("mass", (0, 0, -1), 1.0)
+    s = fc.Structure(
+        [left, right, mass],
+        [fc.Support(left.start), fc.Support(right.start), fc.Pin(left.end, mass.node), fc.Pin(right.end, mass.node)],
+        outputs=[fc.Position("y", mass.node, "y"), fc.Position("z", mass.node, "z")],
+    )
+    model = fc.assemble(s, [fc.Gravity(), fc.LargeRotation()])
+    start = fc.project(model, model.rest, {mass.node: (0.0, 7.0, 0.0)}).state
+    run = fc.simulate(model, until=1.0, start=start, every=0.02, method=method)
+    if run.status is fc.Status.FINISHED:
+        assert run.at(0.48)["y"] == pytest.approx(0.514, abs=0.01)  # DOP853 of the pendulum's equation
+    else:
+        assert "dead point" in run.report.message
+        assert run.t[-1] < 0.4
