@@ -260,6 +260,17 @@ class Watch:
             side = np.sign(fb)
         return found
 
+    def leaps(self, point: Point) -> list[Crossing]:
+        """Return the events that the inputs' jump to those of a point has brought about; sides stay as they are."""
+        values, dusts, found = self.values(point.state, point.supply.u), self.dusts, []
+        for gauge, event in enumerate(self.events):
+            value, side = values[gauge], self.sides[gauge]
+            rising = bool(value > 0.0)
+            missed = Direction.FALLING if rising else Direction.RISING
+            if abs(value) > dusts[gauge] and np.sign(value) == -side and event.direction is not missed:
+                found.append(Crossing(point.state.t, gauge, rising))
+        return found
+
     def offset(self, curve: Curve, before: Point, after: Point, gauge: int) -> float:
         """Return how much later than at the end of a step a gauge is zero, by its slope there."""
         t, h = after.state.t, after.state.t - before.state.t

@@ -184,8 +184,18 @@ class Journey:
             self.point = self.stepper.renew(held, fresh, self.mark.size)
             self.books.jump(self.point)
         if not self.watch.idle:
-            self.watch.settle(self.point)
+            self._leapt()
         self.rows.here(self.point, 1e-6 * self.mark.size)
+
+    def _leapt(self) -> None:
+        """Note the events that a jump of the inputs has brought about; one of them may end the run."""
+        watch, point = self.watch, self.point
+        for crossing in watch.leaps(point):
+            self.events.append(watch.occurrence(crossing, point.state, point.supply.u))
+            if watch.stops(crossing.gauge):
+                name = watch.last_word(crossing.gauge)
+                self.status, self.message = Status.STOPPED, f"{name} at t = {crossing.t:.6g} s"
+        watch.settle(point)
 
     # -- steps of fixed length
 

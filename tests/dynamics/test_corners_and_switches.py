@@ -69,3 +69,22 @@ def test_a_run_with_switches_goes_on_bit_for_bit(model, method, events):
     rest = fc.simulate(machine, pull, until=1.0, method=method, events=events, start=runs["half"].checkpoint)
     assert np.array_equal(rest.final.q, runs["whole"].final.q)
     assert np.array_equal(rest.final.v, runs["whole"].final.v)
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(5e-3)], ids=["adaptive", "fixed"])
+def test_events_on_a_command_happen_where_it_jumps(method, terminal):
+    block = fc.PointMass("block", (0, 0, 0), 1.0)
+    s = fc.Structure(
+        [block],
+        [fc.Support(block.node, "v w")],
+        inputs=[fc.Force("push", block.node, "x")],
+        outputs=[fc.Position("x", block.node, "x")],
+    )
+    model = fc.assemble(s, [fc.LargeRotation()])
+    steps = fc.OpenLoop({"push": lambda t: 0.0 if t < 0.25 else 2.0 if t < 0.55 else -1.0}, sample_time=0.1)
+    event = fc.Event("hard", "push", at=1.0, terminal=terminal)
+    run = fc.simulate(model, steps, until=1.0, events=[event], method=method)
+    times = [0.3] if terminal else [0.3, 0.6]
+    assert [e.t for e in run.events] == pytest.approx(times, abs=1e-12)
+    assert run.status is (fc.Status.STOPPED if terminal else fc.Status.FINISHED)
