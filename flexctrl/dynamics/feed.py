@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,6 +17,10 @@ from flexctrl.model.motion import State
 
 _SMALL = 1e-7
 _NEAR = 1e-10
+
+
+class CommandError(ControllerError):
+    """A controller commands what is no finite number."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +136,11 @@ class Feed:
             )
         for i, value in zip(writes, values):  # noqa: B905 - a few numbers, often: quicker in a list, unchecked again
             u[i] += value
+        if not math.isfinite(sum(u)):
+            name, value = next((n, v) for n, v in zip(self.model.inputs, u, strict=True) if not math.isfinite(v))
+            raise CommandError(
+                f"the controller commands {value} for {name!r}; look at its gains and at what it divides by"
+            )
         return u
 
     def at(self, state: State, before: Supply, h: float) -> Supply:

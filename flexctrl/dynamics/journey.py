@@ -14,7 +14,7 @@ from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Curve, Track
 from flexctrl.dynamics.events import Crossing, Occurrence, Watch
-from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.feed import CommandError, Feed
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.march.stepper import MarchingStepper
@@ -115,6 +115,8 @@ class Journey:
             self.stepper.counts.worst = error.worst
             worst = self.plan.model.coordinates[error.worst]
             self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
+        except CommandError as error:
+            self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
         self.books.close(self.point)
 
     @property

@@ -88,3 +88,22 @@ def test_events_on_a_command_happen_where_it_jumps(method, terminal):
     times = [0.3] if terminal else [0.3, 0.6]
     assert [e.t for e in run.events] == pytest.approx(times, abs=1e-12)
     assert run.status is (fc.Status.STOPPED if terminal else fc.Status.FINISHED)
+
+
+@pytest.mark.parametrize("sample_time", [0.0, 0.1])
+def test_a_command_that_is_no_number_ends_the_run_and_nothing_is_lost(sample_time):
+    block = fc.PointMass("block", (0, 0, 0), 1.0)
+    s = fc.Structure(
+        [block],
+        [fc.Support(block.node, "v w")],
+        inputs=[fc.Force("push", block.node, "x")],
+        outputs=[fc.Position("x", block.node, "x")],
+    )
+    model = fc.assemble(s, [fc.LargeRotation()])
+    broken = fc.OpenLoop({"push": lambda t: 1.0 if t < 0.45 else np.nan}, sample_time=sample_time)
+    run = fc.simulate(model, broken, until=1.0, method=fc.GeneralizedAlpha(0.01))
+    assert run.status is fc.Status.FAILED
+    assert "commands nan for 'push'" in run.report.message
+    assert 0.4 < run.t[-1] <= 0.5
+    assert np.isfinite(run.y).all()
+    assert np.isfinite(run.u).all()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.feed import CommandError, Supply
 from flexctrl.dynamics.march.legs import Held, Leg, Legs, same
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE
@@ -43,6 +43,7 @@ class _Ride:
         j = self.journey = journey
         self.stepper, self.marcher, self.supply = stepper, stepper.marcher, j.point.supply
         self.tick, self.until = 1e-12 * j.plan.until, j.plan.until
+        self.faults: list[CommandError] = []
         stepper.enter(j.point)
         sums = j.books.sums
         self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved)
@@ -66,7 +67,10 @@ class _Ride:
                 well = self._samples(began + _SECONDS)
             else:
                 well = self._leg(stop)
-        return self._end()
+        some = self._end()
+        if self.faults:
+            raise self.faults[0]
+        return some
 
     def _leg(self, stop: float) -> bool:
         """Go on towards a stop; tell whether all is well."""
@@ -115,7 +119,12 @@ class _Ride:
                 break
             t = clock[0] = times[done - 1] = stop
             stops.passed += 1
-            before, (u, x) = u, told(stop, x, y[done - 1].take(reads))
+            before = u
+            try:
+                u, x = told(stop, x, y[done - 1].take(reads))
+            except CommandError as fault:
+                self.faults.append(fault)
+                break
             if u != before:
                 marcher.jumps(u)
         mark.size, self.supply = h, Supply(np.array(u), x, held.rate)
@@ -133,7 +142,7 @@ class _Ride:
             self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
             m.jumping = 0
             mark.left = 0
-        return status == DONE and self.jumped
+        return status == DONE and self.jumped and not self.faults
 
     def _paced(self, t: float, stop: float) -> tuple[float | Pacing, int]:
         """How steps are taken from here, and how many at most."""
@@ -169,7 +178,11 @@ class _Ride:
         j.mark.left = 0
         y = self.marcher.rows[m.done - 1, 1:]
         feed, before = j.plan.feed, self.supply
-        self.supply = feed.sampled(stop, y[feed.reads], before)
+        try:
+            self.supply = feed.sampled(stop, y[feed.reads], before)
+        except CommandError as fault:
+            self.faults.append(fault)
+            return False
         u = self.supply.u
         if j.rows.row(stop, y, u, 1e-6 * j.mark.size) and abs(self.last.t - stop) < self.tick:
             j.rows.frame(self.last)
