@@ -242,8 +242,13 @@ class Stepper:
         h = after.state.t - before.state.t
         c = self.coefficients
         local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self.weight
-        allowed = tolerance.of(float((moved * self.weight).max(initial=0.0)))
+        allowed = tolerance.of(float(far(moved * self.weight, self.turning).max(initial=0.0)))
         return float(local.max(initial=0.0)) / allowed
+
+
+def far(moved: np.ndarray, turning: np.ndarray) -> np.ndarray:
+    """Return what counts of how far freedoms have moved: of a rotation no more than a radian."""
+    return np.where(turning, np.minimum(moved, 1.0), moved)
 
 
 def _trend(before: AlphaPoint, rate: np.ndarray, weight: np.ndarray) -> np.ndarray:

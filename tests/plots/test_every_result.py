@@ -15,7 +15,7 @@ from flexctrl.cranes import bridge_crane
 from flexctrl.design import MinimumJerk, Shaper, Trajectory, convolve, zv, zvd
 
 EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(alpha=0.01, beta=1.5e-3))
-NOT_RESULTS = {"State", "BranchPoint", "LimitPoint", "ErrorReport", "Checkpoint"}
+NOT_RESULTS = {"State", "BranchPoint", "LimitPoint", "ErrorReport", "Checkpoint", "Projection"}
 """Public classes with arrays that are parts of a result that draws itself."""
 
 

@@ -111,7 +111,7 @@ def controlled(m: March) -> int:
         error = 0.0
         if status == DONE:
             judge(m)
-            error = m.error / (m.absolute + m.relative * min(m.reached, 1.0))
+            error = m.error / (m.absolute + m.relative * m.reached)
         if status != DONE or error > 1.0:
             m.rejected += 1
             m.size = 0.25 * m.h if status != DONE else m.h * max(0.2, 0.9 * growth(error))
@@ -159,6 +159,7 @@ def accept(m: March) -> None:
     f = m.flat
     keep(f)
     zero = 0.0 * eight(m.weight)
+    one = zero + 1.0
     still = zero
     onward = zero
     far = zero
@@ -168,7 +169,9 @@ def accept(m: March) -> None:
         still = still + abs(change) * eight(m.weight[i:])
         onward = onward + abs(change - eight(m.trend[i:])) * eight(m.weight[i:])
         reach = larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:])))
-        far = larger(far, reach * eight(m.weight[i:]))
+        way = reach * eight(m.weight[i:])
+        radian = way + one - larger(way, one)
+        far = larger(far, way + eight(m.turns[i:]) * (radian - way))
         put(m.reach[i:], reach)
         put(m.trend[i:], change)
         put(m.rate[i:], rate)

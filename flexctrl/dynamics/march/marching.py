@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
+from flexctrl.dynamics.alpha import far as counted
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.loops import run
@@ -218,7 +219,7 @@ class Marcher:
         """
         m, F = self.march, self.flattened
         m.first[:], m.reach[:] = F.ordered(first), F.ordered(moved)
-        m.reached = float((moved * self.method.weight).max(initial=0.0))
+        m.reached = float(counted(moved * self.method.weight, self.method.turning).max(initial=0.0))
         m.losing, m.gained, m.lost = int(losing), 0.0, 0.0
         self._do(SETTLE)
 

@@ -43,7 +43,7 @@ class _Ride:
         j = self.journey = journey
         self.stepper, self.marcher, self.supply = stepper, stepper.marcher, j.point.supply
         self.tick, self.until = 1e-12 * j.plan.until, j.plan.until
-        self.faults: list[CommandError] = []
+        self.faults: list[CommandError | KeyboardInterrupt] = []
         stepper.enter(j.point)
         sums = j.books.sums
         self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved)
@@ -122,7 +122,7 @@ class _Ride:
             before = u
             try:
                 u, x = told(stop, x, y[done - 1].take(reads))
-            except CommandError as fault:
+            except (CommandError, KeyboardInterrupt) as fault:
                 self.faults.append(fault)
                 break
             if u != before:
@@ -180,7 +180,7 @@ class _Ride:
         feed, before = j.plan.feed, self.supply
         try:
             self.supply = feed.sampled(stop, y[feed.reads], before)
-        except CommandError as fault:
+        except (CommandError, KeyboardInterrupt) as fault:
             self.faults.append(fault)
             return False
         u = self.supply.u
