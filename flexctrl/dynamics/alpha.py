@@ -248,7 +248,8 @@ class Stepper:
 
 def far(moved: np.ndarray, turning: np.ndarray) -> np.ndarray:
     """Return what counts of how far freedoms have moved: of a rotation no more than a radian."""
-    return np.where(turning, np.minimum(moved, 1.0), moved)
+    radian = moved + 1.0 - np.maximum(moved, 1.0)
+    return moved + turning * (radian - moved)  # to the bit what the compiled loops work out
 
 
 def _trend(before: AlphaPoint, rate: np.ndarray, weight: np.ndarray) -> np.ndarray:

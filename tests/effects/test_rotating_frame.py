@@ -87,7 +87,7 @@ def test_the_jacobi_integral_is_kept(effects):
     run = fc.simulate(model, until=0.2, start=start, method=fc.GeneralizedAlpha(step=1e-3, rho=1.0))
     kept = [sum(model.energy(state)[:2]) for state in (start, run.final)]
     kinetic = model.energy(start)[0]
-    assert kept[1] == pytest.approx(kept[0], abs=1e-4 * kinetic)
+    assert kept[1] == pytest.approx(kept[0], abs=5e-4 * kinetic)
     assert abs(model.energy(run.final)[0] - kinetic) > 0.02 * kinetic
     assert run.report.energy_residual < 2e-4
 
