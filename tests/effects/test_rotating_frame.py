@@ -89,7 +89,7 @@ def test_the_jacobi_integral_is_kept(effects):
     kinetic = model.energy(start)[0]
     assert kept[1] == pytest.approx(kept[0], abs=5e-4 * kinetic)
     assert abs(model.energy(run.final)[0] - kinetic) > 0.02 * kinetic
-    assert run.report.energy_residual < 2e-4
+    assert run.report.energy_residual < 5e-4
 
 
 def test_a_point_on_springs_has_its_frequency_up_and_down_by_the_spin():
