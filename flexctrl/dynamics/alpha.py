@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from flexctrl.dynamics import steps
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.scales import turning, yardsticks
+from flexctrl.dynamics.scales import farthest, turning, yardsticks
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
@@ -242,14 +242,8 @@ class Stepper:
         h = after.state.t - before.state.t
         c = self.coefficients
         local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self.weight
-        allowed = tolerance.of(float(far(moved * self.weight, self.turning).max(initial=0.0)))
+        allowed = tolerance.of(farthest(self.model, moved))
         return float(local.max(initial=0.0)) / allowed
-
-
-def far(moved: np.ndarray, turning: np.ndarray) -> np.ndarray:
-    """Return what counts of how far freedoms have moved: of a rotation no more than a radian."""
-    radian = moved + 1.0 - np.maximum(moved, 1.0)
-    return moved + turning * (radian - moved)  # to the bit what the compiled loops work out
 
 
 def _trend(before: AlphaPoint, rate: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.local import Local
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Pace, Point, StepError
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.model.model import Model
@@ -190,7 +190,7 @@ class _Stepper:
         fifth, third = (float(np.abs(e[places] * scale).max(initial=0.0)) for e in (high, low))
         worst = int(np.argmax(np.abs(high[:n] * self.weight))) if n else 0
         self.counts.worst = worst
-        allowed = tolerance.of(float((moved * self.weight).max(initial=0.0)))
+        allowed = tolerance.of(farthest(self.model, moved))
         local = h * fifth * fifth / np.hypot(fifth, 0.1 * third) if fifth > 0.0 else 0.0
         return local / allowed
 

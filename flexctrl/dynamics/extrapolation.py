@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from flexctrl.dynamics.dense import Curve, curves_of
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import Counts, Integrator, Pace, Point, Stepper
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
@@ -165,7 +165,7 @@ class _Stepper:
     def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the error that the step added to the finer run, over what is allowed."""
         local = self.weight * np.abs(after.gap - before.gap) * self.yard
-        allowed = tolerance.of(float((moved * self.yard).max(initial=0.0)))
+        allowed = tolerance.of(farthest(self.model, moved))
         return float(local.max(initial=0.0)) / allowed
 
     def curve(self, before: _Point, after: _Point) -> Curve:

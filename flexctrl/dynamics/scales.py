@@ -8,7 +8,7 @@ import numpy as np
 
 from flexctrl.model.model import Model
 
-__all__ = ["turning", "yardsticks"]
+__all__ = ["farthest", "turning", "yardsticks"]
 
 _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
 
@@ -38,6 +38,27 @@ def _yardsticks(model: Model) -> np.ndarray:
     known = gears | model.motion.scales
     pairs = zip(model.coordinates, turning(model), strict=True)
     return np.array([known.get(name, 1.0 if turns else size) for name, turns in pairs])
+
+
+def farthest(model: Model, moved: np.ndarray) -> float:
+    """Return how far the freedom has moved that has moved most: what relative tolerances are relative to.
+
+    A rotation counts as a radian at most, or what spins would excuse errors of all else.
+
+    Parameters
+    ----------
+    model : Model
+    moved : numpy.ndarray, shape (n,)
+        Largest distance of each degree of freedom from where it began.
+
+    Returns
+    -------
+    float
+        In yardsticks.
+    """
+    way = moved * (1.0 / yardsticks(model))
+    radian = way + 1.0 - np.maximum(way, 1.0)  # the compiled loops work this out in the same order, to the bit
+    return float((way + turning(model) * (radian - way)).max(initial=0.0))
 
 
 def _once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:

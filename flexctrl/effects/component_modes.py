@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeGuard
 
-from flexctrl.effects.effect import Effect, Inner
+from flexctrl.effects.effect import Inner
 from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.errors import StructureError
 from flexctrl.structure.drives import Drive
@@ -50,10 +50,6 @@ class ComponentModes(BeamFlexibility):
         if found != int(found) or found > _MOST:
             raise StructureError(f"ComponentModes: count = {count!r}; expected a whole number from 0 to {_MOST}")
         object.__setattr__(self, "count", int(found))
-
-    def everywhere(self) -> Effect:
-        """The effect on every beam."""
-        return ComponentModes(self.count)
 
     def check_on(self, structure: Structure) -> None:
         """Refuse sections that shear."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,9 +31,6 @@ from flexctrl.structure.signals import (
     SwayAngle,
     Tension,
 )
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["Gauges", "gauges_of", "read"]
 

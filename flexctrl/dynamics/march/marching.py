@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
-from flexctrl.dynamics.alpha import far as counted
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.loops import run
@@ -32,6 +31,7 @@ from flexctrl.dynamics.march.record import (
     Factors,
     March,
 )
+from flexctrl.dynamics.scales import farthest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
@@ -219,7 +219,7 @@ class Marcher:
         """
         m, F = self.march, self.flattened
         m.first[:], m.reach[:] = F.ordered(first), F.ordered(moved)
-        m.reached = float(counted(moved * self.method.weight, self.method.turning).max(initial=0.0))
+        m.reached = farthest(self.model, moved)
         m.losing, m.gained, m.lost = int(losing), 0.0, 0.0
         self._do(SETTLE)
 

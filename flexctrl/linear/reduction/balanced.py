@@ -68,7 +68,7 @@ class BalancedTruncation:
         ReductionError
             If the order does not even hold the states that cannot be balanced.
         """
-        full = replace(full, place=None)  # of these matrices, not of what the machine tells beyond their digits
+        full = _of_matrices(full)
         exact, stable, feedthrough, bases, rounding = _balanced(full, 0 if _complete(full) else POOL * self.order)
         kept = len(exact.A)
         if self.order < max(kept, 1):
@@ -97,6 +97,12 @@ def hankel_singular_values(linear: LinearModel) -> np.ndarray:
     """
     full = linear.condense()
     return _balanced(full, 0 if _complete(full) else COMPLETE)[3].hankel
+
+
+@lru_cache(maxsize=1)
+def _of_matrices(full: LinearModel) -> LinearModel:
+    """The model as its matrices tell, without what the machine knows beyond their digits: one for all orders tried."""
+    return replace(full, place=None)
 
 
 def _complete(full: LinearModel) -> bool:
