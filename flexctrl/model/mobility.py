@@ -12,8 +12,9 @@ from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
 from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import cross
-from flexctrl.model.linkage import Link, Linkage, Loop, renumbered
+from flexctrl.model.linkage import Linkage
 from flexctrl.model.motion import Dry, Motion, State
+from flexctrl.model.open_linkage import Link, Loop, renumbered
 from flexctrl.model.twists import Twists
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
