@@ -16,11 +16,12 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.rope_mass import RopeMass
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.kernels.kernel import Backend, best_backend
+from flexctrl.model.equations import Small
 from flexctrl.model.equilibrium import equilibrium
 from flexctrl.model.frictions import inner_freedoms
 from flexctrl.model.linearize import linearize
 from flexctrl.model.mobility import motion_of
-from flexctrl.model.model import Model, Small
+from flexctrl.model.model import Model
 from flexctrl.structure.cut import cut_ropes
 from flexctrl.structure.elements import Beam, Rope
 from flexctrl.structure.freedoms import listed

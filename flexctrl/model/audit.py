@@ -10,6 +10,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+from flexctrl.model.tangents import tangents
 
 __all__ = ["Audit", "Freedom", "audit"]
 
@@ -34,6 +35,6 @@ def audit(model: Model, at: Rest | State | None = None) -> Audit:
     """
     state = (model.rest if at is None else at.state if isinstance(at, Rest) else at).loose
     u, n = at.inputs if isinstance(at, Rest) else np.zeros(len(model.inputs)), model.n
-    M, C, K = model.tangents(state, u)
+    M, C, K = tangents(model, state, u)
     none = np.zeros((n, 0)), np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, 0))
     return audit_linear(LinearModel(M, C, 0.5 * (K + K.T), *none, model.coordinates, (), ()))

@@ -12,8 +12,9 @@ import scipy.sparse as sp
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.model.mixed import Excess
-from flexctrl.model.model import TURNS, Model
+from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+from flexctrl.model.tangents import TURNS
 
 __all__ = ["Balance"]
 

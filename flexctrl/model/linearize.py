@@ -16,6 +16,7 @@ from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+from flexctrl.model.tangents import tangents
 from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque
 
 _BALANCED, _ROUND_OFF = 1e-6, 1e-12
@@ -81,16 +82,16 @@ def _without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:
 def _derivative(
     model: Model, state: State, u: np.ndarray, free: np.ndarray, unsymmetric: bool
 ) -> tuple[LinearModel, float]:
-    M, C, K = (A[free][:, free] for A in model.tangents(state, u))
+    M, C, K = (A[free][:, free] for A in tangents(model, state, u))
     largest = float(abs(K).max()) if K.nnz else 0.0
     asymmetry = float(abs(K - K.T).max()) / max(largest, 1e-300) if K.nnz else 0.0
-    T = model.motion.jacobian(state if model.large else model.rest)[:, free]
+    T = model.motion.jacobian(model.place(state))[:, free]
     on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=np.zeros(model.n))), model.motion.raw)
     linear = LinearModel(
         M=_symmetric(M),
         C=C.tocsc(),
         K=K.tocsc() if unsymmetric and asymmetry > _ROUND_OFF else _symmetric(K),
-        B=(T.T @ model.signals.loads_at(state if model.large else model.rest)).toarray(),
+        B=(T.T @ model.signals.loads_at(model.place(state))).toarray(),
         Cq=(on_place @ T).toarray(),
         Cv=(on_rates @ T).toarray(),
         D=np.zeros((len(model.outputs), len(model.inputs))),

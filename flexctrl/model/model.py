@@ -15,9 +15,8 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.kernels.kernel import Backend
-from flexctrl.linear.dust import clean_mass, clean_stiffness
-from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.assembly import assembled, mass_blocks, modal_blocks, stiffness_blocks
+from flexctrl.model.equations import Equations, LargeMotion, Small, SmallMotion
 from flexctrl.model.families import families_of
 from flexctrl.model.forces import Forces
 from flexctrl.model.frictions import friction_families, lag_blocks
@@ -38,19 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from flexctrl.model.equilibrium import Rest
-
-TURNS = ("_rx", "_ry", "_rz", "_turn")
-_LAST_DIGITS, _CAUTION = 1e-14, 30.0
-
-
-@dataclass(frozen=True, eq=False)
-class Small:
-    """Constant matrices of a model that moves little: load − K q − C v − M a."""
-
-    load: np.ndarray
-    K: sp.csc_matrix
-    C: sp.csr_matrix
-    M: sp.csc_matrix
 
 
 @dataclass(frozen=True)
@@ -105,6 +91,11 @@ class Model:
         """Whether parts may move as far as they like."""
         return any(isinstance(e, LargeRotation) for e in self.effects)
 
+    @cached_property
+    def equations(self) -> Equations:
+        """The equations of motion: those of small motion unless parts may move as far as they like."""
+        return LargeMotion(self) if self.large else SmallMotion(self)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What was held or released so that rigid loops close."""
@@ -156,26 +147,6 @@ class Model:
         """Return M at rest from the consistent element matrices, shape (n, n), in the order of `coordinates`."""
         return self.about.M if self.about else self._mass
 
-    def tangents(self, state: State, u: np.ndarray) -> tuple[sp.csc_matrix, sp.csc_matrix, sp.csc_matrix]:
-        """Return M, C and K in a state at rest, without the rounding of what has no mass or no stiffness at all.
-
-        Parameters
-        ----------
-        state : State
-        u : numpy.ndarray, shape (inputs,)
-
-        Returns
-        -------
-        tuple of 3 scipy.sparse.csc_matrix, shape (n, n)
-            M symmetric; the others as they come.
-        """
-        still, place = np.zeros(self.n), state if self.large else self.rest
-        seeds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
-        M, C, K = ((-self.slope(state, still, still, seed, u)).tocsc() for seed in seeds)
-        sizes = abs(self.motion.jacobian(place)).T @ np.sqrt(self.forces.inertias(place))
-        M = clean_mass(0.5 * (M + M.T), sizes, self._groups)
-        return M, C, clean_stiffness(K, self._unsure(state, u, K), self._groups) if self.large else K
-
     def strain(self, state: State, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
         """Return ΦᵀKΦ of some motions in a state at rest, where that can be had without the rounding of K's entries.
 
@@ -189,39 +160,7 @@ class Model:
         -------
         numpy.ndarray, shape (k, k)
         """
-        if not self.large:
-            return motions.T @ (self._small.K @ motions)
-        raw, loads = self.motion.jacobian(state) @ motions, self.signals.loads_at(state) @ u
-        total = self.forces.strain(state, raw)
-        if not self.motion.plain:
-            still = np.zeros(self.n)
-            total = total - motions.T @ (
-                self.motion.stiffening(state, self.forces.raw(state, still, still) + loads) @ motions
-            )
-        return total - raw.T @ (self.signals.turning(state, u) @ raw) if self.signals.follows else total
-
-    def _unsure(self, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.ndarray:
-        """By how much entries in each row of K change with the last digits of the places, with some caution."""
-        reach = max(self.structure.size, float(np.abs(state.x).max(initial=0.0)))
-        still, largest = np.zeros(self.n), np.zeros(self.n)
-        turning = np.array([name.endswith(TURNS) for name in self.coordinates], dtype=bool)
-        for seed in range(2):
-            signs = np.random.default_rng(seed).choice((-1.0, 1.0), self.n)
-            near = self.advance(state, _LAST_DIGITS * signs * np.where(turning, 1.0, reach), still, 0.0)
-            change = abs(K + self.slope(near, still, still, (1.0, 0.0, 0.0), u))
-            largest = np.maximum(largest, change.max(axis=1).toarray().ravel())
-        return _CAUTION * largest
-
-    @cached_property
-    def _groups(self) -> tuple[np.ndarray, ...]:
-        """The coordinates that are the displacements or the turns of one node together; others by themselves."""
-        kinds = {end: kind for kind in (("_u", "_v", "_w"), ("_rx", "_ry", "_rz")) for end in kind}
-        nodes: dict[tuple[str, tuple[str, ...]], list[int]] = {}
-        for i, name in enumerate(self.coordinates):
-            head, end = name[: name.rfind("_")], name[name.rfind("_") :]
-            nodes.setdefault((head, kinds[end]) if end in kinds else (name, ()), []).append(i)
-        sizes = {len(places) for places in nodes.values()}
-        return tuple(np.array([p for p in nodes.values() if len(p) == size], dtype=int) for size in sorted(sizes))
+        return self.equations.strain(state, u, motions)
 
     def stiffness(self) -> sp.csc_matrix:
         """Return K at rest from the element matrices, shape (n, n); it may be singular.
@@ -248,16 +187,6 @@ class Model:
         """Which parts resist deformation at rest."""
         return lambda part: (isinstance(part, Spring) or self.bends(part)) and part.name not in loose
 
-    @cached_property
-    def _small(self) -> Small:
-        """The matrices of the linear model."""
-        if self.about:
-            return self.about
-        still = np.zeros(self.n)
-        load = self.forces.balance(self.rest, still, still)
-        damping = -self.forces.slope(self.rest, still, still, (0.0, 1.0, 0.0)).tocsr()
-        return Small(load, self._stiffness, damping + self.viscous, self._mass)
-
     def input_vector(self, inputs: Mapping[str, float]) -> np.ndarray:
         """Return input values in order; what is not named is zero.
 
@@ -283,6 +212,19 @@ class Model:
             u[self.inputs.index(name)] = check_finite(value, f"input {name!r}", "model")
         return u
 
+    def place(self, state: State) -> State:
+        """Return where levers and directions of forces are taken: the state, or the shape at rest in small motion.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        State
+        """
+        return self.equations.place(state)
+
     def loads(self, state: State, u: np.ndarray) -> np.ndarray:
         """Return Tᵀ B u, the generalised forces of the inputs.
 
@@ -295,9 +237,7 @@ class Model:
         -------
         numpy.ndarray, shape (n,)
         """
-        place = state if self.large else self.rest
-        force = self.motion.collect(place, self.signals.loads_at(place) @ u)
-        return self.switches.freed(state, force) if self.switches.sticks(state) else force
+        return self.equations.loads(state, u)
 
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the sum of all forces on the degrees of freedom except the inputs; zero when they obey.
@@ -312,12 +252,7 @@ class Model:
         -------
         numpy.ndarray, shape (n,)
         """
-        if self.large:
-            force = self.forces.balance(state, v, a)
-            force = force - self.viscous @ v if self.viscous.nnz else force
-            return self.switches.held(state, v, a, force) if self.switches.sticks(state) else force
-        small = self._small
-        return small.load - small.K @ state.q - small.C @ v - small.M @ a
+        return self.equations.balance(state, v, a)
 
     def slope(
         self,
@@ -345,15 +280,7 @@ class Model:
         -------
         scipy.sparse.csr_matrix, shape (n, n)
         """
-        if self.large:
-            slope = self.forces.slope(state, v, a, seeds, self.signals.loads_at(state) @ u, excess)
-            if seeds[0] and self.signals.follows:
-                T = self.motion.jacobian(state)
-                slope = (slope + seeds[0] * (T.T @ self.signals.turning(state, u) @ T)).tocsr()
-            slope = slope - seeds[1] * self.viscous if self.viscous.nnz else slope
-            return self.switches.held_slope(state, slope, seeds) if self.switches.sticks(state) else slope
-        small = self._small
-        return -(seeds[0] * small.K + seeds[1] * small.C + seeds[2] * small.M).tocsr()
+        return self.equations.slope(state, v, a, seeds, u, excess)
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
         """Return the state after a step of the degrees of freedom.
@@ -372,13 +299,7 @@ class Model:
         -------
         State
         """
-        if self.large:
-            return self.motion.advance(state, step, v, t)
-        q = state.q + step
-        raw = (self.motion.jacobian(self.rest) @ q)[: self.motion.source_base].reshape(-1, 6)
-        x, R = self.rest.x + raw[:, :3], exponential(raw[:, 3:]) @ self.rest.R
-        shown = self.motion.shown(self.rest.shown, q, R)
-        return State(x, R, q, v, self.motion.unwound(x, R, state.driven), t, state.dry, shown)
+        return self.equations.advance(state, step, v, t)
 
     def rates(self, state: State) -> np.ndarray:
         """Return the raw rates of a state: velocities and spins of all nodes, then the speeds of the motors.
@@ -391,7 +312,7 @@ class Model:
         -------
         numpy.ndarray, shape (raw,)
         """
-        return self.motion.rates(state if self.large else self.rest, state.v)
+        return self.motion.rates(self.place(state), state.v)
 
     def measure(self, state: State) -> np.ndarray:
         """Return the outputs of a state.
@@ -417,13 +338,7 @@ class Model:
         -------
         tuple of 3 floats
         """
-        if self.large:
-            kinetic, stored, power = self.forces.energy(state, state.v)
-            return kinetic, stored, power + float(state.v @ (self.viscous @ state.v))
-        small = self._small
-        kinetic = 0.5 * float(state.v @ (small.M @ state.v))
-        stored = 0.5 * float(state.q @ (small.K @ state.q)) - float(small.load @ state.q)
-        return kinetic, stored, float(state.v @ (small.C @ state.v))
+        return self.equations.energy(state)
 
     def displace(self, q: Mapping[str, float] | np.ndarray) -> State:
         """Return the machine at rest after a displacement of the degrees of freedom from the drawn shape.

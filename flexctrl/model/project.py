@@ -240,5 +240,5 @@ def _moving(
 
 def _rows(model: Model, state: State, numbers: np.ndarray, count: int) -> sp.csr_matrix:
     """The first rows of each node in T."""
-    T = model.motion.jacobian(state if model.large else model.rest)
+    T = model.motion.jacobian(model.place(state))
     return T[(6 * numbers[:, None] + np.arange(count)).ravel()]

@@ -1,0 +1,189 @@
+"""How a model's equations of motion read: where parts move as far as they like, and where they move little."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.mechanics.rotation import exponential
+from flexctrl.model.mixed import Excess
+from flexctrl.model.motion import State
+
+if TYPE_CHECKING:
+    from flexctrl.model.model import Model
+
+__all__ = ["Equations", "LargeMotion", "Small", "SmallMotion"]
+
+Seeds = tuple[float, float, float]
+
+
+class Equations(Protocol):
+    """Forces and motion of a model; `Model` says what each method gives."""
+
+    def place(self, state: State) -> State:
+        """Return where levers and directions of forces are taken."""
+        ...
+
+    def loads(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return the generalised forces of the inputs, shape (n,)."""
+        ...
+
+    def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the sum of all other forces, shape (n,)."""
+        ...
+
+    def slope(
+        self, state: State, v: np.ndarray, a: np.ndarray, seeds: Seeds, u: np.ndarray, excess: Excess | None
+    ) -> sp.csr_matrix:
+        """Return the slope of all forces, shape (n, n)."""
+        ...
+
+    def strain(self, state: State, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of some motions, shape (k, k)."""
+        ...
+
+    def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
+        """Return the state after a step."""
+        ...
+
+    def energy(self, state: State) -> tuple[float, float, float]:
+        """Return kinetic energy [J], stored energy [J] and dissipated power [W]."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class LargeMotion:
+    """Equations about the place where the machine is: Tᵀ (f(x, v, a) + loads) − viscous v = 0.
+
+    Attributes
+    ----------
+    model : Model
+    """
+
+    model: Model
+
+    def place(self, state: State) -> State:
+        """Return where levers and directions of forces are taken: where the machine is."""
+        return state
+
+    def loads(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return the generalised forces of the inputs; what sticks does not move."""
+        force = self.model.motion.collect(state, self.model.signals.loads_at(state) @ u)
+        switches = self.model.switches
+        return switches.freed(state, force) if switches.sticks(state) else force
+
+    def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the sum of all other forces."""
+        viscous, switches = self.model.viscous, self.model.switches
+        force = self.model.forces.balance(state, v, a)
+        force = force - viscous @ v if viscous.nnz else force
+        return switches.held(state, v, a, force) if switches.sticks(state) else force
+
+    def slope(
+        self, state: State, v: np.ndarray, a: np.ndarray, seeds: Seeds, u: np.ndarray, excess: Excess | None
+    ) -> sp.csr_matrix:
+        """Return the slope of all forces."""
+        model, switches = self.model, self.model.switches
+        slope = model.forces.slope(state, v, a, seeds, model.signals.loads_at(state) @ u, excess)
+        if seeds[0] and model.signals.follows:
+            T = model.motion.jacobian(state)
+            slope = (slope + seeds[0] * (T.T @ model.signals.turning(state, u) @ T)).tocsr()
+        slope = slope - seeds[1] * model.viscous if model.viscous.nnz else slope
+        return switches.held_slope(state, slope, seeds) if switches.sticks(state) else slope
+
+    def strain(self, state: State, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of some motions, without the rounding of K's entries."""
+        model, motion, signals = self.model, self.model.motion, self.model.signals
+        raw, loads = motion.jacobian(state) @ motions, signals.loads_at(state) @ u
+        total = model.forces.strain(state, raw)
+        if not motion.plain:
+            still = np.zeros(model.n)
+            total = total - motions.T @ (
+                motion.stiffening(state, model.forces.raw(state, still, still) + loads) @ motions
+            )
+        return total - raw.T @ (signals.turning(state, u) @ raw) if signals.follows else total
+
+    def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
+        """Return the state after a step."""
+        return self.model.motion.advance(state, step, v, t)
+
+    def energy(self, state: State) -> tuple[float, float, float]:
+        """Return kinetic energy, stored energy and dissipated power."""
+        kinetic, stored, power = self.model.forces.energy(state, state.v)
+        return kinetic, stored, power + float(state.v @ (self.model.viscous @ state.v))
+
+
+@dataclass(frozen=True, eq=False)
+class Small:
+    """Constant matrices of a model that moves little: load − K q − C v − M a."""
+
+    load: np.ndarray
+    K: sp.csc_matrix
+    C: sp.csr_matrix
+    M: sp.csc_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class SmallMotion:
+    """Linear equations about the drawn shape, or about another place: load + loads − K q − C v − M a = 0.
+
+    Attributes
+    ----------
+    model : Model
+    """
+
+    model: Model
+
+    @cached_property
+    def matrices(self) -> Small:
+        """The matrices; those of the elements and the damping at rest unless the model brings its own."""
+        model = self.model
+        if model.about:
+            return model.about
+        still = np.zeros(model.n)
+        load = model.forces.balance(model.rest, still, still)
+        damping = -model.forces.slope(model.rest, still, still, (0.0, 1.0, 0.0)).tocsr()
+        return Small(load, model.stiffness(), damping + model.viscous, model.mass())
+
+    def place(self, state: State) -> State:
+        """Return where levers and directions of forces are taken: at rest."""
+        return self.model.rest
+
+    def loads(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return the generalised forces of the inputs."""
+        rest = self.model.rest
+        return self.model.motion.collect(rest, self.model.signals.loads_at(rest) @ u)
+
+    def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the sum of all other forces."""
+        m = self.matrices
+        return m.load - m.K @ state.q - m.C @ v - m.M @ a
+
+    def slope(
+        self, state: State, v: np.ndarray, a: np.ndarray, seeds: Seeds, u: np.ndarray, excess: Excess | None
+    ) -> sp.csr_matrix:
+        """Return the slope of all forces."""
+        m = self.matrices
+        return -(seeds[0] * m.K + seeds[1] * m.C + seeds[2] * m.M).tocsr()
+
+    def strain(self, state: State, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of some motions."""
+        return motions.T @ (self.matrices.K @ motions)
+
+    def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
+        """Return the state after a step; what is shown moves to first order."""
+        motion, rest = self.model.motion, self.model.rest
+        q = state.q + step
+        raw = (motion.jacobian(rest) @ q)[: motion.source_base].reshape(-1, 6)
+        x, R = rest.x + raw[:, :3], exponential(raw[:, 3:]) @ rest.R
+        return State(x, R, q, v, motion.unwound(x, R, state.driven), t, state.dry, motion.shown(rest.shown, q, R))
+
+    def energy(self, state: State) -> tuple[float, float, float]:
+        """Return kinetic energy, stored energy and dissipated power."""
+        m, q, v = self.matrices, state.q, state.v
+        stored = 0.5 * float(q @ (m.K @ q)) - float(m.load @ q)
+        return 0.5 * float(v @ (m.M @ v)), stored, float(v @ (m.C @ v))

@@ -1,0 +1,61 @@
+"""Mass, damping and stiffness of a model in a state at rest, without the rounding of what has none."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.linear.dust import clean_mass, clean_stiffness
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["TURNS", "tangents"]
+
+TURNS = ("_rx", "_ry", "_rz", "_turn")
+_LAST_DIGITS, _CAUTION = 1e-14, 30.0
+
+
+def tangents(model: Model, state: State, u: np.ndarray) -> tuple[sp.csc_matrix, sp.csc_matrix, sp.csc_matrix]:
+    """Return M, C and K in a state at rest, without the rounding of what has no mass or no stiffness at all.
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+    u : numpy.ndarray, shape (inputs,)
+
+    Returns
+    -------
+    tuple of 3 scipy.sparse.csc_matrix, shape (n, n)
+        M symmetric; the others as they come.
+    """
+    still, groups, place = np.zeros(model.n), _groups(model.coordinates), model.place(state)
+    seeds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    M, C, K = ((-model.slope(state, still, still, seed, u)).tocsc() for seed in seeds)
+    sizes = abs(model.motion.jacobian(place)).T @ np.sqrt(model.forces.inertias(place))
+    M = clean_mass(0.5 * (M + M.T), sizes, groups)
+    return M, C, clean_stiffness(K, _unsure(model, state, u, K), groups) if model.large else K
+
+
+def _unsure(model: Model, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.ndarray:
+    """By how much entries in each row of K change with the last digits of the places, with some caution."""
+    reach = max(model.structure.size, float(np.abs(state.x).max(initial=0.0)))
+    still, largest = np.zeros(model.n), np.zeros(model.n)
+    turning = np.array([name.endswith(TURNS) for name in model.coordinates], dtype=bool)
+    for seed in range(2):
+        signs = np.random.default_rng(seed).choice((-1.0, 1.0), model.n)
+        near = model.advance(state, _LAST_DIGITS * signs * np.where(turning, 1.0, reach), still, 0.0)
+        change = abs(K + model.slope(near, still, still, (1.0, 0.0, 0.0), u))
+        largest = np.maximum(largest, change.max(axis=1).toarray().ravel())
+    return _CAUTION * largest
+
+
+def _groups(coordinates: tuple[str, ...]) -> tuple[np.ndarray, ...]:
+    """The coordinates that are the displacements or the turns of one node together; others by themselves."""
+    kinds = {end: kind for kind in (("_u", "_v", "_w"), ("_rx", "_ry", "_rz")) for end in kind}
+    nodes: dict[tuple[str, tuple[str, ...]], list[int]] = {}
+    for i, name in enumerate(coordinates):
+        head, end = name[: name.rfind("_")], name[name.rfind("_") :]
+        nodes.setdefault((head, kinds[end]) if end in kinds else (name, ()), []).append(i)
+    sizes = {len(places) for places in nodes.values()}
+    return tuple(np.array([p for p in nodes.values() if len(p) == size], dtype=int) for size in sorted(sizes))
