@@ -27,6 +27,7 @@ class Freedom(Enum):
     DYNAMIC = "dynamic"
     STATIC = "massless but stiff"
     RELAXING = "massless but damped"
+    FALLING = "massless on negative stiffness"
     MECHANISM = "mechanism"
 
 
@@ -108,7 +109,7 @@ class Scaled:
 
 
 def audit(linear: LinearModel) -> Audit:
-    """Label every coordinate dynamic, static, relaxing or mechanism.
+    """Label every coordinate dynamic, static, relaxing, falling or mechanism.
 
     Parameters
     ----------
@@ -125,6 +126,7 @@ def audit(linear: LinearModel) -> Audit:
     for basis, kind in (
         (kinds.static, Freedom.STATIC),
         (kinds.relaxing, Freedom.RELAXING),
+        (kinds.falling, Freedom.FALLING),
         (kinds.mechanisms, Freedom.MECHANISM),
     ):
         for i in pivots(basis):
@@ -148,15 +150,21 @@ def scaled(linear: LinearModel) -> Scaled:
     ------
     MechanismError
         For a motion with neither mass nor stiffness (nor damping), by coordinate names.
+    LinearizationError
+        For a motion without mass on negative stiffness: as its mass vanishes it runs away ever faster.
     """
     result = linear._scaled
-    loose = _moving(result.massless.mechanisms, linear.coordinates)
-    if loose:
-        words = motions_in_words(result.massless.mechanisms, linear.coordinates, result.scales)
-        motions = "; ".join(f"{' with '.join(names)} ({said})" for names, said in zip(loose, words, strict=True))
+    loose, falling = result.massless.mechanisms, result.massless.falling
+    if loose.shape[1]:
         raise MechanismError(
-            f"{len(loose)} motion(s) with neither mass nor stiffness: {motions}. "
+            f"{loose.shape[1]} motion(s) with neither mass nor stiffness: {_told(loose, linear, result.scales)}. "
             "Hold the freedom, or give it stiffness or inertia."
+        )
+    if falling.shape[1]:
+        raise LinearizationError(
+            f"{falling.shape[1]} motion(s) without mass on negative stiffness (buckled, or upside down): "
+            f"{_told(falling, linear, result.scales)}. As mass vanishes they run away ever faster, so there is no "
+            "model without it: give them mass, take load off, or linearise about a stable equilibrium."
         )
     return result
 
@@ -264,6 +272,12 @@ def scaled_any(linear: LinearModel) -> Scaled:
     band = band_of(K) if len(s) > DENSE_BLOCK else None
     signals = {"B": s[:, None] * linear.B, "Cq": linear.Cq * s, "Cv": linear.Cv * s}
     return Scaled(replace(linear, M=M, C=C, K=K, parts={}, place=None, **signals), s, massless(M, C, K, band), band)
+
+
+def _told(basis: sp.csc_matrix, linear: LinearModel, scales: np.ndarray) -> str:
+    """The coordinates that move in some motions, and the same in words."""
+    names, words = _moving(basis, linear.coordinates), motions_in_words(basis, linear.coordinates, scales)
+    return "; ".join(f"{' with '.join(moving)} ({said})" for moving, said in zip(names, words, strict=True))
 
 
 def _moving(basis: sp.csc_matrix, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:

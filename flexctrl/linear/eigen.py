@@ -243,5 +243,8 @@ def _orthonormal(M: np.ndarray | sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
         gram = phi.T @ (M @ phi)
         if np.abs(gram - np.eye(len(gram))).max(initial=0.0) <= 8.0 * EPS:
             break
-        phi = lapack.dtrtrs(np.linalg.cholesky(gram), phi.T, lower=1)[0].T
+        root, info = lapack.dpotrf(gram, lower=1)
+        if info:
+            raise LinearizationError("the mass matrix is not positive definite on the freedoms kept")
+        phi = lapack.dtrtrs(root, phi.T, lower=1)[0].T
     return phi

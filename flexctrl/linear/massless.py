@@ -40,11 +40,14 @@ class Massless:
         Damping but no mass (K-orthogonal to the static ones): first-order states.
     mechanisms : scipy.sparse.csc_matrix, shape (n, k)
         Neither mass, damping nor stiffness.
+    falling : scipy.sparse.csc_matrix, shape (n, f)
+        Static ones of negative stiffness, as of a buckled column: the less mass, the faster they run away.
     """
 
     static: sp.csc_matrix
     relaxing: sp.csc_matrix
     mechanisms: sp.csc_matrix
+    falling: sp.csc_matrix
 
     @property
     def every(self) -> sp.csc_matrix:
@@ -76,10 +79,10 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix, band: Band | 
     """
     if _heavy(M, band):
         none = sp.csc_matrix((M.shape[0], 0))
-        return Massless(none, none, none)
+        return Massless(none, none, none, none)
     null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
     if not null.shape[1]:
-        return Massless(null, null, null)
+        return Massless(null, null, null, null)
     own = _restricted(C, null)
     undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK)
     static, relaxing = null @ undamped, null @ damped
@@ -87,10 +90,12 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix, band: Band | 
         raise LinearizationError(
             "a massless freedom without damping of its own is moved by velocities of others; give it inertia or damping"
         )
-    free, _ = null_split(_restricted(K, static), STIFFNESS_RANK, size=_size(K, static).diagonal())
+    held = _restricted(K, static)
+    free, _ = null_split(held, STIFFNESS_RANK, size=_size(K, static).diagonal())
     if relaxing.shape[1] and static.shape[1] and not free.shape[1]:
         relaxing = relaxing - static @ solved(static.T @ K @ static, static.T @ K @ relaxing)
-    return Massless(sp.csc_matrix(static), sp.csc_matrix(relaxing), sp.csc_matrix(static @ free))
+    down = sp.csc_matrix((held.shape[0], 0)) if free.shape[1] else _downhill(held)
+    return Massless(*(sp.csc_matrix(basis) for basis in (static, relaxing, static @ free, static @ down)))
 
 
 def null_split(
@@ -270,6 +275,28 @@ def _split_sparse(block: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
     weights = _symmetric_lu(block[free][:, free]).solve(block[free][:, dependent].toarray())
     weights[np.abs(weights) < 1e-13] = 0.0
     return sp.csc_matrix(unit[:, dependent] - unit[:, free] @ sp.csc_matrix(weights)), unit[:, free]
+
+
+def _downhill(K: sp.csc_matrix) -> sp.csc_matrix:
+    """Directions of negative stiffness: eigenvectors whose eigenvalues are real and negative."""
+    n = K.shape[0]
+    even = sp.csc_matrix(0.5 * (K + K.T))
+    if not n or _definite(even, even.diagonal()) or (n > DENSE_BLOCK and (_symmetric_lu(even).U.diagonal() > 0).all()):
+        return sp.csc_matrix((n, 0))
+    unit = sp.identity(n, format="csc")
+    return sp.csc_matrix(sp.hstack([unit[:, rows] @ _downhill_block(K[rows][:, rows]) for rows in _groups(K)]))
+
+
+def _downhill_block(K: sp.csc_matrix) -> sp.csc_matrix:
+    if K.shape[0] > DENSE_BLOCK:
+        values, vectors = sla.eigsh(0.5 * (K + K.T), k=1, which="SA")
+    elif _peak(K - K.T) > MASS_RANK * _peak(K):
+        values, vectors = la.eig(K.toarray())
+        real = np.abs(values.imag) <= MASS_RANK * np.abs(values)
+        values, vectors = values[real].real, vectors[:, real].real
+    else:
+        values, vectors = la.eigh(K.toarray())
+    return sp.csc_matrix(vectors[:, values < -STIFFNESS_RANK * _peak(K)])
 
 
 def _symmetric_lu(A: sp.csc_matrix) -> sla.SuperLU:

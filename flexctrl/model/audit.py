@@ -16,7 +16,7 @@ __all__ = ["Audit", "Freedom", "audit"]
 
 
 def audit(model: Model, at: Rest | State | None = None) -> Audit:
-    """Label every freedom of a machine dynamic, massless but stiff, massless but damped, or mechanism.
+    """Label every freedom of a machine dynamic, mechanism, or massless but stiff, but damped, on negative stiffness.
 
     Mass, damping and stiffness (geometric stiffness included) are those of the given shape, which need not
     be an equilibrium.

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import LinearizationError
+from flexctrl.errors import LinearizationError, MechanismError
 from flexctrl.linear.model import LinearModel, Place
+from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
 from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-from flexctrl.model.tangents import tangents
+from flexctrl.model.tangents import TURNS, tangents
+from flexctrl.structure.elements import Beam
 from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque
 
 _BALANCED, _ROUND_OFF = 1e-6, 1e-12
@@ -45,6 +47,8 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
 
     Raises
     ------
+    MechanismError
+        If something moves that has neither mass nor stiffness.
     LinearizationError
         If the state is not an equilibrium (says by how much and where), another point of the
         certificate fails, or nothing in the machine can move.
@@ -56,6 +60,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
             "linearize: the machine has no degrees of freedom, so there is nothing to linearise: its supports hold all "
             "that no effect lets bend"
         )
+    _refuse_spins(model, () if not isinstance(at, Rest) else at.held)
     rest = equilibrium(model, inputs=inputs) if at is None else at
     state = (rest.state if isinstance(rest, Rest) else rest).loose
     check_state(model, state, "linearize: at")
@@ -70,6 +75,24 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
     pull = 0.0 if balance.idle(model.rest) else balance.pull(state)
     return replace(linear, certificate=certify(linear, residual, asymmetry, slope, loads, model.motion, state, pull))
+
+
+def _refuse_spins(model: Model, held: Sequence[str]) -> None:
+    """Refuse beams that spin about themselves without inertia; bent by a load they seem to have a trace of it."""
+    beams = (p for p in model.structure.elements if isinstance(p, Beam) and model.bends(p))
+    if not any(beam.section.rhoJ == 0.0 for beam in beams):
+        return
+    found = audit(model)
+    spins = [
+        f"{' with '.join(names)} ({said})"
+        for names, said in zip(found.mechanisms, found.motions, strict=True)
+        if all(name.endswith(TURNS) for name in names) and not set(names) & set(held)
+    ]
+    if spins:
+        raise MechanismError(
+            f"{len(spins)} motion(s) with neither mass nor stiffness: {'; '.join(spins)}. "
+            "Hold the freedom, or give the section a rotary inertia rhoJ."
+        )
 
 
 def _without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:

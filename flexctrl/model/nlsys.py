@@ -172,7 +172,8 @@ def _refuse_massless(model: Model, at: Rest | State | None, held: set[int]) -> N
             + "; of ".join(" with ".join(m) for m in loose)
             + ": hold the freedom, or give it stiffness and inertia"
         )
-    light = [*found.named(Freedom.STATIC), *found.named(Freedom.RELAXING)]
+    kinds = (Freedom.STATIC, Freedom.RELAXING, Freedom.FALLING)
+    light = [name for kind in kinds for name in found.named(kind)]
     light = [name for name in light if model.coordinate(name) not in held]
     if light:
         raise StructureError(f"to_nlsys: no mass moves with {', '.join(light)}; {_REMEDY}")
