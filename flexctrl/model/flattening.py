@@ -12,14 +12,12 @@ __all__ = ["Flattened", "can_be_flat", "flatten"]
 def can_be_flat(model: Model) -> bool:
     """Tell whether `flatten` covers a model.
 
-    In large motion: no rigid loops; in small motion: no loads that turn with their nodes. Nothing of first order.
+    Nothing of first order; in small motion no loads that turn with their nodes.
     """
     motion = model.motion
     if model.n == 0 or any(i.order == 1 for i in motion.effects):
         return False
-    if not model.large:
-        return not model.signals.follows
-    return not motion.linkage.loops
+    return model.large or not model.signals.follows
 
 
 def flatten(model: Model) -> Flattened:

@@ -147,6 +147,14 @@ class Linkage(OpenLinkage):
         """Pose → how far loops are open [m or rad]."""
         return _callable("gaps", [self._pose], self._gaps(self._pose))
 
+    @cached_property
+    def gauge(self) -> Kernel:
+        """`gaps` and `grip` as a kernel of one item."""
+        import casadi as ca
+
+        slopes = ca.vec(ca.densify(ca.horzcat(*self._loop_slopes(self._pose))))
+        return _kernel("loops", [self._pose], ca.vertcat(self._gaps(self._pose), slopes))
+
     def _moved(self, d: ca.SX) -> ca.SX:
         """Return the pose after a small raw motion of the nodes, shape (6, count), to first order."""
         import casadi as ca

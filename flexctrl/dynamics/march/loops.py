@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.closing import in_doubt, settled
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
@@ -89,6 +90,8 @@ def fixed(m: March) -> int:
         place(m.flat)
         if m.watching == 1 and passes(m.corners, m.flat):
             return CORNER
+        if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
+            return CORNER
         accept(m)
     return DONE
 
@@ -120,6 +123,8 @@ def controlled(m: March) -> int:
         again = False
         place(m.flat)
         if m.watching == 1 and passes(m.corners, m.flat):
+            return CORNER
+        if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
             return CORNER
         factor = 0.9 * growth(error)
         if factor > 1.3 and m.h > 0.5 * m.size:
@@ -264,6 +269,8 @@ def settle(m: March) -> int:
         drive(f)
         energy(f)
         m.power = f.books[2]
+    if m.closing.loops > 0:
+        settled(m.closing, f)
     return DONE
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.loops import run
 from flexctrl.dynamics.march.record import (
@@ -376,6 +377,7 @@ def _march(F: Flattened, method: Method) -> March:
         flat=flat,
         gauges=F.gauges,
         corners=corners_of(F.model),
+        closing=closing_of(F),
         fronts=F.plan.fronts,
         axes=F.axes,
         tangent=_factors(F),

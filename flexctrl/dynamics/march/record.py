@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.corners import Corners
 from flexctrl.kernels.native import Reals
 from flexctrl.model.axes import Axes
@@ -14,7 +15,7 @@ from flexctrl.model.gauges import Gauges
 
 DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT, CORNER = 0, 1, 2, 3, 4, 5, 6
 """How a call ends: with all done; before it can go on; at a step that does not converge, or cannot be shorter; before
-one that passes a corner of a law of force."""
+one that passes a corner of a law of force, or a place where a loop of rigid parts may lock."""
 
 FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED = 0, 1, 2, 3, 4, 5, 6, 7
 """What to do."""
@@ -57,6 +58,7 @@ class March:
     flat : Flat
     gauges : Gauges
     corners : Corners
+    closing : Closing
     fronts : Fronts
     axes : Axes
     tangent, mass : Factors
@@ -112,6 +114,7 @@ class March:
     flat: Flat
     gauges: Gauges
     corners: Corners
+    closing: Closing
     fronts: Fronts
     axes: Axes
     tangent: Factors
