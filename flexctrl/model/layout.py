@@ -132,14 +132,19 @@ class Layout:
 
     def _slopes(self) -> sp.csr_matrix:
         """A matrix with all entries that slopes have: those of levers in a place where none vanishes by chance, as
-        pieces push on them even where they do not (slack ropes), and as they turn in motion."""
+        pieces push on them even where they do not (slack ropes), and as they turn in motion. Through rigid loops all
+        may depend on all."""
         m, rng = self.motion, np.random.default_rng(0)
         step, v, a = rng.uniform(0.1, 0.4, (3, m.n))
         state = m.advance(m.rest, step, v, 0.0)
         u = rng.uniform(0.5, 1.0, len(self.model.inputs))
         T = abs(m.jacobian(state))
         pushed = sp.csr_matrix((np.ones(len(self.forces.pattern[0])), self.forces.pattern), shape=(m.raw, m.raw))
-        return abs(self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)) + T.T @ pushed @ T
+        found = abs(self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)) + T.T @ pushed @ T
+        if not m.linkage.loops:
+            return found
+        closed = np.isin(np.arange(m.n), m.linked).astype(float)
+        return found + sp.csr_matrix(np.outer(closed, closed))
 
     @cached_property
     def entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.errors import ControllerError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
-from machines import machine
+from machines import bridle, double_girder, four_bar, machine
 
 pytest.importorskip("llvmlite")
 
@@ -70,6 +70,22 @@ def test_marched_runs_are_plain_runs(name, pace, monkeypatch):
 def test_rigid_machines_march(monkeypatch):
     model = fc.assemble(TREES["tree7"], EFFECTS)
     alike(*both(model, monkeypatch, until=0.2, inputs={"force": 2.0}, method=FIXED_STEPS, tolerance=TIGHT))
+
+
+@pytest.mark.parametrize("pace", PACES)
+@pytest.mark.parametrize("machine", [four_bar, bridle, double_girder])
+def test_rigid_loops_march(machine, pace, monkeypatch):
+    """One loop and several, with drives behind rigid shafts; steps are marched but near dead points."""
+    model, taken = fc.assemble(machine(), [fc.Gravity(), fc.LargeRotation()]), []
+    how = {"until": 0.2, "inputs": {"push": 1.0}, "method": PACES[pace], "tolerance": TIGHT}
+    with monkeypatch.context() as patch:
+        plain = Stepper.step
+        patch.setattr(Stepper, "step", lambda self, point, h: taken.append(h) or plain(self, point, h))
+        fc.simulate(model, **how)
+    a, b = both(model, monkeypatch, **how)
+    assert len(taken) < 0.1 * a.report.steps
+    alike(a, b)
+    assert a.report.closure_error < 1e-10
 
 
 def test_follower_loads_march(monkeypatch):

@@ -19,7 +19,7 @@ __all__ = ["Closing", "closing_of", "in_doubt", "settled"]
 
 _OPEN = 1e-12
 _LEVER = 100.0
-_PIVOT = 1e-5
+_PIVOT = 1e-3
 _FULL = 0.05
 _UNEXPLAINED = 2.0
 
@@ -158,8 +158,7 @@ def sent_back(c: Closing, f: Flat, h: float) -> bool:
     for i in range(c.rates):
         first = c.speeds[i]
         last = f.z[c.cells[i]]
-        most = max(abs(first), abs(last))
-        if first * last < 0.0 and most > _FULL * fastest:
-            if abs(last - first) > _UNEXPLAINED * h * abs(f.z[c.cells[i] + 6]):
-                return True
+        fast = max(abs(first), abs(last)) > _FULL * fastest
+        if first * last < 0.0 and fast and abs(last - first) > _UNEXPLAINED * h * abs(f.z[c.cells[i] + 6]):
+            return True
     return False
