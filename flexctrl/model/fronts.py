@@ -3,8 +3,9 @@
 Unknowns with the same neighbours (a node's) are eliminated together, the ones with the fewest neighbours
 first. Each group has a front: a small dense matrix of the group and the unknowns that it touches. Sweeping
 its pivots leaves A₁₁⁻¹ and A₁₁⁻¹A₁₂ in their rows, −A₂₁A₁₁⁻¹ below, and the Schur complement, which is added
-into the front of the next group that it touches. Without exchange of rows: for matrices ruled by masses and
-stiffnesses; a pivot that vanishes is reported and not worked around.
+into the front of the next group that it touches. What solving reads is put down one after the other in the order
+in which it is read: in large models that takes as long as memory does. Without exchange of rows: for matrices
+ruled by masses and stiffnesses; a pivot that vanishes is reported and not worked around.
 """
 
 from __future__ import annotations
@@ -96,6 +97,8 @@ class Fronts:
         The other unknowns of all fronts, and their rows in the fronts' parents.
     diagonal : Wholes, (n,)
         Where the diagonal stands in the entries.
+    below, right : int
+        How many numbers the columns of all pivots have, and the rows right of their blocks.
     """
 
     n: int
@@ -110,6 +113,8 @@ class Fronts:
     others: Wholes
     into: Wholes
     diagonal: Wholes
+    below: int
+    right: int
 
 
 def plan_of(rows: np.ndarray, columns: np.ndarray, n: int) -> Plan:
@@ -201,6 +206,8 @@ def _laid_out(n: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
         others=np.concatenate([np.zeros(0, dtype=int), *others]),
         into=np.zeros(int(rests.sum()), dtype=int),
         diagonal=np.zeros(n, dtype=int),
+        below=int((pivots * size).sum()),
+        right=int((pivots * rests).sum()),
     )
     found = Plan(tables, order, int((lead * size).sum()), int(lead.max(initial=8)))
     up = np.repeat(parent, rests)
@@ -209,10 +216,16 @@ def _laid_out(n: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
     return found
 
 
-def factor(f: Fronts, entries: Reals, diagonal: Reals) -> int:
-    """Factorise the matrix in ``entries`` in place; return the unknown whose pivot vanishes, or −1."""
+def factor(f: Fronts, entries: Reals, diagonal: Reals, down: Reals, up: Reals) -> int:
+    """Factorise the matrix in ``entries``, which are used up; return the unknown whose pivot vanishes, or −1.
+
+    The columns of pivots go to ``down``, front by front, and the rows right of them, by columns, to ``up``; each
+    has eight places more than numbers.
+    """
     for i in range(f.n):
         diagonal[i] = abs(entries[f.diagonal[i]])
+    below = 0
+    right = 0
     for s in range(f.count):
         size = f.size[s]
         lead = f.lead[s]
@@ -223,6 +236,8 @@ def factor(f: Fronts, entries: Reals, diagonal: Reals) -> int:
             if not abs(pivot) > _VANISHING * diagonal[f.first[s] + k]:
                 return f.first[s] + k
             sweep(size, lead, k, 1.0 / pivot, a, a[k * lead :])
+        below = put_down(size, 0, pivots, lead, a, below, down)
+        right = put_down(pivots, pivots, size, lead, a, right, up)
         if f.parent[s] >= 0:
             parent = f.parent[s]
             rest = size - pivots
@@ -247,6 +262,16 @@ def sweep(size: int, lead: int, k: int, inverse: float, a: Reals, column: Reals)
     column[k] = inverse
 
 
+def put_down(rows: int, first: int, last: int, lead: int, a: Reals, at: int, numbers: Reals) -> int:
+    """Put the upper rows of some columns one after the other; return where they end."""
+    for k in range(first, last):
+        column = a[k * lead :]
+        for i in range(0, rows, 8):
+            put(numbers[at + i :], eight(column[i:]))
+        at += rows
+    return at
+
+
 def extend(rest: int, lead: int, a: Reals, wide: int, into: Wholes, parent: Reals) -> None:
     """Add a Schur complement into the parent's front."""
     for j in range(rest):
@@ -255,35 +280,39 @@ def extend(rest: int, lead: int, a: Reals, wide: int, into: Wholes, parent: Real
             column[into[i]] += a[j * lead + i]
 
 
-def solve(f: Fronts, entries: Reals, b: Reals, work: Reals) -> None:
+def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:
     """Solve in place with a factorised matrix."""
+    below = 0
     for s in range(f.count):
         pivots = f.pivots[s]
-        lead = f.lead[s]
-        a = entries[f.base[s] :]
+        size = f.size[s]
         own = b[f.first[s] :]
-        for i in range(0, lead, 8):
-            found = own[0] * eight(a[i:])
+        for i in range(0, size, 8):
+            a = down[below + i :]
+            found = own[0] * eight(a)
             for k in range(1, pivots):
-                found = found + own[k] * eight(a[k * lead + i :])
+                found = found + own[k] * eight(a[k * size :])
             put(work[i:], found)
+        below += pivots * size
         for k in range(pivots):
             own[k] = work[k]
         others = f.others[f.rest[s] :]
-        for i in range(pivots, f.size[s]):
+        for i in range(pivots, size):
             b[others[i - pivots]] += work[i]
+    right = f.right
     for s in range(f.count - 1, -1, -1):
         pivots = f.pivots[s]
-        lead = f.lead[s]
-        a = entries[f.base[s] :]
+        rest = f.size[s] - pivots
+        right -= pivots * rest
         others = f.others[f.rest[s] :]
         own = b[f.first[s] :]
         for k in range(pivots):
             work[k] = own[k]
         for i in range(0, pivots, 8):
+            a = up[right + i :]
             found = eight(work[i:])
-            for j in range(pivots, f.size[s]):
-                found = found - b[others[j - pivots]] * eight(a[j * lead + i :])
+            for j in range(rest):
+                found = found - b[others[j]] * eight(a[j * pivots :])
             put(work[i:], found)
         for k in range(pivots):
             own[k] = work[k]

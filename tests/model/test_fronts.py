@@ -20,14 +20,16 @@ class Problem:
     fronts: Fronts
     entries: Reals
     diagonal: Reals
+    down: Reals
+    up: Reals
     b: Reals
     work: Reals
 
 
 def solved(m: Problem) -> int:
-    where = factor(m.fronts, m.entries, m.diagonal)
+    where = factor(m.fronts, m.entries, m.diagonal, m.down, m.up)
     if where < 0:
-        solve(m.fronts, m.entries, m.b, m.work)
+        solve(m.fronts, m.down, m.up, m.b, m.work)
     return where
 
 
@@ -59,7 +61,9 @@ def problem(A: sp.spmatrix, b: np.ndarray) -> tuple[Plan, Problem]:
     plan = plan_of(A.row, A.col, A.shape[0])
     entries = np.zeros(plan.length)
     np.add.at(entries, plan.places(A.row, A.col), A.data)
-    return plan, Problem(plan.fronts, entries, np.zeros(len(b)), b[plan.order], np.zeros(plan.widest))
+    f = plan.fronts
+    room = [np.zeros(size) for size in (len(b), f.below + 8, f.right + 8)]
+    return plan, Problem(f, entries, *room, b[plan.order], np.zeros(plan.widest))
 
 
 @pytest.mark.parametrize("compiled", [False, True])

@@ -73,7 +73,7 @@ def tilt(a: Reals) -> float:
 def solved(axes: Axes, factors: Factors, fronts: Fronts, b: Reals) -> None:
     """Solve in place with the matrix as it would be now."""
     turn_back(axes.triple_count, axes.triples, factors.turned, b)
-    solve(fronts, factors.entries, b, factors.work)
+    solve(fronts, factors.down, factors.up, b, factors.work)
     turn_on(axes.triple_count, axes.triples, factors.turned, b)
 
 

@@ -66,9 +66,9 @@ def run(m: March) -> int:
 def made_again(m: March) -> int:
     """Make a matrix again in the workspace in which it was made."""
     if m.task == WEIGHED:
-        tangent(m.flat, 0.0, 0.0, 1.0, m.mass.entries)
+        tangent(m.flat, 0.0, 0.0, 1.0, m.entries)
         return weighed(m)
-    tangent(m.flat, 1.0, to_v(m), to_rate(m), m.tangent.entries)
+    tangent(m.flat, 1.0, to_v(m), to_rate(m), m.entries)
     return refactored(m)
 
 
@@ -308,10 +308,10 @@ def small(m: March) -> bool:
     f = m.flat
     pull(f)
     for i in range(0, f.padded, 8):
-        put(m.b[i:], eight(m.pulled[i:]) - eight(f.force[i:]))
+        put(f.force[i:], eight(f.force[i:]) - eight(m.pulled[i:]))
         put(f.rate[i:], eight(m.rate[i:]))
-    m.b[f.n] = 0.0
-    solved(m.axes, m.mass, m.fronts, m.b)
+    f.force[f.n] = 0.0
+    solved(m.axes, m.mass, m.fronts, f.force)
     size = m.made_for * m.made_for * m.beta * added(m)
     if m.made_for > 0.0 and size * _LEFT <= m.tolerance:
         return True
@@ -341,7 +341,7 @@ def massed(m: March) -> int:
     if m.asking == 1:
         return WANTS_MASS
     drive(m.flat)
-    tangent(m.flat, 0.0, 0.0, 1.0, m.mass.entries)
+    tangent(m.flat, 0.0, 0.0, 1.0, m.entries)
     return weighed(m)
 
 
@@ -355,10 +355,8 @@ def balanced(m: March) -> bool:
     for k in range(_SOLUTIONS):
         drive(f)
         push(f)
-        for i in range(0, f.padded, 8):
-            put(m.b[i:], -eight(f.force[i:]))
-        m.b[f.n] = 0.0
-        solved(m.axes, m.mass, m.fronts, m.b)
+        f.force[f.n] = 0.0
+        solved(m.axes, m.mass, m.fronts, f.force)
         change = added(m)
         if k == 0:
             first = change
@@ -375,13 +373,13 @@ def balanced(m: March) -> bool:
 
 
 def added(m: March) -> float:
-    """Add a correction to the accelerations; return its size, NaN where it is not finite."""
+    """Correct accelerations by what is in the place of the forces; return its size, NaN where it is not finite."""
     f = m.flat
     most = 0.0 * eight(m.weight)
     sums = most
     for i in range(0, f.padded, 8):
-        change = eight(m.b[i:])
-        put(f.rate[i:], eight(f.rate[i:]) + change)
+        change = eight(f.force[i:])
+        put(f.rate[i:], eight(f.rate[i:]) - change)
         most = larger(most, abs(change) * eight(m.weight[i:]))
         sums = sums + abs(change)
     return largest(most) if math.isfinite(total(sums)) else math.nan
@@ -398,7 +396,7 @@ def largest_rate(m: March) -> float:
 def weighed(m: March) -> int:
     """Factorise the mass that has been filled in for the present shape."""
     f = m.flat
-    where = factor(m.fronts, m.mass.entries, m.mass.diagonal)
+    where = factor(m.fronts, m.entries, m.mass.diagonal, m.mass.down, m.mass.up)
     m.mass_for = 0.0
     most = 0.0
     for i in range(f.n):

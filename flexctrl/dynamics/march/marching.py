@@ -44,6 +44,8 @@ from flexctrl.model.motion import State
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
 _SHARE = 1e-3
+_HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed")
+_MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
 _CAPACITY = 1024
@@ -96,7 +98,7 @@ class Remembered:
     made_for : float
         Step of the tangent [s].
     numbers : tuple of float
-        Newton's habit and trust, and his tolerance; what the mass has missed, and the trust in that.
+        What the march has learned: of Newton's habit, of the tangent's worth, of what the mass misses.
     """
 
     tangent: np.ndarray
@@ -168,23 +170,23 @@ class Marcher:
             tangent = m.tangent.place.copy() if m.made_for > 0.0 else np.zeros(0)
             mass = m.mass.place.copy() if m.mass_for == 1.0 else np.zeros(0)
             self._kept = kept = ((m.factorisations, m.weighings), tangent, mass)
-        return Remembered(kept[1], kept[2], m.made_for, (m.habit, m.trusted, m.tolerance, m.missed, m.believed))
+        return Remembered(kept[1], kept[2], m.made_for, tuple(getattr(m, name) for name in _HABITS))
 
     def recall(self, memory: Remembered) -> None:
         """Go on as the march whose memory this is."""
         m, f = self.march, self.flattened.flat
         made = m.factorisations
-        for place, factors, mass in ((memory.tangent, m.tangent, False), (memory.mass, m.mass, True)):
+        for place, mass in ((memory.tangent, False), (memory.mass, True)):
             if place.size:
                 f.z[:], m.h = place, memory.made_for
-                self._make(factors, mass)
+                self._make(mass)
         m.factorisations, m.made_for = made, memory.made_for
-        m.habit, trusted, m.tolerance, m.missed, believed = memory.numbers
-        m.trusted, m.believed = int(trusted), int(believed)
+        for name, number in zip(_HABITS, memory.numbers, strict=True):
+            setattr(m, name, number)
 
-    def _make(self, factors: Factors, mass: bool) -> None:
+    def _make(self, mass: bool) -> None:
         if self.march.asking:
-            self._made(factors, (0.0, 0.0, 1.0) if mass else self._seeds, WEIGH if mass else REFACTOR)
+            self._made((0.0, 0.0, 1.0) if mass else self._seeds, WEIGH if mass else REFACTOR)
         else:
             self._do(WEIGHED if mass else REMADE)
 
@@ -226,8 +228,7 @@ class Marcher:
 
     def worst(self) -> int:
         """Return the degree of freedom with the largest correction in the last iteration."""
-        m, order = self.march, self.flattened.plan.order
-        return int(order[np.argmax(np.abs(m.b * m.weight)[: self.flattened.flat.n])])
+        return int(self.flattened.plan.order[self.march.worst])
 
     def supply(self, u: np.ndarray) -> None:
         """Set the inputs."""
@@ -311,11 +312,8 @@ class Marcher:
     def _answered(self, status: int, task: int) -> int:
         """Go on with a task as long as it asks for matrices."""
         while status in (WANTS_TANGENT, WANTS_MASS):
-            if status == WANTS_TANGENT:
-                made = self._made(self.march.tangent, self._seeds, REFACTOR)
-            else:
-                made = self._made(self.march.mass, (0.0, 0.0, 1.0), WEIGH)
-            if made != DONE:
+            seeds, made = (self._seeds, REFACTOR) if status == WANTS_TANGENT else ((0.0, 0.0, 1.0), WEIGH)
+            if self._made(seeds, made) != DONE:
                 self.march.phase = FRESH
                 return SINGULAR
             status = self._do(task)
@@ -326,15 +324,15 @@ class Marcher:
         c, h = self.method.coefficients, self.march.h
         return 1.0, c.gamma / (h * c.beta), (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
 
-    def _made(self, factors: Factors, seeds: tuple[float, float, float], task: int) -> int:
+    def _made(self, seeds: tuple[float, float, float], task: int) -> int:
         """Fill in a matrix that the loops do not make themselves, and factorise it."""
         F, f, m = self.flattened, self.flattened.flat, self.march
         poses = f.z[: self.model.forces.drive_base].reshape(-1, NODE_SLOT)[:, :12]
         state = F.pose_state(poses.ravel(), f.q + f.step, f.v, f.found, m.t)
         slope = self.model.slope(state, state.v, F.own(f.rate), seeds, f.u).tocoo()
-        factors.entries[:] = 0.0
+        m.entries[:] = 0.0
         try:
-            factors.entries[F.plan.places(slope.row, slope.col)] = slope.data
+            m.entries[F.plan.places(slope.row, slope.col)] = slope.data
         except KernelError:
             return SINGULAR
         return self._do(task)
@@ -370,7 +368,7 @@ def _idle(model: Model) -> list[Marcher]:
 
 def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
-    v, rate, algorithmic, trend, lead, b, pulled, reach, first = np.zeros((9, flat.padded))
+    v, rate, algorithmic, trend, lead, pulled, reach, first = np.zeros((8, flat.padded))
     state = _state_width(F)
     shelf = int(min(_CAPACITY, max(1, _BYTES // (8 * state))))
     return March(
@@ -382,12 +380,12 @@ def _march(F: Flattened, method: Method) -> March:
         axes=F.axes,
         tangent=_factors(F),
         mass=_factors(F),
+        entries=np.zeros(F.plan.length + 1),
         v=v,
         rate=rate,
         algorithmic=algorithmic,
         trend=trend,
         lead=lead,
-        b=b,
         pulled=pulled,
         weight=F.ordered(method.weight),
         turns=F.ordered(method.turning.astype(float)),
@@ -403,15 +401,21 @@ def _march(F: Flattened, method: Method) -> March:
         least=method.least,
         loosest=max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
         share=_SHARE,
+        price=_MADE if flat.tangents else _ASKED,
         asking=int(not flat.tangents),
         tolerance=method.least,
     )
 
 
 def _factors(F: Flattened) -> Factors:
-    axes = F.axes
-    made, turned = np.zeros((2, 9 * axes.count))
-    entries, place = np.zeros(F.plan.length + 1), np.zeros(F.flat.size)
+    axes, fronts = F.axes, F.plan.fronts
     return Factors(
-        entries, np.zeros(F.flat.n), np.zeros(F.plan.widest), made, turned, np.zeros(axes.angle_count), place
+        down=np.zeros(fronts.below + 8),
+        up=np.zeros(fronts.right + 8),
+        diagonal=np.zeros(F.flat.n),
+        work=np.zeros(F.plan.widest),
+        made=np.zeros(9 * axes.count),
+        turned=np.zeros(9 * axes.count),
+        angles=np.zeros(axes.angle_count),
+        place=np.zeros(F.flat.size),
     )

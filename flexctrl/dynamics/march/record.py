@@ -30,8 +30,8 @@ class Factors:
 
     Attributes
     ----------
-    entries, diagonal, work : Reals
-        Its fronts; the sizes of its diagonal before, and room for a column.
+    down, up, diagonal, work : Reals
+        What solving reads; the sizes of its diagonal before, and room for a column.
     made, turned : Reals
         Rotations of the axes when it was made, and since.
     angles : Reals
@@ -40,7 +40,8 @@ class Factors:
         The workspace when it was made.
     """
 
-    entries: Reals
+    down: Reals
+    up: Reals
     diagonal: Reals
     work: Reals
     made: Reals
@@ -62,6 +63,8 @@ class March:
     fronts : Fronts
     axes : Axes
     tangent, mass : Factors
+    entries : Reals
+        Fronts of the matrix that is being made.
     alpha_m, alpha_f, beta, gamma : float
         The method; see `Coefficients`.
     least, loosest, share : float
@@ -81,6 +84,9 @@ class March:
         Where in a step it is.
     habit, trusted : float, int
         How much smaller each correction has been than the one before, and in how many steps that was only believed.
+    price, spent, lately, served : float, int
+        What a tangent costs, in iterations; what was spent on it and on iterations since, how many steps take
+        lately, and how many there were.
     trending : int
         Whether accelerations are expected to go on as they went.
     made_for, mass_for : float
@@ -99,8 +105,8 @@ class March:
         Dissipated power; work of the inputs and energy dissipated.
     v, rate, algorithmic, trend : Reals
         At the start of the step; see `AlphaPoint`.
-    lead, b, pulled : Reals
-        The method's own acceleration at its end; forces, then corrections; the inputs' forces at its start.
+    lead, pulled : Reals
+        The method's own acceleration at its end; the inputs' forces at its start.
     weight, turns : Reals
         One over the yardsticks; 1 for what turns.
     reach, first : Reals
@@ -119,12 +125,12 @@ class March:
     axes: Axes
     tangent: Factors
     mass: Factors
+    entries: Reals
     v: Reals
     rate: Reals
     algorithmic: Reals
     trend: Reals
     lead: Reals
-    b: Reals
     pulled: Reals
     weight: Reals
     turns: Reals
@@ -139,6 +145,7 @@ class March:
     least: float
     loosest: float
     share: float
+    price: float
     asking: int
     shelf: int
     tolerance: float = 0.0
@@ -164,6 +171,9 @@ class March:
     strayed: float = 0.0
     habit: float = 0.0
     trusted: int = 0
+    spent: float = 0.0
+    lately: float = 0.0
+    served: int = 0
     trending: int = 0
     made_for: float = -1.0
     mass_for: float = 0.0

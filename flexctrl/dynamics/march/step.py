@@ -22,6 +22,7 @@ _ASTRAY = 1.5
 _ITERATIONS = 12
 _TRUSTED = 8
 _HABIT = 0.002
+_FORGOTTEN = 0.25
 
 
 def step(m: March) -> int:
@@ -35,6 +36,7 @@ def step(m: March) -> int:
         m.phase = FRESH
         if status == DONE or m.attempt == 1:
             m.attempt = 0
+            m.worst = m.worst if status == SINGULAR else foremost(m)
             return status
         m.attempt = 1
 
@@ -75,21 +77,32 @@ def newton(m: March) -> int:
                 m.last = math.inf
                 if m.asking == 1:
                     return WANTS_TANGENT
-                tangent(f, 1.0, to_v(m), to_rate(m), m.tangent.entries)
+                tangent(f, 1.0, to_v(m), to_rate(m), m.entries)
                 if refactored(m) != DONE:
                     return SINGULAR
         m.phase = EVALUATE
         size = correct(m)
         if not math.isfinite(size) or m.strayed > _ASTRAY:
+            m.last = size if math.isfinite(size) else math.inf
             return FAILED
         m.contraction = size / m.last if math.isfinite(m.last) else 0.0
+        m.last = size
         if m.contraction > 2.0 and m.iteration > 3:
             return FAILED
         if converged(m, size):
+            reckon(m)
             return DONE
-        m.last = size
         m.iteration += 1
     return FAILED
+
+
+def foremost(m: March) -> int:
+    """Return the degree of freedom with the largest correction in the last iteration, or one that is not finite."""
+    f = m.flat
+    for i in range(f.n):
+        if not abs(f.force[i]) * m.weight[i] < m.last:
+            return i
+    return 0
 
 
 def to_v(m: March) -> float:
@@ -102,16 +115,27 @@ def to_rate(m: March) -> float:
     return (1.0 - m.alpha_m) / (m.h * m.h * m.beta * (1.0 - m.alpha_f))
 
 
+def reckon(m: March) -> None:
+    """Enter the iterations of a step in the account of the tangent."""
+    m.served += 1
+    m.spent += m.iteration + 1.0
+    m.lately += _FORGOTTEN * (m.iteration + 1.0 - m.lately)
+
+
 def stale(m: March) -> bool:
-    """Tell whether the tangent is of another step length or of another shape."""
-    if not abs(m.h - m.made_for) <= 1e-6 * m.h:
+    """Tell whether the tangent is of another step length or of another shape, or no longer worth keeping.
+
+    It is worth that until steps take more than they did on average since it was made, what it cost included: so
+    the average is the least possible.
+    """
+    if not abs(m.h - m.made_for) <= 1e-6 * m.h or m.lately * m.served > m.spent:
         return True
     return turned_too_far(m.axes, m.tangent, m.flat, _TURNED)
 
 
 def refactored(m: March) -> int:
     """Factorise the tangent that has been filled in for the present end of the step."""
-    where = factor(m.fronts, m.tangent.entries, m.tangent.diagonal)
+    where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
     m.made_for = -1.0
     if where >= 0:
         m.worst = where
@@ -119,6 +143,9 @@ def refactored(m: March) -> int:
     m.factorisations += 1
     m.made_for = m.h
     m.habit = 0.0
+    m.served = 0
+    m.spent = m.price
+    m.lately = 0.0
     mark(m.axes, m.tangent, m.flat)
     return DONE
 
@@ -143,22 +170,20 @@ def converged(m: March, size: float) -> bool:
 
 
 def correct(m: March) -> float:
-    """Take a Newton step; return its size, NaN where it is not finite."""
+    """Take a Newton step, found in the place of the forces; return its size, NaN where it is not finite."""
     f = m.flat
-    for i in range(0, f.padded, 8):
-        put(m.b[i:], -eight(f.force[i:]))
-    m.b[f.n] = 0.0
-    solved(m.axes, m.tangent, m.fronts, m.b)
+    f.force[f.n] = 0.0
+    solved(m.axes, m.tangent, m.fronts, f.force)
     speed = to_v(m)
     pull = to_rate(m)
     most = 0.0 * eight(m.weight)
     sums = most
     turn = most
     for i in range(0, f.padded, 8):
-        change = eight(m.b[i:])
-        put(f.step[i:], eight(f.step[i:]) + change)
-        put(f.v[i:], eight(f.v[i:]) + speed * change)
-        put(f.rate[i:], eight(f.rate[i:]) + pull * change)
+        change = eight(f.force[i:])
+        put(f.step[i:], eight(f.step[i:]) - change)
+        put(f.v[i:], eight(f.v[i:]) - speed * change)
+        put(f.rate[i:], eight(f.rate[i:]) - pull * change)
         sizes = abs(change) * eight(m.weight[i:])
         most = larger(most, sizes)
         sums = sums + sizes
