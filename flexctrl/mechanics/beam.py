@@ -33,7 +33,10 @@ SHEARING = ("r_y", "r_z", *(f"c{i}{j}" for i in range(6) for j in range(i, 6)))
 
 @dataclass(frozen=True)
 class NodeMotion:
-    """Symbols of a node: position x, rotation R since rest, velocity v, spin w, and their rates a, b."""
+    """Symbols of a node: position x, rotation R since rest, velocity v, spin w, and their rates a, b.
+
+    ``span`` is the duration of the step whose middle this is, v being its mean velocity; 0 for an instant.
+    """
 
     x: ca.SX
     R: ca.SX
@@ -41,6 +44,25 @@ class NodeMotion:
     w: ca.SX
     a: ca.SX
     b: ca.SX
+    span: ca.SX | float = 0.0
+
+
+def reach(first: NodeMotion, second: NodeMotion) -> tuple[ca.SX, ca.SX]:
+    """Return the distance of two nodes as it is in the middle of a step, and as it is at its ends in the mean.
+
+    A force along the line between nodes that hangs on the second and works on the middle's vector over it does exactly
+    the work that a quadratic potential changes by: (V₁ − V₀)/(ℓ₁ − ℓ₀) at (ℓ₀ + ℓ₁)/2 (Simo & Tarnow 1992). In the
+    middle of a step a line that turns is shorter than at its ends.
+    """
+    import casadi as ca
+
+    d = second.x - first.x
+    length = ca.sqrt(ca.dot(d, d))
+    if isinstance(first.span, float):
+        return length, length
+    half = 0.5 * first.span * (second.v - first.v)
+    before, after = d - half, d + half
+    return length, 0.5 * (ca.sqrt(ca.dot(before, before)) + ca.sqrt(ca.dot(after, after)))
 
 
 @dataclass(frozen=True)
@@ -105,6 +127,8 @@ class BeamMotion:
         v₁, ω₁, v₂, ω₂ and their rates, absolute, resolved in the frame.
     modal : tuple of three casadi.SX, or of none
         Amplitudes of the element's own modes with their rates and accelerations (see `component_modes`).
+    lean : casadi.SX or float
+        The chord over the length of which ``stretch`` tells; 1 but over the middle of a step (see `reach`).
     """
 
     p: dict[str, ca.SX]
@@ -119,6 +143,7 @@ class BeamMotion:
     rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
     accelerations: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
     modal: tuple[ca.SX, ...] = ()
+    lean: ca.SX | float = 1.0
 
 
 def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
@@ -130,7 +155,7 @@ def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     torque = force.torque - (t1 + t2)
     along, across = m.normal
     lever = torque[0] / across
-    pull = ca.vertcat(n[0], torque[2] / m.chord, -(torque[1] + lever * along) / m.chord)
+    pull = ca.vertcat(m.lean * n[0], torque[2] / m.chord, -(torque[1] + lever * along) / m.chord)
     turn = [t + 0.5 * lever * arm for t, arm in zip((t1, t2), m.arms, strict=True)]
     f = force.nodal
     blocks = (f[0:3] - pull, f[3:6] + turn[0], f[6:9] + pull, f[9:12] + turn[1])
@@ -157,9 +182,8 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal:
     names = (*PARAMETERS, *SHEARING) if parameters.numel() > len(PARAMETERS) else PARAMETERS
     p = {name: parameters[i] for i, name in enumerate(names)}
     rest = ca.reshape(parameters[:9], 3, 3).T
-    d = second.x - first.x
-    chord = ca.sqrt(ca.dot(d, d))
-    e1 = d / chord
+    chord, length = reach(first, second)
+    e1 = (second.x - first.x) / chord
     sides = [node.R @ rest[:, 1] for node in (first, second)]
     mean = 0.5 * (sides[0] + sides[1])
     e3 = ca.cross(e1, mean)
@@ -167,7 +191,7 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal:
     e2 = ca.cross(e3, e1)
     frame = ca.horzcat(e1, e2, e3)
     rates, accelerations = (first.v, first.w, second.v, second.w), (first.a, first.b, second.a, second.b)
-    return framed_motion(
+    m = framed_motion(
         p,
         frame,
         0.5 * (first.x + second.x),
@@ -178,6 +202,7 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal:
         tuple(frame.T @ a for a in accelerations),
         modal,
     )
+    return m if length is chord else replace(m, stretch=length - p["L"], lean=chord / length)
 
 
 def framed_motion(
@@ -343,7 +368,7 @@ def deformation_rates(m: BeamMotion) -> ca.SX:
 
     # the rate of a rotation vector is T⁻¹ times the relative spin; T⁻¹(θ) = T⁻ᵀ(−θ)
     turning = [inverse_tangent(-t, m.rates[k] - m.spin) for t, k in zip(m.theta, (1, 3), strict=True)]
-    return ca.vertcat((m.rates[2] - m.rates[0])[0], *turning)
+    return ca.vertcat(m.lean * (m.rates[2] - m.rates[0])[0], *turning)
 
 
 def viscous_force(m: BeamMotion) -> BeamForce:

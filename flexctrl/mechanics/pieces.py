@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.beam import NodeMotion, reach
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -61,9 +61,8 @@ def line_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX) -> Lin
     """Return the motion of a line from that of its ends."""
     import casadi as ca
 
-    d = second.x - first.x
-    length = ca.sqrt(ca.dot(d, d))
-    direction = d / length
+    length = reach(first, second)[1]
+    direction = (second.x - first.x) / length
     return LineMotion(named(LINE_PARAMETERS, parameters), length, ca.dot(direction, second.v - first.v), direction)
 
 

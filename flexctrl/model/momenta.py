@@ -6,16 +6,32 @@ d/dt (M v) = force − c + Ṁ v: nothing but v and the place is needed, and whe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kind, moved, symbols_of
+from flexctrl.mechanics.beam import PARAMETERS, NodeMotion, reach
+from flexctrl.mechanics.pieces import named
+from flexctrl.model.families import Family
+from flexctrl.model.kinds import (
+    BEAM,
+    DRIVE_SLOT,
+    HEAVY_ROPE,
+    NODE_SLOT,
+    ROPE,
+    SPRING,
+    Kernels,
+    Kind,
+    moved,
+    symbols_of,
+)
+from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
@@ -23,6 +39,8 @@ if TYPE_CHECKING:
     import casadi as ca
 
 __all__ = ["Momenta"]
+
+_LINES = (SPRING, ROPE, HEAVY_ROPE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +54,16 @@ class Momenta:
 
     model: Model
 
-    def at(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, state: State, u: np.ndarray, span: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the momenta of a state, conjugate to its rates, and their rates of change under some inputs.
 
         Parameters
         ----------
         state : State
         u : numpy.ndarray, shape (inputs,)
+        span : float
+            Duration of the step whose middle the state is, its rates being their mean [s]: what lines between nodes do
+            is that of the whole step (see `flexctrl.mechanics.beam.reach`); 0 for an instant.
 
         Returns
         -------
@@ -51,7 +72,7 @@ class Momenta:
         model, v = self.model, state.v
         if not model.large:
             return self.of(state, v), model.balance(state, v, np.zeros(model.n)) + model.loads(state, u)
-        motion, both = model.motion, self._raw(state, v)
+        motion, both = model.motion, self._raw(state, v, span)
         momenta, change = both[: motion.raw], both[motion.raw :]
         pushed = motion.collect(state, change + model.signals.loads @ u)
         if model.viscous.nnz:
@@ -67,12 +88,49 @@ class Momenta:
             return model.balance(state, v, np.zeros(model.n)) - model.balance(state, v, v)
         return model.motion.collect(state, self._raw(state, v)[: model.motion.raw])
 
-    def _raw(self, state: State, v: np.ndarray) -> np.ndarray:
+    def _raw(self, state: State, v: np.ndarray, span: float = 0.0) -> np.ndarray:
         forces = self.model.forces
-        z, both = forces.slots(state, v, np.zeros(self.model.n)), np.zeros(2 * self.model.motion.raw)
+        z, both = np.append(forces.slots(state, v, np.zeros(self.model.n)), span), np.zeros(2 * self.model.motion.raw)
         for batch in self._batches:
             batch(z, both)
         return both
+
+    def excess(self, middle: State, span: float) -> Excess | None:
+        """Return what lines that turn over a step bear beside their stresses in its middle; None without lines.
+
+        Parameters
+        ----------
+        middle : State
+            With the mean rates of the step.
+        span : float
+            Its duration [s].
+        """
+        if not (self.model.large and self._lines):
+            return None
+        forces, raw = self.model.forces, self.model.motion.raw
+        z = np.append(forces.slots(middle, middle.v, np.zeros(self.model.n)), span)
+        blocks, borne = np.zeros(forces.entries), np.zeros(raw)
+        for run in self._lines:
+            run(z, blocks)
+        if not self.model.motion.plain:
+            borne = (self._raw(middle, middle.v, span) - self._raw(middle, middle.v))[raw:]
+        return Excess(np.zeros(0), blocks, borne)
+
+    @cached_property
+    def _lines(self) -> tuple[Run, ...]:
+        forces, found = self.model.forces, []
+        for f, start in zip(forces.families, forces.block_starts, strict=True):
+            if _stretches(f.kernels):
+                size = f.kernels.kind.width**2
+                scatter = start + np.arange(f.count * size).reshape(f.count, size)
+                kernel = _turning_of(f.kernels.kind, f.kernels.effects)
+                found.append(forces.backend.bind(kernel, self._gather(f), f.parameters, scatter))
+        return tuple(found)
+
+    def _gather(self, f: Family) -> np.ndarray:
+        """What a piece reads, and the duration of the step."""
+        forces = self.model.forces
+        return np.hstack([f.gather(forces.drive_base), np.full((f.count, 1), forces.slot_count)])
 
     @cached_property
     def _batches(self) -> tuple[Run, ...]:
@@ -83,7 +141,7 @@ class Momenta:
             cells = f.scatter(self.model.motion.source_base)
             scatter = np.hstack([cells, raw + cells])
             kernel = _kernel_of(f.kernels.kind, f.kernels.effects)
-            found.append(forces.backend.bind(kernel, f.gather(forces.drive_base), f.parameters, scatter))
+            found.append(forces.backend.bind(kernel, self._gather(f), f.parameters, scatter))
         return tuple(found)
 
 
@@ -94,17 +152,50 @@ def _kernel_of(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
 
     symbols, parameters = symbols_of(kind)
     step = ca.SX.sym("step", kind.width)
-    nodes = moved(kind, symbols, step, ca.SX([1, 0, 0]))
+    span = ca.SX.sym("span")
+    nodes = [replace(m, span=span) for m in moved(kind, symbols, step, ca.SX([1, 0, 0]))]
     slot = symbols[NODE_SLOT * kind.nodes :]
-    still = [NodeMotion(m.x, m.R, m.v, m.w, ca.SX(3, 1), ca.SX(3, 1)) for m in nodes]
-    along = [NodeMotion(m.x, m.R, m.v, m.w, m.v, m.w) for m in nodes]
+    still = [replace(m, a=ca.SX(3, 1), b=ca.SX(3, 1)) for m in nodes]
+    along = [replace(m, a=m.v, b=m.w) for m in nodes]
     shares = kind.physics(effects, still, _accelerated(slot, 0.0), parameters)
     pushed = kind.physics(effects, along, _accelerated(slot, 1.0), parameters)
     momenta = shares.inertia - pushed.inertia
     rates = ca.vertcat(*[ca.vertcat(m.v, m.w)[: kind.freedoms] for m in nodes], slot[1::DRIVE_SLOT])
     change = shares.force + shares.inertia + ca.jtimes(momenta, step, rates)
     both = ca.substitute(ca.vertcat(momenta, change), step, ca.SX.zeros(kind.width))
-    return Kernel(f"{kind.name}_momenta", symbols, parameters, ca.cse(ca.densify(both)))
+    return Kernel(f"{kind.name}_momenta", ca.vertcat(symbols, span), parameters, ca.cse(ca.densify(both)))
+
+
+@cache
+def _turning_of(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
+    """Return the kernel of what the duration of a step adds to the slope of a line's force, column by column."""
+    import casadi as ca
+
+    symbols, parameters = symbols_of(kind)
+    span, step = ca.SX.sym("span"), ca.SX.sym("step", kind.width)
+    nodes = moved(kind, symbols, step, ca.vertcat(0.5, 1.0 / span, 0.0))
+    lasting = [replace(m, span=span) for m in nodes]
+    forces = [_pull(kind, effects, motion, parameters) for motion in (lasting, nodes)]
+    slope = ca.substitute(ca.jacobian(forces[0] - forces[1], step), step, ca.SX.zeros(kind.width))
+    return Kernel(f"{kind.name}_turning", ca.vertcat(symbols, span), parameters, ca.cse(ca.vec(ca.densify(slope))))
+
+
+def _stretches(kernels: Kernels) -> bool:
+    """Tell whether pieces resist the distance of their nodes."""
+    bending = any(isinstance(e, BeamFlexibility) for e in kernels.effects)
+    return kernels.kind in _LINES or (kernels.kind.physics is BEAM.physics and bending)
+
+
+def _pull(kind: Kind, effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], parameters: ca.SX) -> ca.SX:
+    """The force of a line; that of a beam along its chord, without the little that bending adds to it."""
+    import casadi as ca
+
+    if kind in _LINES:
+        return kind.physics(effects, nodes, ca.SX(0, 1), parameters).force
+    p, length = named(PARAMETERS, parameters), reach(*nodes)[1]
+    pull = p["EA"] * (length / p["L"] - 1.0) * (nodes[1].x - nodes[0].x) / length
+    force = ca.vertcat(pull, ca.SX(3, 1), -pull)
+    return ca.vertcat(force, ca.SX(kind.width - force.numel(), 1))
 
 
 def _accelerated(slot: ca.SX, share: float) -> ca.SX:

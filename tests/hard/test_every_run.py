@@ -27,10 +27,9 @@ def chain(count: int = 12, stiffness: float = 1e8) -> fc.Model:
     return fc.assemble(structure, [fc.LargeRotation(), fc.Gravity()])
 
 
-@pytest.mark.parametrize("method", [fc.GeneralizedAlpha(0.02), fc.ConservingMidpoint(0.02)], ids=lambda m: str(m)[:8])
-def test_steps_that_make_energy_from_nothing_end_the_run(method):
+def test_steps_that_make_energy_from_nothing_end_the_run():
     """Fixed steps of many periods of the springs: an energy that grows without a source is no result."""
-    run = fc.simulate(chain(), until=20.0, method=method)
+    run = fc.simulate(chain(), until=20.0, method=fc.GeneralizedAlpha(0.02))
     assert run.status is Status.FAILED
     assert "has made" in run.report.message
     assert "AdaptiveAlpha" in run.report.message
