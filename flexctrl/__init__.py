@@ -31,6 +31,7 @@ _HOMES = {
         "Torque",
         "Velocity",
     ),
+    "flexctrl.structure.trolleys": ("Trolley",),
     "flexctrl.structure.join_table": ("JoinTable",),
     "flexctrl.structure.structure": ("Structure", "planar"),
     "flexctrl.structure.refine": ("coarsen", "refine"),

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.damping import ModalDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import Deforming
@@ -28,6 +29,7 @@ from flexctrl.structure.freedoms import listed
 from flexctrl.structure.relations import Group
 from flexctrl.structure.signals import Tension
 from flexctrl.structure.structure import Structure
+from flexctrl.structure.trolleys import Trolley
 
 
 def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend | None = None) -> Model:
@@ -60,6 +62,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
         _check_names(structure, effect)
         effect.check_on(structure)
     structure, parts = _heavy(structure, parts)
+    _check_trolleys(structure, parts)
     if any(isinstance(e, GeometricStiffness) for e in parts):
         return _prestressed(structure, parts, backend)
     rigid = [p for p in structure.elements if isinstance(p, Beam | Rope) and not any(e.bends(p) for e in parts)]
@@ -81,6 +84,23 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping)]
     return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
+
+
+def _check_trolleys(structure: Structure, parts: tuple[Effect, ...]) -> None:
+    """Refuse trolleys that travel where nothing may move far, and rails with modes inside their elements."""
+    large = any(isinstance(e, LargeRotation) for e in parts)
+    for trolley in (p for p in structure.elements if isinstance(p, Trolley)):
+        if not large and structure.join_table.rows[structure.number(trolley.travel)][0]:
+            raise StructureError(
+                f"assemble: Trolley {trolley.name!r} travels, which is no small motion; give LargeRotation() (and "
+                f"linearize the model for small motion), or hold it with Support({trolley.name}.travel, 'u')"
+            )
+        for beam in (p for p in structure.elements if p.name in trolley.rail):
+            if any(isinstance(e, ComponentModes) and e.modes(beam) for e in parts):
+                raise StructureError(
+                    f"assemble: Trolley {trolley.name!r} rolls on the cubics of its rail's elements; ComponentModes "
+                    f"bends {beam.name!r} otherwise: name other beams in of=, or give the rail more elements"
+                )
 
 
 def _heavy(structure: Structure, parts: tuple[Effect, ...]) -> tuple[Structure, tuple[Effect, ...]]:

@@ -211,9 +211,11 @@ def whole_body(coordinates: tuple[str, ...], motion: Motion, state: State) -> li
         found.append((f"rotation about {'xyz'[axis]}", turned))
     projected = []
     nodes = T[: 6 * len(x)]
+    elsewhere = np.isin(np.arange(len(x)), motion.gauges)
     weights = nodes.T @ nodes + 1e-12 * sp.identity(len(places))
     solve = splu(weights.tocsc()).solve
-    for name, field in found:
+    for name, everywhere in found:
+        field = np.where(elsewhere[:, None], 0.0, everywhere)
         vector = solve(nodes.T @ field.ravel())
         if np.abs(nodes @ vector - _reachable(nodes, field)).max() < 1e-6 * np.abs(field).max():
             projected.append((name, vector))

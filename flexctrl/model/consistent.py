@@ -14,7 +14,7 @@ from flexctrl.structure.relations import Copy, Turn
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
 
-__all__ = ["Breach", "breaches", "check_state", "extent"]
+__all__ = ["Breach", "breaches", "check_state", "extent", "off_rails"]
 
 _ALLOWED = 1e-8
 
@@ -84,6 +84,7 @@ def breaches(model: Model, state: State) -> Iterator[Breach]:
     yield _worst(skew, lambda i: f"R of {labels[i]} is no rotation (Rᵀ R is off by {skew[i]:.3g})")
     turned = _turned(motion, state)
     yield _worst(turned, lambda i: f"{labels[i]} is turned by {turned[i]:.3g} rad against what it is tied to")
+    yield from (Breach(gap / size, what) for gap, what in _beyond(model, state))
     if motion.drives and model.large:
         astray = np.abs(motion.unwound(state.x, state.R, state.driven) - state.driven)
         astray = astray / np.where(motion.rotary, 1.0, size)
@@ -91,6 +92,31 @@ def breaches(model: Model, state: State) -> Iterator[Breach]:
         yield _worst(astray, lambda i: f"drive {names[i]} is {astray[i]:.3g} from the coordinate it drives")
     if model.large and not motion.plain:
         yield from _linked(motion, state, labels, size)
+
+
+def off_rails(model: Model, state: State) -> tuple[str, ...]:
+    """Say which trolleys are beyond the ends of their rails.
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+
+    Returns
+    -------
+    tuple of str
+    """
+    allowed = _ALLOWED * extent(model, state)
+    return tuple(what for gap, what in _beyond(model, state) if gap > allowed)
+
+
+def _beyond(model: Model, state: State) -> Iterator[tuple[float, str]]:
+    """How far each trolley is beyond the ends of its rail [m], in words too."""
+    motion = model.motion
+    for f in motion.tracks:
+        place, length = float(state.x[motion.nodes[f.gauge], 0]), f.places[-1]
+        gap, who = max(-place, place - length, 0.0), model.structure.nodes[motion.nodes[f.node]].part
+        yield gap, f"{who} is {gap:.3g} m beyond an end of its rail, which is {length:g} m long"
 
 
 def extent(model: Model, state: State) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.balance import Balance
 from flexctrl.model.certify import whole_body
-from flexctrl.model.consistent import check_state
+from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.pivots import holds, negative_pivots
@@ -124,7 +124,14 @@ def equilibrium(
     held |= {i: float(begin.q[i]) for i in model.motion.frozen}
     balance = Balance(model, model.input_vector(inputs or {}), held)
     begin = begin.with_(v=balance.still, t=0.0)
-    return rest_of(balance, _found(balance, begin, tolerance))
+    found = _found(balance, begin, tolerance)
+    if fallen := off_rails(model, found.state):
+        raise EquilibriumError(
+            f"no equilibrium found on the rails: {fallen[0]}; hold what travels, or balance its load",
+            found.state,
+            found.residual,
+        )
+    return rest_of(balance, found)
 
 
 def rest_of(balance: Balance, found: Found) -> Rest:

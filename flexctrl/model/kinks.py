@@ -1,4 +1,4 @@
-"""Where laws of force have a corner: a rope goes slack or taut, a gap closes or opens.
+"""Where laws of force have a corner: a rope goes slack or taut, a gap closes or opens, a rail ends.
 
 Steps end there, or the corner would cost accuracy however small the step: the values' signs tell the sides.
 """
@@ -16,7 +16,8 @@ from flexctrl.effects.backlash import gaps_of
 from flexctrl.model.loose_kinds import loose_names
 from flexctrl.model.motion import State
 from flexctrl.structure.drives import Winch
-from flexctrl.structure.elements import Rope, Spring
+from flexctrl.structure.elements import Node, Rope, Spring
+from flexctrl.structure.trolleys import Trolley
 
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
@@ -49,9 +50,19 @@ class Turn:
     end: str = ""
 
 
+@dataclass(frozen=True)
+class RailEnd:
+    """An end of a trolley's rail: where sign·s + offset, positive on the rail, is zero."""
+
+    trolley: Trolley
+    sign: float
+    offset: float
+    end: str
+
+
 @dataclass(frozen=True, eq=False)
 class Kinks:
-    """The corners of a model's laws of force: lengths of lines, then turns of drives.
+    """The corners of a model's laws of force: lengths of lines, turns of drives, then ends of rails.
 
     Attributes
     ----------
@@ -89,6 +100,19 @@ class Kinks:
         return [slack, Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, message)]
 
     @cached_property
+    def _rails(self) -> tuple[RailEnd, ...]:
+        """Both ends of every rail."""
+        found = []
+        for p in (p for p in self.model.structure.elements if isinstance(p, Trolley)):
+            length = next(t.places[-1] for t in self.model.structure.tracks if t.node == self._number(p.node))
+            found.append(RailEnd(p, 1.0, 0.0, f"{p.name} is at the start of its rail"))
+            found.append(RailEnd(p, -1.0, length, f"{p.name} is at the end of its rail, {length:.6g} m from its start"))
+        return tuple(found)
+
+    def _number(self, node: Node) -> int:
+        return self.model.structure.number(node)
+
+    @cached_property
     def _loose(self) -> frozenset[str]:
         return loose_names(self.model.structure, self.model.effects)
 
@@ -96,12 +120,13 @@ class Kinks:
     def names(self) -> tuple[str, ...]:
         """The parts, in the order of `values`; one with play has two flanks."""
         drives = self.model.structure.drives
-        return (*(p.name for p, _ in self._lines), *(drives[turn.drive].name for turn in self._turns))
+        turns = (drives[turn.drive].name for turn in self._turns)
+        return (*(p.name for p, _ in self._lines), *turns, *(end.trolley.name for end in self._rails))
 
     @cached_property
     def ends(self) -> tuple[str, ...]:
         """What to say where a run cannot go on beyond a corner; empty where it can."""
-        return (*("" for _ in self._lines), *(turn.end for turn in self._turns))
+        return (*("" for _ in self._lines), *(turn.end for turn in self._turns), *(rail.end for rail in self._rails))
 
     @cached_property
     def lines(self) -> tuple[np.ndarray, np.ndarray]:
@@ -117,12 +142,20 @@ class Kinks:
         return np.array([turn.drive for turn in self._turns], dtype=int), np.array(rows).reshape(-1, 3)
 
     @cached_property
+    def rails(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes whose x is how far a trolley has travelled; sign and offset of an end of its rail (2)."""
+        rows = [(rail.sign, rail.offset) for rail in self._rails]
+        nodes = [self._number(rail.trolley.travel) for rail in self._rails]
+        return np.array(nodes, dtype=int), np.array(rows).reshape(-1, 2)
+
+    @cached_property
     def dust(self) -> np.ndarray:
         """Values below these are zero but for round-off."""
-        return np.append(_ROUND_OFF * self.lines[1], [turn.dust for turn in self._turns])
+        longest = [_ROUND_OFF * track.places[-1] for track in self.model.structure.tracks for _ in range(2)]
+        return np.concatenate([_ROUND_OFF * self.lines[1], [turn.dust for turn in self._turns], longest])
 
     def values(self, state: State) -> np.ndarray:
-        """Return what changes its sign at the corners: stretch of ropes, strains from flanks of gaps, rope left.
+        """Return what changes its sign at the corners: stretch of ropes, strains from flanks, rope or rail left.
 
         Parameters
         ----------
@@ -137,7 +170,9 @@ class Kinks:
         arms = state.x[ends[:, 1]] - state.x[ends[:, 0]]
         strains = np.sqrt(np.einsum("ij,ij->i", arms, arms)) - lengths
         own = np.append(state.q, 0.0)[motion.sources[drives]]
-        return np.append(strains, rows[:, 0] * state.driven[drives] + rows[:, 1] * own - rows[:, 2])
+        turned = rows[:, 0] * state.driven[drives] + rows[:, 1] * own - rows[:, 2]
+        travelling, ends = self.rails
+        return np.concatenate([strains, turned, ends[:, 0] * state.x[travelling, 0] + ends[:, 1]])
 
     def standing(self, state: State, free: np.ndarray) -> tuple[str, ...]:
         """Say in words which parts stand exactly on a corner that a motion of the free coordinates would leave.
@@ -154,9 +189,12 @@ class Kinks:
             Each part with what to do about it. Empty where all laws of force have a derivative.
         """
         on = np.flatnonzero(np.abs(self.values(state)) <= self.dust)
-        lines = len(self.lines[1])
-        moved = self._leaving(state, free)
-        return tuple(dict.fromkeys(self._words(i) for i in on.tolist() if i >= lines or moved[i]))
+        moved = np.concatenate([self._leaving(state, free), np.ones(len(self._turns), dtype=bool), self._rolling(free)])
+        return tuple(dict.fromkeys(self._words(i) for i in on.tolist() if moved[i]))
+
+    def _rolling(self, free: np.ndarray) -> np.ndarray:
+        """Whether each trolley can travel with some coordinates."""
+        return np.isin(self.model.motion.place[self.rails[0], 0], free)
 
     def _leaving(self, state: State, free: np.ndarray) -> np.ndarray:
         """Whether the length of each line changes with any of some coordinates."""
@@ -174,6 +212,8 @@ class Kinks:
     def _words(self, corner: int) -> str:
         """What to say of a part on its corner."""
         name = self.names[corner]
+        if corner >= len(self.names) - len(self._rails):
+            return self.ends[corner] + "; hold it there, or move it off the end"
         if self.ends[corner]:
             return self.ends[corner] + "; pay some out"
         if name in self._loose:

@@ -132,15 +132,17 @@ class Layout:
 
     def _slopes(self) -> sp.csr_matrix:
         """A matrix with all entries that slopes have: those of levers in a place where none vanishes by chance, as
-        pieces push on them even where they do not (slack ropes), and as they turn in motion. Through rigid loops all
-        may depend on all."""
+        pieces push on them even where they do not (slack ropes), as they turn in motion, and all along rails. Through
+        rigid loops all may depend on all."""
         m, rng = self.motion, np.random.default_rng(0)
         step, v, a = rng.uniform(0.1, 0.4, (3, m.n))
-        state = m.advance(m.rest, step, v, 0.0)
         u = rng.uniform(0.5, 1.0, len(self.model.inputs))
-        T = abs(m.jacobian(state))
         pushed = sp.csr_matrix((np.ones(len(self.forces.pattern[0])), self.forces.pattern), shape=(m.raw, m.raw))
-        found = abs(self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)) + T.T @ pushed @ T
+        found = sp.csr_matrix((m.n, m.n))
+        for moved in m.along_rails(step):
+            state = m.advance(m.rest, moved, v, 0.0)
+            T = abs(m.jacobian(state))
+            found = found + abs(self.model.slope(state, v, a, (1.0, 2.0, 3.0), u)) + T.T @ pushed @ T
         if not m.linkage.loops:
             return found
         closed = np.isin(np.arange(m.n), m.linked).astype(float)

@@ -16,10 +16,10 @@ from flexctrl.model.linkage import Linkage
 from flexctrl.model.motion import Dry, Motion, State
 from flexctrl.model.open_linkage import Link, Loop, renumbered
 from flexctrl.model.twists import Twists
-from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
+from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, TRAVEL, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis
-from flexctrl.structure.relations import Closure, Copy, Fit, Group, Ties, Turn
+from flexctrl.structure.relations import Closure, Fit, Follow, Group, Ride, Ties, Track, Turn
 from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import tie
 
@@ -69,7 +69,7 @@ def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
         table = structure.joints
         numbers = {n for row in table.rows for n in row}
         return Ties(table.rows, (), (), (), max(numbers, default=0))
-    return tie(structure.nodes, structure.joints, rigid)
+    return tie(structure.nodes, structure.joints, rigid, structure.tracks)
 
 
 @dataclass(frozen=True)
@@ -129,13 +129,13 @@ def _linkage(
     """Return the linkage of a structure, the numbers of its nodes and of its independent freedoms."""
     none = int(place.max(initial=0))
     sides = [(s.number(d.node), len(s.nodes) if d.against is None else s.number(d.against)) for d in s.drives]
-    used = {n for f in ties.follows for n in (f.node, f.master)} | {n for n, _ in ties.lines}
+    used = {n for f in ties.follows for n in _involved(f)} | {n for n, _ in ties.lines}
     used |= {n for pair in sides for n in pair}
     used |= set(np.flatnonzero(np.isin(place, loops.dependent).any(axis=1)).tolist())
     used |= {n for c in loops.closures for n in _sides(c) if n >= 0}
     nodes = sorted(used)
     local = {n: i for i, n in enumerate(nodes)}
-    owns = {f.own - 1 for f in ties.follows if not isinstance(f, Copy) and f.own}
+    owns = {f.own - 1 for f in ties.follows if isinstance(f, Ride | Turn) and f.own}
     every = (set(place[nodes].ravel().tolist()) - {none}) | owns
     independent = sorted(every - set(loops.dependent))
     order = {number: i for i, number in enumerate([*independent, *loops.dependent])}
@@ -153,6 +153,13 @@ def _linkage(
         free=len(independent),
     )
     return linkage, np.array(nodes, dtype=int), np.array(independent, dtype=int)
+
+
+def _involved(follow: Follow) -> tuple[int, ...]:
+    """The nodes a follower has to do with."""
+    if isinstance(follow, Track):
+        return (follow.node, follow.gauge, *follow.rail)
+    return (follow.node, follow.master)
 
 
 def _sides(c: Closure | Fit) -> tuple[int, int]:
@@ -182,14 +189,15 @@ def _names(structure: Structure, ties: Ties) -> list[str]:
     """Name each degree of freedom after the first node that has it: ``part_index_freedom``."""
     names = [""] * ties.free
     for follow in ties.follows:
-        if not isinstance(follow, Copy) and follow.own:
+        if isinstance(follow, Ride | Turn) and follow.own:
             node = structure.nodes[follow.node]
             kind = "turn" if isinstance(follow, Turn) else "slide"
             names[follow.own - 1] = f"{node.part}_{node.index}_{kind}"
     for node, row in zip(structure.nodes, ties.cells, strict=True):
         for f, number in enumerate(row):
             if number > 0 and not names[number - 1]:
-                names[number - 1] = f"{node.part}_{node.index}_{IDENTIFIERS[f]}"
+                own = "slide" if node.freedoms == TRAVEL else f"{node.index}_{IDENTIFIERS[f]}"
+                names[number - 1] = f"{node.part}_{own}"
     return names
 
 

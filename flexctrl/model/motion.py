@@ -8,6 +8,7 @@ follower, and forces back again. Inner freedoms of effects (a bristle, a motor's
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,6 +21,7 @@ from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.linkage import Linkage, reciprocal_condition
 from flexctrl.model.twists import Twists
 from flexctrl.structure.drives import Drive, RotaryDrive
+from flexctrl.structure.relations import Track
 
 DENSE_UP_TO = 60
 """Degrees of freedom up to which matrices are worked as plain arrays."""
@@ -201,6 +203,26 @@ class Motion:
     def ratios(self) -> np.ndarray:
         """Motor angle per driven coordinate of each drive."""
         return np.array([d.effective_ratio for d in self.drives])
+
+    @cached_property
+    def tracks(self) -> tuple[Track, ...]:
+        """What travels along rails, in the numbers of the linkage's nodes."""
+        return tuple(f for f in self.linkage.follows if isinstance(f, Track))
+
+    @cached_property
+    def gauges(self) -> np.ndarray:
+        """Nodes that are nowhere in space: their x is how far something has travelled."""
+        return self.nodes[[f.gauge for f in self.tracks]]
+
+    def along_rails(self, step: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield a step as it is where nothing travels, else with all that travels brought to each element in turn."""
+        own = self.place[self.gauges, 0]
+        for k in range(max((len(f.places) - 1 for f in self.tracks), default=1)):
+            moved = np.append(step, 0.0)
+            for f, number in zip(self.tracks, own, strict=True):
+                i = min(k, len(f.places) - 2)
+                moved[number] = 0.5 * (f.places[i] + f.places[i + 1]) - f.start
+            yield moved[:-1]
 
     @cached_property
     def plain(self) -> bool:

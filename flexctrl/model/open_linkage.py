@@ -6,7 +6,7 @@ Only places and rates are written down; all else follows by differentiation (`fl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +14,10 @@ import numpy as np
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, hoist_motion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
+from flexctrl.mechanics.track import travelled, travelling
 from flexctrl.structure.drives import Drive, RotaryDrive, Winch
 from flexctrl.structure.freedoms import Vector
-from flexctrl.structure.relations import Copy, Fit, Follow, Ride, Turn
+from flexctrl.structure.relations import Copy, Fit, Follow, Ride, Track, Turn
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -54,7 +55,7 @@ class OpenLinkage:
         Number of each nodal freedom among the linkage's; one past the last for none.
     rest : numpy.ndarray, shape (count, 3)
         Positions at rest.
-    follows : tuple of Ride, Turn or Copy
+    follows : tuple of Ride, Turn, Copy or Track
         In an order in which they can be evaluated; ``own`` counts from 1 among the linkage's freedoms.
     lines : tuple of (int, numpy.ndarray)
         Nodes that turn about body axes (columns).
@@ -112,6 +113,11 @@ class OpenLinkage:
         import casadi as ca
 
         (v, w), (mv, mw) = motion[f.node], motion[f.master]
+        if isinstance(f, Track):
+            axes = [attitude(pose[:, i]) @ ca.DM(f.along) for i in f.rail]
+            moves = [(*motion[i], t) for i, t in zip(f.rail, axes, strict=True)]
+            nodes = [(pose[:3, i], t, u, ca.cross(spin, t)) for i, (u, spin, t) in zip(f.rail, moves, strict=True)]
+            return travelling(pose[0, f.gauge], motion[f.gauge][0][0], f.places, nodes), w
         if isinstance(f, Turn):
             a = attitude(pose[:, f.master]) @ ca.DM(f.axis)
             return v, mw + a * (_own(f.own, every) - ca.dot(a, mw))
@@ -168,6 +174,9 @@ class OpenLinkage:
             elif isinstance(f, Ride):
                 slid = self._slid(f, x, R, old, _own(f.own, step))
                 x[n] = x[m] + R[m] @ (ca.DM(self.rest[n] - self.rest[m]) + slid)
+            elif isinstance(f, Track):
+                axis = ca.DM(f.along)
+                x[n] = travelled(x[f.gauge][0], f.places, [(x[i], R[i] @ axis) for i in f.rail])
             elif f.freedom == 3:
                 R[n] = R[m]
             else:
@@ -242,6 +251,9 @@ def _twist(Q: ca.SX, axis: ca.DM) -> ca.SX:
 
 def renumbered(follow: Follow, local: dict[int, int], own: dict[int, int]) -> Follow:
     """Return a follower in the node and freedom numbers of a linkage."""
+    if isinstance(follow, Track):
+        rail = tuple(local[n] for n in follow.rail)
+        return replace(follow, node=local[follow.node], gauge=local[follow.gauge], rail=rail)
     node, master = local[follow.node], local[follow.master]
     if isinstance(follow, Copy):
         return Copy(node, follow.freedom, master)

@@ -30,6 +30,8 @@ HUGE = 1e50
 ALL = frozenset(range(6))
 TRANSLATIONS = frozenset(range(3))
 ROTATIONS = frozenset(range(3, 6))
+TRAVEL = frozenset({0})
+"""Of a node that is nowhere in space: its u is how far something has travelled."""
 
 
 def parse_freedoms(text: str | Iterable[str], owner: str) -> frozenset[int]:

@@ -12,7 +12,7 @@ from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector, check_whole, listed, numbers
 from flexctrl.structure.joints import Joint, main_axis
-from flexctrl.structure.relations import Copy, Follow, Group, Ride, Turn
+from flexctrl.structure.relations import Copy, Follow, Group, Ride, Track, Turn
 from flexctrl.structure.ties import tie
 
 if TYPE_CHECKING:
@@ -187,7 +187,13 @@ def _columns(columns: str) -> list[int]:
     return [known[n] for n in names]
 
 
-def join(nodes: Sequence[Node], joints: Sequence[Joint], drives: Sequence[Drive], groups: Sequence[Group]) -> JoinTable:
+def join(
+    nodes: Sequence[Node],
+    joints: Sequence[Joint],
+    drives: Sequence[Drive],
+    groups: Sequence[Group],
+    tracks: Sequence[Track] = (),
+) -> JoinTable:
     """Make the join table of some nodes from their joints.
 
     Parameters
@@ -198,12 +204,14 @@ def join(nodes: Sequence[Node], joints: Sequence[Joint], drives: Sequence[Drive]
     drives : sequence of Drive
     groups : sequence of Group
         Rigid parts, whose points follow each other.
+    tracks : sequence of Track
+        What travels along beams.
 
     Returns
     -------
     JoinTable
     """
-    ties = tie(nodes, joints, groups)
+    ties = tie(nodes, joints, groups, tracks)
     rows = [list(row) for row in ties.cells]
     relative: set[tuple[int, int]] = set()
     for follow in ties.follows:
@@ -213,7 +221,7 @@ def join(nodes: Sequence[Node], joints: Sequence[Joint], drives: Sequence[Drive]
             if (follow.master, f) in relative or _skew(follow, nodes):
                 relative.add((follow.node, f))
         axis = _axis_of(follow)
-        if not isinstance(follow, Copy) and axis is not None:
+        if isinstance(follow, Ride | Turn) and axis is not None:
             rows[follow.node][columns[0] + main_axis(axis)] = follow.own
     return JoinTable(
         rows=tuple(tuple(row) for row in rows),  # type: ignore[misc]
@@ -238,8 +246,8 @@ def _axis_of(follow: Follow) -> Vector | None:
 
 def _skew(follow: Follow, nodes: Sequence[Node]) -> bool:
     """Tell whether the row does not say it all: a lever arm, or an axis that is not a global one."""
-    if isinstance(follow, Copy):
-        return False
+    if isinstance(follow, Copy | Track):
+        return isinstance(follow, Track)
     axis = _axis_of(follow)
     if axis is not None:
         return abs(axis[main_axis(axis)]) < 1.0 - 1e-12

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.elements import Beam, Node, Part, PointMass, RigidBody
+from flexctrl.structure.trolleys import Trolley
 
 
 def node_of(elements: Sequence[Part], name: str) -> Node:
@@ -17,7 +18,8 @@ def node_of(elements: Sequence[Part], name: str) -> Node:
         The parts whose nodes may be named.
     name : str
         ``part.start``, ``part.end`` or, for beams, ``part.3`` (counted from 0, or from the end if
-        negative); ``mass`` alone; a rigid body's name alone (its centre of mass) or ``body.point``.
+        negative); ``mass`` alone; a rigid body's name alone (its centre of mass) or ``body.point``;
+        ``trolley`` or ``trolley.travel``.
 
     Returns
     -------
@@ -48,6 +50,8 @@ def _node(part: Part, point: str, name: str) -> Node:
 
 
 def _points(part: Part) -> dict[str, Node]:
+    if isinstance(part, Trolley):
+        return {"": part.node, "travel": part.travel}
     if isinstance(part, PointMass):
         return {"": part.node}
     if isinstance(part, RigidBody):

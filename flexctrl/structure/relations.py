@@ -50,7 +50,28 @@ class Copy:
     master: int
 
 
-Follow: TypeAlias = Ride | Turn | Copy
+@dataclass(frozen=True)
+class Track:
+    """x_node = r(s): a point of the bent axis of a rail, with s the place x of the node ``gauge``.
+
+    ``rail`` are the rail's nodes in order, ``places`` their s; ``along`` is the axis of their sections at rest, and
+    ``start`` the s at rest.
+    """
+
+    node: int
+    gauge: int
+    rail: tuple[int, ...]
+    places: tuple[float, ...]
+    along: Vector
+    start: float
+
+    @property
+    def master(self) -> int:
+        """The rail's node before it at rest."""
+        return self.rail[max(sum(place <= self.start for place in self.places[:-1]) - 1, 0)]
+
+
+Follow: TypeAlias = Ride | Turn | Copy | Track
 
 
 @dataclass(frozen=True)
@@ -84,7 +105,7 @@ class Ties:
     ----------
     cells : tuple of 6-tuples
         Number of the degree of freedom (from 1), 0 for held, -1 for one that follows.
-    follows : tuple of Ride, Turn or Copy
+    follows : tuple of Ride, Turn, Copy or Track
         In an order in which they can be evaluated.
     closures : tuple of Closure or Fit
         Conditions on followers that close a loop of rigid parts.
@@ -132,6 +153,8 @@ def writes(follow: Follow) -> tuple[int, bool]:
 
 def reads(follow: Follow) -> tuple[tuple[int, bool], ...]:
     """Return what a follower needs of its master: position, rotation or both."""
+    if isinstance(follow, Track):
+        return ((follow.gauge, False), *((node, turns) for node in follow.rail for turns in (False, True)))
     if isinstance(follow, Ride):
         return ((follow.master, False), (follow.master, True))
     return ((follow.master, isinstance(follow, Turn) or follow.freedom == 3),)

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.drives import Drive, RotaryDrive, Winch
 from flexctrl.structure.elements import Node, Part, RigidBody, Rope, Spring, check_node
-from flexctrl.structure.freedoms import FREEDOMS, check_name, listed, parse_direction
+from flexctrl.structure.freedoms import FREEDOMS, TRAVEL, check_name, listed, parse_direction
 from flexctrl.structure.join_table import JoinTable, Row, drive_row, join
 from flexctrl.structure.joints import Hinge, Joint, Slide, Support, Weld, main_axis
-from flexctrl.structure.relations import Group
+from flexctrl.structure.relations import Group, Track
 from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,
@@ -34,6 +34,7 @@ from flexctrl.structure.signals import (
     Torque,
     Velocity,
 )
+from flexctrl.structure.trolleys import Trolley, check_rails, tracks_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +48,7 @@ class Structure:
 
     Parameters
     ----------
-    elements : sequence of Beam, Rope, Spring, PointMass or RigidBody
+    elements : sequence of Beam, Rope, Spring, PointMass, RigidBody or Trolley
         The parts; their nodes are numbered in this order.
     joints : sequence of Support, Weld, Pin, Hinge or Slide, or a JoinTable
         How nodal freedoms are tied. A `JoinTable` made from rows may stand in place of joints.
@@ -91,6 +92,7 @@ class Structure:
         _check_names(self)
         _check_nodes(self)
         _check_table(self)
+        _check_trolleys(self)
         _check_coincidence(self)
         _check_drives(self)
         _check_pieces(self)
@@ -109,13 +111,18 @@ class Structure:
                 labels=tuple(f"{n.part} {n.index}" for n in self.nodes),
                 drive_labels=tuple(d.name for d in self.drives),
             )
-        return join(self.nodes, self.joints, self.drives, self.bodies)
+        return join(self.nodes, self.joints, self.drives, self.bodies, self.tracks)
 
     @cached_property
     def bodies(self) -> tuple[Group, ...]:
         """The rigid bodies with more than one node, as groups of node numbers (from 0)."""
         parts = [p for p in self.elements if isinstance(p, RigidBody) and p.points]
         return tuple(Group(p.name, tuple(self._places[n.part, n.index] for n in p.nodes)) for p in parts)
+
+    @cached_property
+    def tracks(self) -> tuple[Track, ...]:
+        """How trolleys follow their rails, in node numbers (from 0)."""
+        return tracks_of(self.elements, self._places)
 
     def number(self, node: Node) -> int:
         """Return a node's place in `nodes`, from 0 (the join table counts from 1).
@@ -249,7 +256,8 @@ def planar(structure: Structure, normal: str = "z") -> Structure:
     if isinstance(structure.joints, JoinTable):
         raise StructureError("planar: the joints are a JoinTable; give its rows with columns='u v θz' instead")
     kept = {(axis + 1) % 3, (axis + 2) % 3, 3 + axis}
-    supports = [Support(node, [FREEDOMS[f] for f in sorted(node.freedoms - kept)]) for node in structure.nodes]
+    across = [(node, node.freedoms - kept) for node in structure.nodes if node.freedoms != TRAVEL]
+    supports = [Support(node, [FREEDOMS[f] for f in sorted(held)]) for node, held in across]
     return structure.with_(joints=(*structure.joints, *supports))
 
 
@@ -332,6 +340,17 @@ def _check_table(s: Structure) -> None:
                 f"drive {drive.name!r}: the join table has its source angle in {row}; expected "
                 f"{drive_row(drive, max(row))}, the column of the driven freedom"
             )
+
+
+def _check_trolleys(s: Structure) -> None:
+    trolleys = [p for p in s.elements if isinstance(p, Trolley)]
+    if trolleys and isinstance(s.joints, JoinTable):
+        raise StructureError(
+            f"Structure {s.name!r}: Trolley {trolleys[0].name!r} needs joints beside it, not a table of numbers: what "
+            "travels is no row of one"
+        )
+    if not isinstance(s.joints, JoinTable):
+        check_rails(s.elements, s.joints, f"Structure {s.name!r}")
 
 
 def _check_coincidence(s: Structure) -> None:
@@ -419,6 +438,8 @@ def _check_pieces(s: Structure) -> None:
     else:
         for joint in s.joints:
             link([n.part for n in joint.nodes] + ([ground] if isinstance(joint, Support) else []))
+    for trolley in (p for p in s.elements if isinstance(p, Trolley)):
+        link([trolley.name, *trolley.rail])
     for drive in s.drives:
         link([drive.node.part, ground if drive.against is None else drive.against.part])
     pieces = _pieces(linked)

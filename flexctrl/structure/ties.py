@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from flexctrl.errors import StructureError
 from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import Vector
 from flexctrl.structure.joints import Hinge, Joint, Slide, Support, main_axis
@@ -21,6 +22,7 @@ from flexctrl.structure.relations import (
     Group,
     Ride,
     Ties,
+    Track,
     Turn,
     fits,
     in_order,
@@ -30,7 +32,7 @@ from flexctrl.structure.relations import (
 )
 
 
-def tie(nodes: Sequence[Node], joints: Sequence[Joint], groups: Sequence[Group]) -> Ties:
+def tie(nodes: Sequence[Node], joints: Sequence[Joint], groups: Sequence[Group], tracks: Sequence[Track] = ()) -> Ties:
     """Work out the ties of some nodes.
 
     Parameters
@@ -39,12 +41,19 @@ def tie(nodes: Sequence[Node], joints: Sequence[Joint], groups: Sequence[Group])
     joints : sequence of Joint
     groups : sequence of Group
         Rigid parts.
+    tracks : sequence of Track
+        What travels along beams.
 
     Returns
     -------
     Ties
+
+    Raises
+    ------
+    StructureError
+        For rigid parts that follow each other in a circle.
     """
-    return _Tying(nodes, joints, groups).result()
+    return _Tying(nodes, joints, groups, tracks).result()
 
 
 class _Classes:
@@ -66,8 +75,10 @@ class _Classes:
 class _Tying:
     """The work in progress of `tie`: classes of same cells, and who defines each class."""
 
-    def __init__(self, nodes: Sequence[Node], joints: Sequence[Joint], groups: Sequence[Group]) -> None:
-        self.nodes, self.groups = nodes, groups
+    def __init__(
+        self, nodes: Sequence[Node], joints: Sequence[Joint], groups: Sequence[Group], tracks: Sequence[Track]
+    ) -> None:
+        self.nodes, self.groups, self.tracks = nodes, groups, tracks
         self.place = {(n.part, n.index): i for i, n in enumerate(nodes)}
         self.ground = 6 * len(nodes)
         self.same = _Classes(self.ground + 1)
@@ -101,7 +112,9 @@ class _Tying:
         held = dict.fromkeys(links, 0)
         for place, node in enumerate(self.nodes):
             held[self._unit(node)] = max(held[self._unit(node)], sum(self.held(place, f) for f in range(6)))
-        for a, b in ([self._unit(n) for n in j.nodes] for j in joints if not isinstance(j, Support)):
+        tied = [j.nodes for j in joints if not isinstance(j, Support)]
+        tied += [(self.nodes[t.node], self.nodes[n]) for t in self.tracks for n in t.rail]
+        for a, b in ([self._unit(n) for n in pair] for pair in tied):
             links[a].add(b)
             links[b].add(a)
         depth: dict[int, int] = {}
@@ -157,18 +170,22 @@ class _Tying:
         across = {3, 4, 5} - ({3 + main} if isinstance(joint, Hinge) else set())
         return any(all(self.held(self.place[n.part, n.index], f) for f in across) for n in joint.nodes)
 
-    def _ordered(self) -> list[Hinge | Slide | Group]:
-        def key(item: Hinge | Slide | Group) -> tuple[int, int]:
+    def _ordered(self) -> list[Hinge | Slide | Group | Track]:
+        def key(item: Hinge | Slide | Group | Track) -> tuple[int, int]:
             if isinstance(item, Group):
                 return (self.depth[item.nodes[0]], 1)
+            if isinstance(item, Track):
+                return (self.depth[self._unit(self.nodes[item.node])], 0)
             return (max(self.depth[self._unit(n)] for n in item.nodes), 0)
 
-        return sorted([*self.moving, *self.groups], key=key)
+        return sorted([*self.tracks, *self.moving, *self.groups], key=key)
 
     def result(self) -> Ties:
         for item in self._ordered():
             if isinstance(item, Group):
                 self._group(item)
+            elif isinstance(item, Track):
+                self._track(item)
             else:
                 self._axis(item)
         return self._number()
@@ -209,6 +226,12 @@ class _Tying:
             self._follow(Turn(node, master, joint.axis))
         else:
             self._follow(Ride(node, master, along=joint.along))
+
+    def _track(self, track: Track) -> None:
+        if self._hangs(track):
+            name = self.nodes[track.node].part
+            raise StructureError(f"Trolley {name!r}: its rail is carried by the trolley itself; make a part flexible")
+        self._follow(track)
 
     def _follow(self, follow: Follow) -> None:
         """Let a node follow; if its place is told already, or the master's hangs on it, demand that it fits."""
@@ -282,7 +305,7 @@ class _Tying:
         return Ties(tuple(cells), in_order(follows), tuple(self.closures), tuple(self.lines), free)
 
     def _numbered(self, follow: Follow, owns: dict[tuple[int, bool], int]) -> Follow:
-        return follow if isinstance(follow, Copy) else replace(follow, own=owns.get(writes(follow), 0))
+        return follow if isinstance(follow, Copy | Track) else replace(follow, own=owns.get(writes(follow), 0))
 
 
 __all__ = ["tie"]

@@ -21,22 +21,29 @@ class Corners:
 
     Attributes
     ----------
-    lines, turns : int
+    lines, turns, rails : int
     ends : Wholes
         Slots of the nodes at the ends of each line.
     drives : Wholes
     lengths, sums : Reals
         Where lines have corners; weights of driven coordinates and source angles, and where their sums have (3 each).
+    travels : Wholes
+        Slots of the nodes whose x is how far something has travelled.
+    spans : Reals
+        Sign and offset of each end of a rail (2 each).
     dust, sides : Reals
         What is zero but for round-off; the sides the motion is on, 0: not yet known.
     """
 
     lines: int
     turns: int
+    rails: int
     ends: Wholes
     drives: Wholes
     lengths: Reals
     sums: Reals
+    travels: Wholes
+    spans: Reals
     dust: Reals
     sides: Reals
 
@@ -44,10 +51,11 @@ class Corners:
 def corners_of(model: Model) -> Corners:
     """Return the corners of a model."""
     kinks = model.kinks
-    (ends, lengths), (drives, sums) = kinks.lines, kinks.shafts
+    (ends, lengths), (drives, sums), (travels, spans) = kinks.lines, kinks.shafts, kinks.rails
     sides = np.zeros(len(kinks.names))
-    counts = len(lengths), len(drives)
-    return Corners(*counts, NODE_SLOT * ends.ravel(), drives, lengths, sums.ravel(), kinks.dust, sides)
+    counts = len(lengths), len(drives), len(travels)
+    places = NODE_SLOT * ends.ravel(), drives, lengths, sums.ravel(), NODE_SLOT * travels, spans.ravel()
+    return Corners(*counts, *places, kinks.dust, sides)
 
 
 def passes(c: Corners, f: Flat) -> bool:
@@ -55,6 +63,10 @@ def passes(c: Corners, f: Flat) -> bool:
     for k in range(c.lines + c.turns):
         value = stretch(c, f, k) if k < c.lines else turn(c, f, k - c.lines)
         if not within(c, k, value):
+            return True
+    for k in range(c.rails):
+        left = c.spans[2 * k] * f.z[c.travels[k]] + c.spans[2 * k + 1]
+        if not within(c, c.lines + c.turns + k, left):
             return True
     return False
 
