@@ -134,6 +134,33 @@ tilt = { kind = "rotation", at = "hook", axis = [0, 1, 0], minus = "mast.1" }
     assert found.join_table.columns("v rx rz") == ((0, 0, 0),) * len(found.nodes)
 
 
+def test_a_trolley_on_a_girder_and_what_holds_it(written):
+    text = """
+[sections]
+box = { EA = 1e6, EI_y = 900, EI_z = 900, GJ = 700, rhoA = 2, rhoJ = 0.05 }
+[elements]
+girder = { kind = "beam", start = [0, 0, 5], end = [0, 4, 5], section = "box", elements = 4 }
+carriage = { kind = "trolley", along = "girder", at = 1.0, mass = 5.0 }
+[[joints]]
+kind = "support"
+node = "girder.start"
+[drives]
+travel = { kind = "linear", node = "carriage.travel", direction = "x", radius = 0.1, stiffness = 100 }
+[outputs]
+s = { kind = "position", at = "carriage.travel", direction = "x" }
+[effects]
+large_rotation = true
+[equilibrium]
+hold = { "carriage.travel.u" = 0.5 }
+"""
+    scene = load_scene(written(text))
+    girder = scene.structure.part("girder")
+    assert scene.structure.part("carriage") == fc.Trolley("carriage", girder, at=1.0, mass=5.0)
+    assert scene.rest.outputs == pytest.approx({"s": 1.5})
+    with pytest.raises(SceneError, match="there is no beam 'grider'.*girder"):
+        load_scene(written(text.replace('along = "girder"', 'along = "grider"')))
+
+
 def test_effects_that_are_not_named_are_not_simulated(written):
     text = TROLLEY.replace("flexible = true", "flexible = false\nrope_stretch = true")
     assert {type(e).__name__ for e in load_scene(written(text)).effects} == {

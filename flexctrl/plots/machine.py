@@ -53,7 +53,26 @@ class Drawn:
     def of(cls, structure: Structure) -> Drawn:
         """Return the pose at rest."""
         x = np.array([n.position for n in structure.nodes])
-        return cls(x, np.broadcast_to(np.eye(3), (len(x), 3, 3)))
+        return seen(structure, cls(x, np.broadcast_to(np.eye(3), (len(x), 3, 3))))
+
+
+def seen(structure: Structure, pose: Pose) -> Drawn:
+    """Return the pose of a structure's nodes; those that say how far a trolley has travelled stand on it.
+
+    Parameters
+    ----------
+    structure : Structure
+    pose : State
+
+    Returns
+    -------
+    Drawn
+    """
+    count = len(structure.nodes)
+    x = pose.x[:count].copy()
+    for track in structure.tracks:
+        x[track.gauge] = x[track.node]
+    return Drawn(x, pose.R[:count])
 
 
 def best_plane(structure: Structure, poses: Sequence[Pose] = ()) -> tuple[int, int] | None:
@@ -70,8 +89,7 @@ def best_plane(structure: Structure, poses: Sequence[Pose] = ()) -> tuple[int, i
     (int, int) or None
         Numbers of the horizontal and the vertical axis of the picture.
     """
-    count = len(structure.nodes)
-    points = np.vstack([Drawn.of(structure).x, *(p.x[:count] for p in poses)])
+    points = np.vstack([Drawn.of(structure).x, *(seen(structure, p).x for p in poses)])
     extent = np.ptp(points, axis=0)
     flat = [i for i in range(3) if extent[i] <= 0.01 * extent.max()]
     if not flat:
@@ -186,7 +204,7 @@ def draw_machine(
     matplotlib.axes.Axes
         The same axes.
     """
-    shown = pose or Drawn.of(structure)
+    shown = seen(structure, pose) if pose else Drawn.of(structure)
     plane = None if ax.name == "3d" else plane or best_plane(structure) or (0, 2)
     pen = Pen(ax, plane)
     for part in structure.elements:
@@ -335,4 +353,4 @@ def draw_deformed(
     return ax
 
 
-__all__ = ["Drawn", "Pose", "add_machine_axes", "best_plane", "draw_deformed", "draw_machine"]
+__all__ = ["Drawn", "Pose", "add_machine_axes", "best_plane", "draw_deformed", "draw_machine", "seen"]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.linear.modes import Modes
+from flexctrl.plots.machine import seen
 from flexctrl.plots.modes import mode_label, mode_pose
 from flexctrl.structure.structure import Structure
 
@@ -29,12 +30,10 @@ def animation(structure: Structure, modes: Modes) -> dict[str, Any]:
     """
     place = modes.place
     assert place is not None
-    rest = place.state.x[: len(structure.nodes)]
+    rest = seen(structure, place.state).x
     lines = [[structure.number(node) for node in part.nodes] for part in structure.elements]
-    shapes = [
-        {"label": mode_label(modes, k), "moved": _rounded(mode_pose(place, modes.shapes[:, k]).x[: len(rest)] - rest)}
-        for k in range(len(modes))
-    ]
+    poses = [seen(structure, mode_pose(place, modes.shapes[:, k])) for k in range(len(modes))]
+    shapes = [{"label": mode_label(modes, k), "moved": _rounded(pose.x - rest)} for k, pose in enumerate(poses)]
     return {"rest": _rounded(rest), "lines": lines, "modes": shapes}
 
 

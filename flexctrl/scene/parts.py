@@ -47,6 +47,7 @@ from flexctrl.structure.signals import (
     Velocity,
 )
 from flexctrl.structure.structure import Structure, planar
+from flexctrl.structure.trolleys import Trolley
 
 MACHINES = {
     "bridge_crane": Kind(bridge_crane, {"load": number, "rope": number, "elements": whole}),
@@ -200,11 +201,13 @@ def _element_kinds(sections: Mapping[str, Section], earlier: Sequence[Part]) -> 
 
     ends = {"start": point, "end": point}
     section = _chosen(sections, "section")
+    beam = _chosen({part.name: part for part in earlier if isinstance(part, Beam)}, "beam")
     return {
         "beam": Kind(Beam, {**ends, "section": section, "elements": whole, "up": direction}),
         "rope": Kind(Rope, {**ends, **dict.fromkeys(("EA", "length", "damping", "rhoA"), number), "elements": whole}),
         "spring": Kind(Spring, {**ends, "stiffness": number, "length": number, "damping": number}),
         "point_mass": Kind(PointMass, {"at": point, "mass": number}),
+        "trolley": Kind(Trolley, {"along": one_or_several(beam), "at": number, "mass": number}),
         "rigid_body": Kind(RigidBody, {"at": point, "mass": number, "inertia": _inertia, "points": mapping(point)}),
     }
 

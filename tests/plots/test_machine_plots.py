@@ -112,3 +112,16 @@ def test_a_run_draws_itself(runs):
     run_curves(axes[:1], runs[0], ("load_z",))
     figure = Comparison.between(*runs).plot(("load_z",))
     assert len(figure.axes) == 1
+
+
+def test_how_far_a_trolley_has_travelled_is_drawn_nowhere():
+    wire = fc.Section(EA=1e6, EI_y=9e2, EI_z=9e2, GJ=7e2, rhoA=2.0, rhoJ=0.05)
+    girder = fc.Beam("girder", (0, 0, 5), (0, 4, 5), wire, 2)
+    trolley = fc.Trolley("trolley", girder, at=1.0, mass=5.0)
+    machine = fc.Structure([girder, trolley], [fc.Support(girder.start)])
+    ax = draw_machine(add_machine_axes(Figure(), machine), machine)
+    points = np.vstack([line.get_xydata() for line in ax.lines])
+    assert best_plane(machine) == (1, 2)
+    assert points[:, 0].min() >= 0.0
+    assert np.allclose(points[:, 1], 5.0)
+    assert "4, 5" in written(ax)
