@@ -17,6 +17,7 @@ from flexctrl.dynamics import steps
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, turning, yardsticks
+from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
@@ -107,7 +108,7 @@ class Stepper:
             self._factor(memory)
 
     def start(self, state: State, supply: Supply, step: float) -> AlphaPoint:
-        """Return a state with the accelerations it has under its inputs.
+        """Return a state with the accelerations it has under its inputs; what has no mass where it balances.
 
         Raises
         ------
@@ -115,6 +116,7 @@ class Stepper:
             If a freedom has neither mass nor stiffness.
         """
         zero, flows = np.zeros(self.model.n), self.model.motion.flows
+        state, supply = settled(self.model, state, self.feed, supply)
         state = flowing(self.model, state, supply.u)
         force = self.model.balance(state, state.v, zero) + self.model.loads(state, supply.u)
         if flows.size:

@@ -9,6 +9,7 @@ import numpy as np
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Block, Point
 from flexctrl.model.motion import State
 
@@ -89,10 +90,20 @@ class Books:
         if sums.entered < _OFTEN or sums.entered % _OFTEN == 0:
             self.close(after)
 
-    def jump(self, point: Point) -> None:
-        """Note that rates have jumped with the inputs: what is dissipated jumps with them."""
+    def jump(self, before: Point, after: Point) -> None:
+        """Note that rates have jumped with the inputs, and with them what is dissipated.
+
+        Places of what has no mass have jumped too: what the inputs did on the way and springs do not store is lost.
+        """
         if self.model.motion.flows.size:
-            self.turn(point)
+            self.turn(after)
+        if quasistatic(self.model).size:
+            (k0, v0, _), (k1, v1, _) = (self.model.energy(point.state) for point in (before, after))
+            moved = after.state.q - before.state.q
+            work = float(self.model.loads(after.state, after.supply.u) @ moved)
+            self.sums.work += work
+            self.sums.lost += work - (k1 + v1 - k0 - v0)
+            self.sums.moved = np.maximum(self.sums.moved, np.abs(after.state.q - self.first))
 
     def turn(self, point: Point) -> None:
         """Note that what is dissipated jumps."""

@@ -17,6 +17,7 @@ from flexctrl.dynamics.dense import Curve, curves_of
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
+from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Counts, Integrator, Pace, Point, Stepper
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
@@ -119,7 +120,7 @@ class _Stepper:
     def start(self, state: State, supply: Supply, step: float) -> _Point:
         """Return the point of a state, both runs together."""
         coarse, fine = self.coarse.start(state, supply, step), self.fine.start(state, supply, 0.5 * step)
-        return _Point(state, fine.rate, supply, coarse, fine, fine, np.zeros(self.model.n))
+        return _Point(fine.state, fine.rate, fine.supply, coarse, fine, fine, np.zeros(self.model.n))
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs; the runs stay apart."""
@@ -127,7 +128,12 @@ class _Stepper:
         coarse = self.coarse.renew(coarse, replace(supply, x=coarse.supply.x), step)
         fine = self.fine.renew(fine, replace(supply, x=fine.supply.x), 0.5 * step)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
-        return replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
+        point = replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
+        if not quasistatic(self.model).size:
+            return point
+        gap = self.between(coarse.state, fine.state)
+        state = self.moved_on(coarse.state, fine.state, gap)
+        return replace(point, state=state, supply=self._supply(state, coarse, fine), gap=gap)
 
     def _switched(self, run: Any, state: State) -> Any:
         """A run whose dry contacts stick or slide as those of a state do."""

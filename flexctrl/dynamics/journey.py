@@ -184,7 +184,7 @@ class Journey:
         else:
             held = replace(self.point, state=self.plan.model.switches.under(state, fresh.u))
             self.point = self.stepper.renew(held, fresh, self.mark.size)
-            self.books.jump(self.point)
+            self.books.jump(held, self.point)
         if not self.watch.idle:
             self._leapt()
         self.rows.here(self.point, 1e-6 * self.mark.size)

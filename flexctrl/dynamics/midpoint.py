@@ -20,6 +20,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import turning, yardsticks
+from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.model import Model
@@ -145,6 +146,7 @@ class _Stepper:
     def start(self, state: State, supply: Supply, step: float) -> _Point:
         """Return the point of a state; where a freedom has no mass, its rates follow from the steps alone."""
         still = np.zeros(self.model.n)
+        state, supply = settled(self.model, state, self.feed, supply)
         try:
             rate = self.masses.accelerations(state, supply.u, still)
         except SingularMatrixError:
@@ -153,7 +155,7 @@ class _Stepper:
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs: momenta do not jump."""
-        state = point.state
+        state, supply = settled(self.model, point.state, self.feed, supply)
         rate = point.rate if self.massless else self.masses.accelerations(state, supply.u, point.rate)
         return _Point(state, rate, supply, point.momenta)
 

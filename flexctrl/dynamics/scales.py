@@ -15,7 +15,7 @@ _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
 
 def turning(model: Model) -> np.ndarray:
     """Return which degrees of freedom are rotations, shape (n,)."""
-    return _once(model, _turning)
+    return once(model, _turning)
 
 
 def _turning(model: Model) -> np.ndarray:
@@ -29,7 +29,7 @@ def yardsticks(model: Model) -> np.ndarray:
     A source angle counts as the motion it drives, or a motor's many turns would excuse any error of the machine;
     inner freedoms of effects have scales of their own.
     """
-    return _once(model, _yardsticks)
+    return once(model, _yardsticks)
 
 
 def _yardsticks(model: Model) -> np.ndarray:
@@ -61,8 +61,8 @@ def farthest(model: Model, moved: np.ndarray) -> float:
     return float((way + turning(model) * (radian - way)).max(initial=0.0))
 
 
-def _once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:
-    """What is found of a model, kept with it."""
+def once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:
+    """Return what is found of a model, kept with it."""
     kept = model.__dict__.setdefault("_scales", {})
     if found not in kept:
         kept[found] = found(model)

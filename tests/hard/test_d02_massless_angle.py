@@ -5,9 +5,12 @@ A motor turns 5 kg m² through a shaft of k_θ from 10 to 10¹² N m/rad. The pe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from recorder import Absolute
+from scipy.integrate import solve_ivp
 
 import flexctrl as fc
 
@@ -67,6 +70,89 @@ def test_a_massless_angle_in_time(record, stiffness, method):
         source="M t²/2J, and M/k more",
         tolerance=Absolute(1e-6),
     )
+
+
+@dataclass(frozen=True)
+class Jolts:
+    """A torque that jumps at every sample: an open-loop controller."""
+
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ("torque",)
+    sample_time: float = 0.1
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([-0.2 if round(t / self.sample_time) % 2 == 0 else 0.3])
+
+
+def arm(damping: float = 0.0) -> fc.Model:
+    """An arm that gravity pulls at, moved by a motor without inertia through a soft shaft and a gear of 50."""
+    body = fc.RigidBody("arm", (1, 0, 0), 2.0, (1, 1, 1), points={"hub": (0, 0, 0)})
+    hub = body.point("hub")
+    motor = fc.RotaryDrive("motor", hub, axis="y", stiffness=10.0, ratio=50.0, inertia=0.0, damping=damping)
+    structure = fc.Structure(
+        [body],
+        [fc.Support(hub, "u v w rx rz")],
+        [motor],
+        inputs=[fc.MotorTorque("torque", "motor")],
+        outputs=[fc.Rotation("arm", body.node, "y"), fc.DriveAngle("angle", "motor")],
+    )
+    return fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.ShaftElasticity()])
+
+
+IMPLICIT = {
+    "AdaptiveAlpha": (fc.AdaptiveAlpha(), fc.Tolerance(1e-7, 1e-9)),
+    "GeneralizedAlpha": (fc.GeneralizedAlpha(1e-3), None),
+    "ConservingMidpoint": (fc.ConservingMidpoint(1e-3), None),
+    "Richardson": (fc.Richardson(fc.GeneralizedAlpha(2e-3, rho=1.0)), None),
+}
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_a_massless_motor_under_torques_that_jump(record, name):
+    """With nothing to accelerate, the shaft's twist is M/k at once, and the arm feels R M: J θ̈ = R M + m g r cos θ."""
+    method, tolerance = IMPLICIT[name]
+    run = fc.simulate(arm(), Jolts(), until=1.0, method=method, tolerance=tolerance)
+
+    def slope(t: float, y: np.ndarray) -> list[float]:
+        torque = -0.2 if int(t / 0.1 + 1e-9) % 2 == 0 else 0.3
+        return [y[1], (50.0 * torque + 2.0 * 9.81 * np.cos(y[0])) / 3.0]
+
+    y = np.zeros(2)
+    for k in range(10):
+        y = solve_ivp(slope, (0.1 * k, 0.1 * (k + 0.9999999999)), y, rtol=1e-12, atol=1e-12).y[:, -1]
+    record(
+        f"D2 arm on a massless motor, torques that jump, {name}: angle after 1 s [rad]",
+        ours=run["arm"][-1],
+        reference=y[0],
+        source="one freedom, scipy",
+        tolerance=1e-5,
+    )
+    record(
+        f"D2 arm on a massless motor, torques that jump, {name}: error of the twist over M/k",
+        ours=np.abs((run["angle"] - 50.0 * run["arm"] - run["torque"] / 10.0)[:-1]).max() / 0.03,
+        reference=0,
+        source="statics of the motor",
+        tolerance=Absolute(1e-4),
+    )
+    record(
+        f"D2 arm on a massless motor, torques that jump, {name}: energy lost or made",
+        ours=run.report.energy_residual,
+        reference=0,
+        source="what springs do not store of a jump is lost",
+        tolerance=Absolute(1e-4),
+    )
+    lost = 5 * 0.5**2 / 2 / 10 + 4 * 0.5**2 / 2 / 10
+    assert run.report.energy.dissipated == pytest.approx(lost, rel=1e-6)
+
+
+def test_a_massless_motor_with_a_damped_shaft_creeps_to_its_twist():
+    """c (R θ̇ − θ̇_d) + k (R θ − θ_d) + M = 0 is of first order: nothing jumps but the rate."""
+    run = fc.simulate(arm(damping=2.0), until=1.0, inputs={"torque": -0.2}, tolerance=fc.Tolerance(1e-6, 1e-9))
+    twist = -0.02 * (1.0 - np.exp(-run.t * 10.0 / 2.0))
+    assert np.abs(run["angle"] - 50.0 * run["arm"] - twist).max() < 1e-4
 
 
 @pytest.mark.parametrize("stiffness", SHAFTS)

@@ -17,6 +17,7 @@ from flexctrl.dynamics.march.legs import Held, Leg, Legs, same
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed
 
 if TYPE_CHECKING:
@@ -29,9 +30,14 @@ _SECONDS = 0.1
 
 
 def ride(journey: Journey) -> bool:
-    """Take as many steps of a run as can be marched, for about a tenth of a second; tell whether there were any."""
-    stepper = journey.stepper
+    """Take as many steps of a run as can be marched, for about a tenth of a second; tell whether there were any.
+
+    Between samples only, where some freedom has no mass: the march has no rule for how its place jumps.
+    """
+    stepper, plan = journey.stepper, journey.plan
     if not isinstance(stepper, MarchingStepper) or not journey.watch.quiet:
+        return False
+    if plan.feed.sample_time and quasistatic(plan.model).size:
         return False
     return _Ride(journey, stepper).go()
 

@@ -1,0 +1,82 @@
+"""Freedoms that move no mass: they are at once where forces balance, whatever has jumped.
+
+A motor's angle without inertia, the joint of two springs: with nothing to accelerate, a freedom with stiffness but
+neither mass nor damping has no motion of its own. Its place is the root of its forces with all massive freedoms where
+they are. Left where it was, a jump of the inputs would have it cross the gap within one step, however short.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.scales import once, yardsticks
+from flexctrl.errors import SingularMatrixError
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+from flexctrl.model.solve import factorise
+
+__all__ = ["quasistatic", "settled"]
+
+_NOTHING = 1e-14
+_EXACT = 1e-12
+_ITERATIONS = 25
+
+
+def quasistatic(model: Model) -> np.ndarray:
+    """Return the degrees of freedom with stiffness but neither mass nor damping, shape (k,)."""
+    return once(model, _quasistatic)
+
+
+def _quasistatic(model: Model) -> np.ndarray:
+    if not isinstance(model, Model) or model.switches.names:
+        return np.zeros(0, dtype=int)
+    zero, u = np.zeros(model.n), np.zeros(len(model.inputs))
+    seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    stiffness, damping, mass = (np.abs(model.slope(model.rest, zero, zero, seed, u).diagonal()) for seed in seeds)
+    light = (mass <= _NOTHING * mass.max(initial=0.0)) & (damping <= _NOTHING * damping.max(initial=0.0))
+    light[model.motion.inner] = False
+    return np.flatnonzero(light & (stiffness > 0.0))
+
+
+def settled(model: Model, state: State, feed: Feed, supply: Supply) -> tuple[State, Supply]:
+    """Return a state with its quasi-static freedoms where they balance under the inputs, and the inputs there.
+
+    Inputs of a continuous controller follow what it reads. The state is left as it is where it is balanced, or where
+    nothing holds such a freedom (a slack rope, a shaft within its play).
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+    feed : Feed
+    supply : Supply
+        Inputs from now on.
+
+    Returns
+    -------
+    tuple of State and Supply
+    """
+    light = quasistatic(model)
+    if not light.size:
+        return state, supply
+    zero, weight, first = np.zeros(model.n), 1.0 / yardsticks(model)[light], (state, supply)
+    for iteration in range(_ITERATIONS):
+        force = (model.balance(state, state.v, zero) + model.loads(state, supply.u))[light]
+        slope = model.slope(state, state.v, zero, (1.0, 0.0, 0.0), supply.u)
+        if feed.continuous:
+            slope = slope + feed.slope(state, supply, 0.0, (1.0, 0.0, 0.0))
+        try:
+            correction = factorise(slope.tocsr()[light][:, light])(-force)
+        except SingularMatrixError:
+            return first
+        size = float(np.abs(correction * weight).max())
+        if not np.isfinite(size):
+            return first
+        if size <= _EXACT:
+            return (state, supply) if iteration else first
+        step = zero.copy()
+        step[light] = correction
+        state = model.advance(state, step, state.v, state.t)
+        supply = feed.restart(state, supply)
+    return first
