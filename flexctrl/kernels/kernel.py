@@ -219,7 +219,8 @@ class CasadiVM:
         return VMRun.of(kernel, Tables.of(kernel, gather, scatter), params)
 
 
-def _has_llvmlite() -> bool:
+def can_compile() -> bool:
+    """Return whether llvmlite is installed, which makes machine code."""
     try:
         import llvmlite
     except ImportError:
@@ -249,7 +250,7 @@ class Compiled:
     optimize_up_to: int = 6000
 
     def __post_init__(self) -> None:
-        if not _has_llvmlite():
+        if not can_compile():
             oldest = ".".join(map(str, _OLDEST_LLVMLITE))
             raise MissingExtraError(
                 f"compiled kernels need llvmlite {oldest} or later: pip install flexctrl[fast], or use CasadiVM()"
@@ -275,7 +276,7 @@ class Compiled:
 
 def best_backend() -> Backend:
     """Return `Compiled` if llvmlite is installed, else `CasadiVM`."""
-    return Compiled() if _has_llvmlite() else CasadiVM()
+    return Compiled() if can_compile() else CasadiVM()
 
 
 @dataclass(frozen=True, eq=False)

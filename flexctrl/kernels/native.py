@@ -46,7 +46,7 @@ class Packed:
     Parameters
     ----------
     record : dataclass
-        Its arrays are shared, not copied: they must be contiguous.
+        Its arrays are shared, not copied: they must be contiguous. Records in it may be packed already.
 
     Raises
     ------
@@ -74,7 +74,7 @@ class Packed:
 
     def _address(self, name: str, kind: Any, value: Any) -> int:
         if isinstance(kind, type):
-            inner = Packed(value)
+            inner = value if isinstance(value, Packed) else Packed(value)
             self._kept.append(inner)
             return int(inner._words.ctypes.data)
         if kind == RUNS:

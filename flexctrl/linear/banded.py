@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from flexctrl.kernels.kernel import can_compile
+from flexctrl.linear.krylov import Space
 
 __all__ = ["Band", "Factor", "band_of", "prominent"]
 
@@ -25,15 +29,21 @@ class Factor:
     ----------
     pivots : numpy.ndarray, shape (n,)
         Squares of the diagonal of L, in the band's order.
+    diagonal : numpy.ndarray, shape (n,)
+        That of A, in the band's order.
     order : numpy.ndarray of int, shape (n,)
         Freedoms in the band's order.
     solve : callable
         rhs ↦ A⁻¹ rhs.
+    space : callable, optional
+        Entries of M, q of M-length one and M q ↦ the Krylov space of A⁻¹M that begins with q, where loops are compiled.
     """
 
     pivots: np.ndarray
+    diagonal: np.ndarray
     order: np.ndarray
     solve: Callable[[np.ndarray], np.ndarray]
+    space: Callable[[np.ndarray, np.ndarray, np.ndarray], Space] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +53,36 @@ class Band:
     Attributes
     ----------
     order : numpy.ndarray of int, shape (n,)
-    width : int
-        Half bandwidth.
-    lower : numpy.ndarray of int
+    reach : numpy.ndarray of int, shape (n,)
+        Last row of each column of the ordered matrix, its diagonal at least.
+    chosen : numpy.ndarray of int
         Which entries lie on or under the diagonal of the ordered matrix.
-    places : numpy.ndarray of int
-        Where these stand in LAPACK's band storage, column by column.
+    rows, columns : numpy.ndarray of int
+        Where these stand in it.
     """
 
     order: np.ndarray
-    width: int
-    lower: np.ndarray
-    places: np.ndarray
+    reach: np.ndarray
+    chosen: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+
+    @cached_property
+    def back(self) -> np.ndarray:
+        """Place of each freedom in the order."""
+        back = np.empty_like(self.order)
+        back[self.order] = np.arange(self.order.size)
+        return back
+
+    @cached_property
+    def _width(self) -> int:
+        """Half bandwidth."""
+        return _width(self.reach)
+
+    @cached_property
+    def _places(self) -> np.ndarray:
+        """Where the lower entries stand in LAPACK's band storage, column by column."""
+        return self.columns * self._width + self.rows
 
     def factorise(self, data: np.ndarray) -> Factor | None:
         """Cholesky factor of the matrix with these entries, or None if it is not positive definite.
@@ -68,39 +96,38 @@ class Band:
         -------
         Factor or None
         """
-        order = self.order
-        L, info = lapack.dpbtrf(self._stored(data).T, lower=1, overwrite_ab=1)
+        storage = self._stored(data)
+        diagonal = storage[:, 0].copy()
+        L, info = lapack.dpbtrf(storage.T, lower=1, overwrite_ab=1)
         if info:
             return None
 
         def solve(rhs: np.ndarray) -> np.ndarray:
-            x = np.empty_like(rhs)
-            x[order] = lapack.dpbtrs(L, rhs[order], lower=1)[0]
-            return x
+            return np.asarray(lapack.dpbtrs(L, rhs.take(self.order, axis=0), lower=1)[0].take(self.back, axis=0))
 
-        return Factor(L[0] ** 2, order, solve)
+        return Factor(L[0] ** 2, diagonal, self.order, solve)
 
-    def negative(self, data: np.ndarray, held: np.ndarray) -> int | None:
+    def negative(self, data: np.ndarray, near: Callable[[], np.ndarray], growth: float) -> int | None:
         """How many negative eigenvalues the matrix with these entries has, if it is definite with some freedoms held.
 
         They are then those of the Schur complement of the held ones (E. Haynsworth, Linear Algebra Appl. 1 (1968)
-        73–81). More freedoms are held where that turns out to be needed.
+        73–81). Those are held that tell the vectors given apart, and more where that turns out to be needed.
 
         Parameters
         ----------
         data : numpy.ndarray
             Entries in the order of the pattern.
-        held : numpy.ndarray of int
-            Freedoms.
+        near : callable
+            Vectors that span about the eigenvectors of these eigenvalues, and more, shape (n, k).
+        growth : float
+            By how much rounding of the entries may grow without any consequence.
 
         Returns
         -------
         int or None
             None if it is not definite, or the complement singular to rounding.
         """
-        storage, places = self._stored(data), np.empty_like(self.order)
-        places[self.order] = np.arange(self.order.size)
-        held = places[held]
+        storage, held = self._stored(data), self.back[prominent(near())]
         for _ in range(TRIES):
             rest, columns, own = _without(storage, held)
             L, info = lapack.dpbtrf(rest.T, lower=1, overwrite_ab=1)
@@ -112,11 +139,17 @@ class Band:
             held = np.append(held, info - 1)
         return None
 
+    def _diagonal(self, data: np.ndarray) -> np.ndarray:
+        """Diagonal of the matrix with these entries, in the band's order."""
+        diagonal, own = np.zeros(self.order.size), np.flatnonzero(self.rows == self.columns)
+        diagonal[self.rows[own]] = data[self.chosen[own]]
+        return diagonal
+
     def _stored(self, data: np.ndarray) -> np.ndarray:
         """Lower band column by column, shape (n, width + 1)."""
         n = self.order.size
-        storage = np.zeros(n * (self.width + 1))
-        storage[self.places] = data[self.lower]
+        storage = np.zeros(n * (self._width + 1))
+        storage[self._places] = data[self.chosen]
         return storage.reshape(n, -1)
 
 
@@ -169,11 +202,26 @@ def band_of(A: sp.csc_matrix) -> Band | None:
     """
     n = A.shape[0]
     order = reverse_cuthill_mckee(sp.csr_matrix((A.data, A.indices, A.indptr), A.shape), symmetric_mode=True)
-    back = np.empty(n, dtype=int)
+    back = np.empty_like(order)
     back[order] = np.arange(n)
-    rows, columns = back[A.indices], np.repeat(back, np.diff(A.indptr))
-    width = int((rows - columns).max(initial=0))
-    if width > WIDEST:
+    rows, filled = back[A.indices], np.flatnonzero(np.diff(A.indptr))
+    reach = np.arange(n)
+    last = back[filled]
+    reach[last] = np.maximum(last, np.maximum.reduceat(rows, A.indptr[filled])) if filled.size else last
+    if _width(reach) > WIDEST:
         return None
-    lower = np.flatnonzero(rows >= columns)
-    return Band(order, width, lower, columns[lower] * width + rows[lower])
+    columns = np.repeat(back, np.diff(A.indptr))
+    chosen = np.flatnonzero(rows >= columns)
+    return _kind()(order, reach, chosen, rows[chosen], columns[chosen])
+
+
+def _width(reach: np.ndarray) -> int:
+    return int((reach - np.arange(reach.size)).max(initial=0))
+
+
+def _kind() -> type[Band]:
+    if not can_compile():
+        return Band
+    from flexctrl.linear.compiled_band import CompiledBand
+
+    return CompiledBand

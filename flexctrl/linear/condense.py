@@ -15,7 +15,7 @@ from flexctrl.linear.banded import Band, band_of
 from flexctrl.linear.eigen import coordinate_scales
 from flexctrl.linear.massless import DENSE_BLOCK, Massless, as_dense, massless, pivots, solved
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.pattern import congruent, symmetric
+from flexctrl.linear.pattern import congruent, mirror, symmetric
 from flexctrl.linear.words import motions_in_words
 
 __all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map"]
@@ -99,13 +99,17 @@ class Scaled:
     @cached_property
     def stiffness(self) -> tuple[sp.csc_matrix, float]:
         """The symmetric part of K, and the largest entry of the rest relative to K's largest."""
-        even, gap = symmetric(self.model.K)
+        even, gap = symmetric(self.model.K, self._across)
         return even, gap / max(float(np.abs(even.data).max(initial=0.0)), np.finfo(float).tiny)
 
     @cached_property
     def mass(self) -> sp.csc_matrix:
         """The symmetric part of M."""
-        return symmetric(self.model.M)[0]
+        return symmetric(self.model.M, self._across)[0]
+
+    @cached_property
+    def _across(self) -> np.ndarray | None:
+        return mirror(self.model.K)  # M has the same pattern
 
 
 def audit(linear: LinearModel) -> Audit:

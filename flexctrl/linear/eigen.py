@@ -16,6 +16,7 @@ from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.banded import Band
+from flexctrl.linear.krylov import Space
 from flexctrl.linear.pencil import EPS, HIDDEN, DensePencil, Matrix, Pencil, ShiftedPencil, faint_shift, stiffness_noise
 
 __all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
@@ -27,6 +28,8 @@ UNCLEAR = 1e5 * EPS
 SHORT_SPAN = 1e4
 WIDTH = 4
 SCOUTS = 8
+GROWTH, CLEAR = 1e5, 1e-3
+NEARLY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def coordinate_scales(M: Matrix, C: Matrix, K: Matrix) -> np.ndarray:
     both = (m > 0) & (k > 0)
     w2 = float(np.median(k[both] / m[both])) if both.any() else 1.0
     d = k + w2 * m + np.sqrt(w2) * c
-    return 2.0 ** -np.round(0.5 * np.log2(np.where(d > 0, d, 1.0)))
+    return np.ldexp(1.0, -np.round(0.5 * np.log2(np.where(d > 0, d, 1.0))).astype(int))
 
 
 def complete_pairs(
@@ -148,7 +151,7 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int, band: Band | No
         elif better not in (0.0, shifted.sigma):
             shifted, start = pencil.below_all(better), np.hstack([found.phi, _noise(n, width)])
         else:
-            missed = _missed(pencil, np.sort(found.lam), count, space)
+            missed = _missed(pencil, found, count, space)
             if missed == 0:
                 return _settled(pencil, found.without_last())
             # more equal modes than the block is wide, or a start that does not hold one
@@ -218,12 +221,15 @@ def _better_shift(found: _Found, sigma: float) -> float:
     return sigma if small_enough and (clear.all() or 0.01 * scale <= -sigma) else -2.0 * scale
 
 
-def _missed(pencil: Pencil, lam: np.ndarray, count: int, space: np.ndarray) -> int:
+def _missed(pencil: Pencil, found: _Found, count: int, space: Space) -> int:
     """How many more λ lie under some gap beyond `count` than were found there; 1 if that cannot be told."""
+    order = np.argsort(found.lam)
+    lam, noise = found.lam[order], found.noise[order]
     for i in range(min(count, lam.size - 1), lam.size):
         gap = lam[i] - lam[i - 1] if i else 0.0
         if gap > 1e-6 * abs(lam[i]):
-            below = pencil.below(0.5 * (lam[i] + lam[i - 1]), space)
+            growth = min(GROWTH, CLEAR * gap / noise[: i + 1].max())
+            below = pencil.below(0.5 * (lam[i] + lam[i - 1]), space, growth)
             return 0 if below == HIDDEN else max(below - i, 1) if below != i else 0
     return 0
 
@@ -231,20 +237,22 @@ def _missed(pencil: Pencil, lam: np.ndarray, count: int, space: np.ndarray) -> i
 def _settled(pencil: Pencil | DensePencil, found: _Found) -> Eigenpairs:
     """Set λ of the rigid ones to 0, orthonormalise (these first) and sort."""
     first = np.argsort(~found.rigid, kind="stable")
-    phi = _orthonormal(pencil.M, found.phi[:, first])
+    phi = _orthonormal(pencil.M, found.phi.take(first, axis=1))
     lam, rigid, noise = np.where(found.rigid, 0.0, found.lam)[first], found.rigid[first], found.noise[first]
     order = np.argsort(lam, kind="stable")
-    return Eigenpairs(lam[order], phi[:, order], rigid[order], noise[order])
+    return Eigenpairs(lam[order], phi.take(order, axis=1), rigid[order], noise[order])
 
 
 def _orthonormal(M: np.ndarray | sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
     """M-orthonormal columns spanning the same nested spaces (Cholesky, until nothing is left to do)."""
     for _ in range(2):
         gram = phi.T @ (M @ phi)
-        if np.abs(gram - np.eye(len(gram))).max(initial=0.0) <= 8.0 * EPS:
+        gap = np.abs(gram - np.eye(len(gram))).max(initial=0.0)
+        if gap > 8.0 * EPS:
+            root, info = lapack.dpotrf(gram, lower=1)
+            if info:
+                raise LinearizationError("the mass matrix is not positive definite on the freedoms kept")
+            phi = lapack.dtrtrs(root, phi.T, lower=1)[0].T
+        if gap < NEARLY:
             break
-        root, info = lapack.dpotrf(gram, lower=1)
-        if info:
-            raise LinearizationError("the mass matrix is not positive definite on the freedoms kept")
-        phi = lapack.dtrtrs(root, phi.T, lower=1)[0].T
     return phi

@@ -1,14 +1,15 @@
-"""Block Lanczos with full reorthogonalisation for A⁻¹M, A symmetric positive definite."""
+"""Lanczos with full reorthogonalisation for A⁻¹M, A symmetric positive definite."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["Krylov", "krylov"]
+__all__ = ["NOTHING", "Blocks", "Grown", "Krylov", "Space", "krylov"]
 
 STILL = 1e-10
 ROUGH = 1e-3
@@ -16,6 +17,7 @@ GAP = 1e-6
 NOTHING = 1e-14
 PARALLEL = 1e-12
 ORTHOGONAL = 1e-2
+SELDOM = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,33 +30,63 @@ class Krylov:
         Descending.
     vectors : numpy.ndarray, shape (n, k)
         M-orthonormal, A⁻¹M y = θ y.
-    basis : numpy.ndarray, shape (n, j)
-        The whole space, M-orthonormal.
     """
 
     theta: np.ndarray
     vectors: np.ndarray
-    basis: np.ndarray
 
 
-def krylov(
-    inverse: Callable[[np.ndarray], np.ndarray], M: np.ndarray | sp.csc_matrix, start: np.ndarray, count: int
-) -> Krylov:
+class Grown(NamedTuple):
+    """How far a space has come.
+
+    Attributes
+    ----------
+    known : int
+        Vectors whose images under A⁻¹M are known.
+    rest : numpy.ndarray, shape (fresh, width)
+        What the images of the last `width` of them have beyond these, as shares of the vectors after them.
+    ended : bool
+        Whether there are no more.
+    """
+
+    known: int
+    rest: np.ndarray
+    ended: bool
+
+
+class Space(Protocol):
+    """A Krylov space of A⁻¹M that grows."""
+
+    @property
+    def width(self) -> int:
+        """Vectors that it grows by at once."""
+
+    @property
+    def vectors(self) -> np.ndarray:
+        """M-orthonormal Q, shape (n, size)."""
+
+    def combined(self, shares: np.ndarray) -> np.ndarray:
+        """The first vectors times shares, shape (known, k)."""
+
+    def grown(self, until: int) -> Grown:
+        """Grow until the images of so many vectors are known."""
+
+    def projected(self, known: int) -> np.ndarray:
+        """Qᵀ M A⁻¹ M Q of the first vectors, shape (known, known)."""
+
+
+def krylov(space: Space, count: int) -> Krylov:
     """The `count` largest θ of A⁻¹M y = θ y, and on to the next gap.
 
-    The space grows by blocks until the residuals of the pairs wanted are 1e-10 of their θ, so that θ has all its
+    The space grows until the residuals of the pairs wanted are 1e-10 of their θ, so that θ has all its
     digits (G. H. Golub, R. Underwood, Mathematical Software III (1977)
-    361–377). A multiple θ is found as often as the block is wide. The last pair, beyond the gap, is known to some six
+    361–377). A multiple θ is found as often as the space is wide. The last pair, beyond the gap, is known to some six
     digits.
 
     Parameters
     ----------
-    inverse : callable
-        rhs ↦ A⁻¹ rhs.
-    M : array or sparse matrix, shape (n, n)
-        Symmetric, positive semidefinite.
-    start : numpy.ndarray, shape (n, width)
-        Anything that holds a share of the vectors wanted.
+    space : Space
+        Begun with anything that holds a share of the vectors wanted.
     count : int
 
     Returns
@@ -62,22 +94,17 @@ def krylov(
     Krylov
         Fewer pairs if M has no more rank.
     """
-    space = _Space(M, start.shape[0], 3 * (count + start.shape[1]))
-    width, _ = space.grown(inverse(M @ start), 0)
-    check = 2 * count + width
+    check, step = 2 * count + max(space.width, SELDOM), max(space.width, count // 3)
     while True:
-        known = space.size
-        fresh, R = space.grown(inverse(space.images[:, -width:]), width)
-        if not fresh or known >= check:
-            theta, s = np.linalg.eigh(space.projected[:known, :known])
-            theta, s = theta[::-1], s[:, ::-1]
-            miss = np.sqrt(np.square(R @ s[-width:]).sum(axis=0)) / np.maximum(theta, NOTHING * space.largest)
-            wanted = _to_the_gap(theta, count)
-            if not fresh or (wanted < known and (miss[:wanted] <= STILL).all() and miss[wanted] <= ROUGH):
-                basis, kept = space.vectors[:, :known], slice(None, wanted + 1)
-                return Krylov(theta[kept], basis @ s[:, kept], basis)
-            check = known + max(width, count // 3)
-        width = fresh
+        known, rest, ended = space.grown(check)
+        theta, s = np.linalg.eigh(space.projected(known))
+        theta, s = theta[::-1], s[:, ::-1]
+        miss = np.sqrt(np.square(rest @ s[-rest.shape[1] :]).sum(axis=0)) / np.maximum(theta, NOTHING * theta[0])
+        wanted = _to_the_gap(theta, count)
+        if ended or (wanted < known and (miss[:wanted] <= STILL).all() and miss[wanted] <= ROUGH):
+            kept = slice(None, wanted + 1)
+            return Krylov(theta[kept], space.combined(s[:, kept]))
+        check = known + step
 
 
 def _to_the_gap(theta: np.ndarray, count: int) -> int:
@@ -87,53 +114,79 @@ def _to_the_gap(theta: np.ndarray, count: int) -> int:
     return count + int(gaps[0]) if gaps.size else theta.size
 
 
-class _Space:
-    """An M-orthonormal basis Q that grows by blocks, with M Q and Qᵀ M A⁻¹ M Q."""
+class Blocks:
+    """The space of block Lanczos with full reorthogonalisation.
 
-    def __init__(self, M: np.ndarray | sp.csc_matrix, n: int, room: int) -> None:
-        self._M, self.size, self.largest = M, 0, 0.0
-        self._Q, self._MQ = np.empty((n, room), order="F"), np.empty((n, room), order="F")
-        self.projected = np.zeros((room, room))
+    Parameters
+    ----------
+    inverse : callable
+        rhs ↦ A⁻¹ rhs.
+    M : array or sparse matrix, shape (n, n)
+        Symmetric, positive semidefinite.
+    start : numpy.ndarray, shape (n, width)
+    room : int
+        About how many vectors there will be.
+    """
+
+    def __init__(
+        self, inverse: Callable[[np.ndarray], np.ndarray], M: np.ndarray | sp.csc_matrix, start: np.ndarray, room: int
+    ) -> None:
+        self._inverse, self._M, self._size, self._largest, self.width = inverse, M, 0, 0.0, 0
+        self._Q, self._MQ = (np.empty((len(start), room), order="F") for _ in range(2))
+        self._projected = np.zeros((room, room))
+        self.width = self._joined(inverse(M @ start))[0]
 
     @property
     def vectors(self) -> np.ndarray:
-        """Q."""
-        return self._Q[:, : self.size]
+        """See `Space`."""
+        return self._Q[:, : self._size]
 
-    @property
-    def images(self) -> np.ndarray:
-        """M Q."""
-        return self._MQ[:, : self.size]
+    def combined(self, shares: np.ndarray) -> np.ndarray:
+        """See `Space`."""
+        return self._Q[:, : len(shares)] @ shares
 
-    def grown(self, Z: np.ndarray, width: int) -> tuple[int, np.ndarray]:
+    def projected(self, known: int) -> np.ndarray:
+        """See `Space`."""
+        return self._projected[:known, :known]
+
+    def grown(self, until: int) -> Grown:
+        """See `Space`."""
+        while True:
+            known = self._size
+            fresh, rest = self._joined(self._inverse(self._MQ[:, known - self.width : known]))
+            self.width = fresh
+            if not fresh or known >= until:
+                return Grown(known, rest, not fresh)
+
+    def _joined(self, Z: np.ndarray) -> tuple[int, np.ndarray]:
         """Add what is new of Z, which A⁻¹M made of the last `width` columns.
 
         Returns how many columns that are, and R in Z = … + new R.
         """
-        Q, MQ = self.vectors, self.images.T
-        if width:
+        Q, MQ = self.vectors, self._MQ[:, : self._size].T
+        if self.width:
             column = MQ @ Z
-            self._note(column, width)
+            self._note(column)
             Z = Z - Q @ column
             Z = Z - Q @ (MQ @ Z)
-        new, image, R = _orthonormal(Z, self._M @ Z, NOTHING * self.largest)
-        count = min(new.shape[1], self._Q.shape[0] - self.size)
+        new, image, R = _orthonormal(Z, self._M @ Z, NOTHING * self._largest)
+        count = min(new.shape[1], self._Q.shape[0] - self._size)
         self._append(new[:, :count], image[:, :count])
         return count, R[:count]
 
-    def _note(self, column: np.ndarray, width: int) -> None:
-        last = slice(self.size - width, self.size)
-        self.projected[last, : self.size] = column.T
-        self.projected[: self.size, last] = column
-        self.largest = max(self.largest, float(np.abs(column).max(initial=0.0)))
+    def _note(self, column: np.ndarray) -> None:
+        last = slice(self._size - self.width, self._size)
+        self._projected[last, : self._size] = column.T
+        self._projected[: self._size, last] = column
+        self._largest = max(self._largest, float(np.abs(column).max(initial=0.0)))
 
     def _append(self, new: np.ndarray, image: np.ndarray) -> None:
-        wanted = self.size + new.shape[1]
+        wanted = self._size + new.shape[1]
         if wanted > self._Q.shape[1]:
-            self._Q, self._MQ = (_wider(A, 2 * wanted, self.size) for A in (self._Q, self._MQ))
-            self.projected = np.pad(self.projected, (0, 2 * wanted - len(self.projected)))
-        self._Q[:, self.size : wanted], self._MQ[:, self.size : wanted] = new, image
-        self.size = wanted
+            self._Q, self._MQ = (_wider(A, 2 * wanted, self._size) for A in (self._Q, self._MQ))
+            self._projected = np.pad(self._projected, (0, 2 * wanted - len(self._projected)))
+        self._Q[:, self._size : wanted], self._MQ[:, self._size : wanted] = new, image
+        self._size = wanted
 
 
 def _orthonormal(Z: np.ndarray, image: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

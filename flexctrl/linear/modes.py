@@ -16,6 +16,7 @@ from flexctrl.linear.eigen import EPS, RIGID_NOISE, Eigenpairs, complete_pairs, 
 from flexctrl.linear.massless import STIFFNESS_RANK, null_split
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.linear.parts import energies_by_part
+from flexctrl.linear.pattern import with_entries
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -325,18 +326,22 @@ def _grounded(base: Scaled) -> sp.csc_matrix:
 
 
 def _sharpened(K: sp.csc_matrix, M: sp.csc_matrix, pairs: Eigenpairs) -> Eigenpairs:
-    """Soft λ, which the rounding of φᵀ K φ blurs, as Rayleigh quotients of extended precision.
+    """Soft λ, which the rounding of φᵀ K φ blurs, as Rayleigh quotients with that in extended precision.
 
     The error of the vectors is in them squared (B. N. Parlett, The Symmetric Eigenvalue Problem, 1998, § 4.6).
     """
     soft = ~pairs.rigid & (pairs.noise > BLURRED * np.abs(pairs.values))
     if not soft.any():
         return pairs
-    phi = pairs.shapes[:, soft].astype(np.longdouble)
-    strain, kinetic = (_energy(sp.csr_matrix(A).astype(np.longdouble), phi) for A in (K, M))
+    phi = pairs.shapes[:, soft]
     values = pairs.values.copy()
-    values[soft] = (strain / kinetic).astype(float)
+    values[soft] = (_strain(K, phi) / _energy(M, phi)).astype(float)
     return replace(pairs, values=values)
+
+
+def _strain(K: sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
+    """φᵀ K φ, every operation in extended precision."""
+    return _energy(with_entries(K, K.data.astype(np.longdouble)), phi.astype(np.longdouble))
 
 
 def _settled_basis(base: Scaled, pairs: Eigenpairs) -> Eigenpairs:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["aligned", "congruent", "symmetric"]
+__all__ = ["aligned", "congruent", "mirror", "symmetric", "with_entries"]
 
 SMALL = 200
 
@@ -31,6 +33,24 @@ def aligned(*matrices: sp.spmatrix) -> tuple[sp.csc_matrix, ...]:
     return tuple(A for A in (_spread(A, union) for A in given) if A is not None)
 
 
+def with_entries(A: sp.csc_matrix, data: np.ndarray) -> sp.csc_matrix:
+    """A matrix of the same pattern, without the checks that making one anew takes.
+
+    Parameters
+    ----------
+    A : scipy.sparse.csc_matrix
+    data : numpy.ndarray
+        Its entries.
+
+    Returns
+    -------
+    scipy.sparse.csc_matrix
+    """
+    other = copy.copy(A)
+    other.data = data
+    return other
+
+
 def congruent(scale: np.ndarray, *matrices: sp.spmatrix) -> tuple[sp.csc_matrix, ...]:
     """S A S for diagonal S and each A, all on one pattern.
 
@@ -46,15 +66,33 @@ def congruent(scale: np.ndarray, *matrices: sp.spmatrix) -> tuple[sp.csc_matrix,
     given = aligned(*matrices)
     pattern = given[0]
     factor = scale[pattern.indices] * np.repeat(scale, np.diff(pattern.indptr))
-    return tuple(sp.csc_matrix((A.data * factor, pattern.indices, pattern.indptr), A.shape) for A in given)
+    return tuple(with_entries(pattern, A.data * factor) for A in given)
 
 
-def symmetric(A: sp.csc_matrix) -> tuple[sp.csc_matrix, float]:
+def mirror(A: sp.csc_matrix) -> np.ndarray | None:
+    """Where the entry across the diagonal stands for every entry; None if there is not one for each.
+
+    Parameters
+    ----------
+    A : scipy.sparse.csc_matrix, shape (n, n)
+        In canonical format.
+
+    Returns
+    -------
+    numpy.ndarray of int, or None
+    """
+    T = with_entries(A, np.arange(A.nnz)).T.tocsc()
+    return T.data if _same_pattern(A, T) else None
+
+
+def symmetric(A: sp.csc_matrix, across: np.ndarray | None = None) -> tuple[sp.csc_matrix, float]:
     """½ (A + Aᵀ), and the largest entry of A − Aᵀ.
 
     Parameters
     ----------
     A : scipy.sparse.csc_matrix, shape (n, n)
+    across : numpy.ndarray of int, optional
+        Its `mirror`, where that is known.
 
     Returns
     -------
@@ -63,14 +101,13 @@ def symmetric(A: sp.csc_matrix) -> tuple[sp.csc_matrix, float]:
     """
     if A.shape[0] <= SMALL and np.array_equal(dense := A.toarray(), dense.T):
         return _canonical(A), 0.0
-    A, T = _canonical(A), A.T.tocsc()
-    if _same_pattern(A, T) and np.array_equal(A.data, T.data):
-        return A, 0.0
-    A, T = aligned(A, T)
-    gap = float(np.abs(A.data - T.data).max(initial=0.0))
-    if gap == 0.0:
-        return A, gap
-    return sp.csc_matrix((0.5 * (A.data + T.data), A.indices, A.indptr), A.shape), gap
+    if across is None:
+        A, T = aligned(A, A.T)
+        over = T.data
+    else:
+        over = A.data[across]
+    gap = float(np.abs(A.data - over).max(initial=0.0))
+    return (A if gap == 0.0 else with_entries(A, 0.5 * (A.data + over))), gap
 
 
 def _columns(A: sp.spmatrix) -> sp.csc_matrix:
@@ -112,4 +149,4 @@ def _spread(A: sp.csc_matrix, pattern: sp.csc_matrix) -> sp.csc_matrix | None:
         return None
     data = np.zeros(wide.size, dtype=A.dtype)
     data[places] = A.data
-    return sp.csc_matrix((data, pattern.indices, pattern.indptr), A.shape)
+    return with_entries(pattern, data)

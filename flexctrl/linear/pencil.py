@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -13,9 +13,9 @@ import scipy.sparse.linalg as sla
 from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
-from flexctrl.linear.banded import Band, band_of, prominent
-from flexctrl.linear.krylov import krylov
-from flexctrl.linear.pattern import aligned
+from flexctrl.linear.banded import Band, band_of
+from flexctrl.linear.krylov import Blocks, Space, krylov
+from flexctrl.linear.pattern import aligned, with_entries
 
 __all__ = [
     "EPS",
@@ -53,7 +53,7 @@ def stiffness_noise(K: Matrix, shapes: np.ndarray) -> np.ndarray:
 
 
 def _squared(K: Matrix) -> Matrix:
-    return K * K if isinstance(K, np.ndarray) else sp.csc_matrix((K.data**2, K.indices, K.indptr), K.shape)
+    return K * K if isinstance(K, np.ndarray) else with_entries(K, K.data**2)
 
 
 def _noise(squared: Matrix, shapes: np.ndarray) -> np.ndarray:
@@ -76,6 +76,8 @@ class ShiftedPencil:
         How many λ lie under σ (Sylvester); HIDDEN if the pivoting does not tell.
     firm : bool
         Whether no motion is nearly without stiffness, as far as the pivots tell; False if they are not looked at.
+    recurrence : callable, optional
+        q of M-length one and M q ↦ the Krylov space that begins with q, where that is compiled.
     """
 
     K: Matrix
@@ -84,6 +86,7 @@ class ShiftedPencil:
     inverse: Callable[[np.ndarray], np.ndarray]
     below: int
     firm: bool = False
+    recurrence: Callable[[np.ndarray, np.ndarray], Space] | None = None
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """(K − σM)⁻¹ rhs with one step of refinement."""
@@ -102,17 +105,26 @@ class ShiftedPencil:
     def _within(self, x: np.ndarray, image: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The pairs within the space of x, given M x and (K − σM)⁻¹ M x."""
         theta, z, _ = lapack.dsygvd(image.T @ after, x.T @ image)
-        return self.sigma + 1.0 / theta[::-1], (after @ z / theta)[:, ::-1]
+        return self.sigma + 1.0 / theta[::-1], after @ (z / theta)[:, ::-1]
 
-    def lanczos(self, start: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def lanczos(self, start: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, Space]:
         """The `count` pairs nearest to σ, which must lie under all of them, and on to the next gap; ascending.
 
         With them, the Krylov space that they come from.
         """
-        found = krylov(self.inverse, self.M, start, count)
+        space = self._space(start, 3 * (count + start.shape[1]))
+        found = krylov(space, count)
         image, near = self.M @ found.vectors, found.theta * found.vectors
-        after = near + self.inverse(image - self.K @ near + self.sigma * (self.M @ near))
-        return *self._within(found.vectors, image, after), found.basis
+        after = near + self.inverse(image + self.sigma * (found.theta * image) - self.K @ near)
+        return *self._within(found.vectors, image, after), space
+
+    def _space(self, start: np.ndarray, room: int) -> Space:
+        if self.recurrence is None or start.shape[1] > 1:
+            return Blocks(self.inverse, self.M, start, room)
+        first = self.inverse(self.M @ start)
+        image = self.M @ first
+        length = np.sqrt(first.T @ image)
+        return self.recurrence(first / length, image / length)
 
 
 class Pencil:
@@ -145,7 +157,7 @@ class Pencil:
         LinearizationError
             If it is singular: a freedom with neither mass nor stiffness, or σ an eigenvalue.
         """
-        A = sp.csc_matrix((self._data(sigma), self.K.indices, self.K.indptr), self.K.shape)
+        A = with_entries(self.K, self._data(sigma))
         options = {"SymmetricMode": True}
         try:
             lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options=options)
@@ -168,21 +180,21 @@ class Pencil:
         """As `at` for σ under all λ, in a band where that is narrow."""
         if self._band is None:
             return self.at(sigma)
-        data = self._data(sigma)
-        factor = self._band.factorise(data)
+        factor = self._band.factorise(self._data(sigma))
         if factor is None:
             raise LinearizationError(f"K - ({sigma:.3g}) M is not positive definite")
-        diagonal = sp.csc_matrix((data, self.K.indices, self.K.indptr), self.K.shape).diagonal()
-        firm = bool((factor.pivots > FIRM * diagonal[factor.order]).all())
-        return ShiftedPencil(self.K, self.M, sigma, factor.solve, 0, firm)
+        firm = bool((factor.pivots > FIRM * factor.diagonal).all())
+        recurrence = factor.space and partial(factor.space, self.M.data)
+        return ShiftedPencil(self.K, self.M, sigma, factor.solve, 0, firm, recurrence)
 
-    def below(self, sigma: float, near: np.ndarray | None = None) -> int:
+    def below(self, sigma: float, near: Space | None = None, growth: float = 1.0) -> int:
         """How many λ lie under σ; SINGULAR or HIDDEN where the factors do not tell.
 
-        Vectors that span about the eigenvectors of these λ, and more, make it quicker where the band is narrow.
+        A space that holds about the eigenvectors of these λ, and more, makes it quicker where the band is narrow; so
+        does a growth of the rounding of K that would not bring another λ to σ.
         """
         if near is not None and self._band is not None:
-            found = self._band.negative(self._data(sigma), prominent(near))
+            found = self._band.negative(self._data(sigma), lambda: near.vectors, growth)
             if found is not None:
                 return found
         try:

@@ -1,0 +1,168 @@
+"""Matrices of narrow band in compiled loops: factors, counts of eigenvalues, Lanczos' recurrence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from flexctrl.kernels.native import Packed
+from flexctrl.linear.band_loops import Factorising, LanczosRun, Solving, Tiles, factorise, lanczos, solve
+from flexctrl.linear.banded import Band, Factor
+from flexctrl.linear.krylov import NOTHING, Grown
+
+__all__ = ["CompiledBand", "Recurrence"]
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledBand(Band):
+    """A band in tiles of eight rows and columns; see `band_loops`."""
+
+    @cached_property
+    def tiles(self) -> Any:
+        """The tiles between the diagonal and where a panel, or one before it, reaches: `Tiles`, packed."""
+        panels = -(-self.order.size // 8)
+        ends = np.maximum.reduceat(self.reach, np.arange(0, self.order.size, 8)) // 8
+        below = np.maximum.accumulate(ends) - np.arange(panels)
+        return Packed(Tiles(panels, np.cumsum(below + 1) - below - 1, below))
+
+    @cached_property
+    def room(self) -> int:
+        """Numbers in all tiles."""
+        return int(64 * (self.tiles.first[-1] + 1))
+
+    @cached_property
+    def _tiled(self) -> np.ndarray:
+        """Where the lower entries stand."""
+        panel = self.columns >> 3
+        tile = self.tiles.first[panel] + (self.rows >> 3) - panel
+        return (tile << 6) + ((self.columns & 7) << 3) + (self.rows & 7)
+
+    def lower(self, data: np.ndarray) -> np.ndarray:
+        """Tiles of the lower triangle of the matrix with these entries in the order of the pattern."""
+        tiles = np.zeros(self.room)
+        tiles[self._tiled] = data[self.chosen]
+        return tiles
+
+    def whole(self, data: np.ndarray) -> np.ndarray:
+        """As `lower`, with whole tiles on the diagonal."""
+        tiles = self.lower(data)
+        own = tiles.reshape(-1, 8, 8)[self.tiles.first]
+        over = own.transpose(0, 2, 1).copy()
+        over[:, np.arange(8), np.arange(8)] = 0.0
+        tiles.reshape(-1, 8, 8)[self.tiles.first] += over
+        return tiles
+
+    def padded(self, x: np.ndarray) -> np.ndarray:
+        """Columns of x, shape (n, k), as rows in the band's order and filled up to whole panels."""
+        rows = np.zeros((x.shape[1], 8 * self.tiles.panels))
+        rows[:, : len(x)] = x.take(self.order, axis=0).T
+        return rows
+
+    def unpadded(self, rows: np.ndarray) -> np.ndarray:
+        """What `padded` was given."""
+        return np.ascontiguousarray(rows.take(self.back, axis=1).T)
+
+    def _eliminated(self, data: np.ndarray) -> tuple[Any, int]:
+        t, lower = self.tiles, self.lower(data)
+        idle = np.arange(self.order.size % 8 or 8, 8)
+        lower[self.room - 64 + 9 * idle] = 1.0
+        pivots, size = np.zeros((2, 8 * t.panels))
+        work = np.empty(64 * (int(t.below.max()) + 1))
+        f = Packed(Factorising(t, lower, pivots, size, work))
+        return f, f.bound(factorise)()
+
+    def factorise(self, data: np.ndarray) -> Factor | None:
+        """See `Band`."""
+        f, negative = self._eliminated(data)
+        n = self.order.size
+        if negative or not np.isfinite(f.pivots).all():
+            return None
+
+        def solved(rhs: np.ndarray) -> np.ndarray:
+            x = self.padded(rhs)
+            Packed(Solving(f, len(x), x.ravel())).bound(solve)()
+            return self.unpadded(x)
+
+        def space(mass: np.ndarray, start: np.ndarray, image: np.ndarray) -> Recurrence:
+            return Recurrence(self, f, mass, start, image)
+
+        return Factor(f.pivots[:n], f.size[:n], self.order, solved, space)
+
+    def negative(self, data: np.ndarray, near: Callable[[], np.ndarray], growth: float) -> int | None:
+        """See `Band`. Counted by the pivots of an elimination without exchange, where rounding does not grow in it."""
+        f, negative = self._eliminated(data)
+        if negative >= 0 and (f.size[: self.order.size] <= growth * np.abs(self._diagonal(data))).all():
+            return negative
+        return super().negative(data, near, growth)
+
+
+class Recurrence:
+    """The space of Lanczos' recurrence for one vector; see `krylov.Space`.
+
+    Parameters
+    ----------
+    band : CompiledBand
+    factor : Packed
+        `Factorising` of A.
+    mass : numpy.ndarray
+        Entries of M in the order of the pattern.
+    start : numpy.ndarray, shape (n, 1)
+        Of M-length one.
+    image : numpy.ndarray, shape (n, 1)
+        M start.
+    """
+
+    width = 1
+
+    def __init__(self, band: CompiledBand, factor: Any, mass: np.ndarray, start: np.ndarray, image: np.ndarray) -> None:
+        self._band, self._factor, self._mass, self._size = band, factor, band.whole(mass), 1
+        self._vectors, self._images, self._coefficients = band.padded(start), band.padded(image), np.zeros((2, 1))
+
+    @property
+    def vectors(self) -> np.ndarray:
+        """See `Space`."""
+        return self._band.unpadded(self._vectors[: self._size])
+
+    def combined(self, shares: np.ndarray) -> np.ndarray:
+        """See `Space`."""
+        return self._band.unpadded(shares.T @ self._vectors[: len(shares)])
+
+    def projected(self, known: int) -> np.ndarray:
+        """See `Space`."""
+        own, beside = self._coefficients[:, :known]
+        return np.diag(own) + np.diag(beside[:-1], -1)
+
+    def grown(self, until: int) -> Grown:
+        """See `Space`."""
+        until = min(until, self._band.order.size)
+        if until >= len(self._vectors):
+            self._vectors, self._images = (_lengthened(a, 2 * until) for a in (self._vectors, self._images))
+            self._coefficients = np.ascontiguousarray(_lengthened(self._coefficients.T, 2 * until).T)
+        run = Packed(
+            LanczosRun(
+                factor=self._factor,
+                mass=self._mass,
+                size=self._size,
+                until=until + 1,
+                least=NOTHING,
+                vectors=self._vectors.ravel(),
+                images=self._images.ravel(),
+                own=self._coefficients[0],
+                beside=self._coefficients[1],
+                work=np.empty(2 * self._vectors.shape[1]),
+            )
+        )
+        ended = bool(run.bound(lanczos)())
+        known = run.size if ended else run.size - 1
+        self._size = run.size
+        return Grown(known, self._coefficients[1:, known - 1 : known], ended)
+
+
+def _lengthened(a: np.ndarray, rows: int) -> np.ndarray:
+    more = np.empty((rows, a.shape[1]))
+    more[: len(a)] = a
+    return more
