@@ -70,7 +70,7 @@ def congruent(scale: np.ndarray, *matrices: sp.spmatrix) -> tuple[sp.csc_matrix,
 
 
 def mirror(A: sp.csc_matrix) -> np.ndarray | None:
-    """Where the entry across the diagonal stands for every entry; None if there is not one for each.
+    """Where the entry across the diagonal stands for every entry; None if there is not one for each, or in small ones.
 
     Parameters
     ----------
@@ -81,6 +81,8 @@ def mirror(A: sp.csc_matrix) -> np.ndarray | None:
     -------
     numpy.ndarray of int, or None
     """
+    if A.shape[0] <= SMALL:
+        return None  # a dense comparison is quicker
     T = with_entries(A, np.arange(A.nnz)).T.tocsc()
     return T.data if _same_pattern(A, T) else None
 
