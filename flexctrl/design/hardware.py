@@ -69,14 +69,15 @@ class Saturated(Wrapper):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._range
+        _ = self.range
 
     @cached_property
-    def _range(self) -> tuple[np.ndarray, np.ndarray]:
+    def range(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest commands."""
         return _bounds(self.limits, self.outputs, type(self).__name__)
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        low, high = self._range
+        low, high = self.range
         return np.minimum(np.maximum(self.controller.command(t, x, y), low), high)
 
 
@@ -98,10 +99,10 @@ class AntiWindup(Saturated):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._integrators
+        _ = self.integrators
 
     @cached_property
-    def _integrators(self) -> tuple[np.ndarray, np.ndarray]:
+    def integrators(self) -> tuple[np.ndarray, np.ndarray]:
         """The states that are pure integrators, and their columns of C."""
         law = self.controller.controller if isinstance(self.controller, Sampled) else self.controller
         if not isinstance(law, LinearController):
@@ -126,7 +127,7 @@ class AntiWindup(Saturated):
         return after
 
     def _stopped(self, t: float, x: np.ndarray, y: np.ndarray, change: np.ndarray) -> np.ndarray:
-        (low, high), (places, effect) = self._range, self._integrators
+        (low, high), (places, effect) = self.range, self.integrators
         wish = self.controller.command(t, x, y)
         excess = wish - np.minimum(np.maximum(wish, low), high)
         return places[excess.dot(effect) * change[places] > 0]
@@ -152,10 +153,11 @@ class RateLimited(Wrapper):
     def __post_init__(self) -> None:
         super().__post_init__()
         _require_samples(self.controller, "RateLimited")
-        _ = self._changes, self.initial()
+        _ = self.changes, self.initial()
 
     @cached_property
-    def _changes(self) -> tuple[np.ndarray, np.ndarray]:
+    def changes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Most negative and most positive change of the commands from a sample to the next."""
         low, high = _bounds(self.limits, self.outputs, "RateLimited")
         return low * self.sample_time, high * self.sample_time
 
@@ -164,7 +166,7 @@ class RateLimited(Wrapper):
         return np.concatenate([self.controller.initial(), before])
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        down, up = self._changes
+        down, up = self.changes
         n = len(x) - len(up)
         wish, last = self.controller.command(t, x[:n], y), x[n:]
         return np.minimum(np.maximum(wish, last + down), last + up)
@@ -235,22 +237,23 @@ class Quantised(Wrapper):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._grids
+        _ = self.grids
 
     @cached_property
-    def _grids(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    def grids(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Places and sizes of the steps among the signals read, and among those commanded."""
         sizes = _signal_values(self.steps, self, "Quantised")
         return tuple((np.flatnonzero(s), s[np.flatnonzero(s)]) for s in sizes)
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        read, sent = self._grids
+        read, sent = self.grids
         return _rounded(self.controller.command(t, x, _rounded(y, *read)), *sent)
 
     def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return self.controller.rate(t, x, _rounded(y, *self._grids[0]))
+        return self.controller.rate(t, x, _rounded(y, *self.grids[0]))
 
     def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return self.controller.update(t, x, _rounded(y, *self._grids[0]))
+        return self.controller.update(t, x, _rounded(y, *self.grids[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,10 +280,11 @@ class Noisy(Wrapper):
         super().__post_init__()
         _require_samples(self.controller, "Noisy")
         _require_whole(self.seed, "Noisy: seed")
-        _ = self._levels
+        _ = self.levels
 
     @cached_property
-    def _levels(self) -> tuple[np.ndarray, np.ndarray]:
+    def levels(self) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviations of the signals read, and of those commanded."""
         return _signal_values(self.std, self, "Noisy")
 
     @cached_property
@@ -288,16 +292,28 @@ class Noisy(Wrapper):
         return self.sample_time
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        (read, sent), noise = self._levels, self._noise(t)
+        (read, sent), noise = self.levels, self.noise(t)
         return self.controller.command(t, x, y + read * noise[: len(read)]) + sent * noise[len(read) :]
 
     def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        read = self._levels[0]
-        return self.controller.update(t, x, y + read * self._noise(t)[: len(read)])
+        read = self.levels[0]
+        return self.controller.update(t, x, y + read * self.noise(t)[: len(read)])
 
-    def _noise(self, t: float) -> np.ndarray:
+    def noise(self, t: float) -> np.ndarray:
+        """Return the noise of a sample, of unit deviation.
+
+        Parameters
+        ----------
+        t : float
+            Its instant [s].
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_inputs + n_outputs,)
+            Of the signals read, then of those commanded.
+        """
         block, row = divmod(round(t / self._period), _BLOCK)
-        return _normals(self.seed, block, sum(map(len, self._levels)))[row]
+        return _normals(self.seed, block, sum(map(len, self.levels)))[row]
 
 
 _BLOCK = 1024

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from flexctrl.errors import ControllerError
 
 if TYPE_CHECKING:
@@ -41,6 +43,20 @@ class Trajectory(ABC):
     def breaks(self) -> tuple[float, ...]:
         """Instants at which the value or a derivative jumps, s."""
         return ()
+
+    def along(self, times: np.ndarray) -> np.ndarray:
+        """Return the values at many instants, the same as one by one.
+
+        Parameters
+        ----------
+        times : numpy.ndarray, shape (n,)
+            [s]
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        return np.array([self(t) for t in times.tolist()], dtype=float)
 
     def plot(self, until: float | None = None) -> Figure:
         """Draw value, rate and acceleration.
@@ -117,6 +133,19 @@ class PiecewisePolynomial(Trajectory):
             value = value * s + coefficient
         return value
 
+    def along(self, times: np.ndarray) -> np.ndarray:
+        piece = np.searchsorted(self._reached, times, side="right") - 1
+        known = np.maximum(piece, 0)
+        s, value = times - np.array(self.knots)[known], np.zeros(len(times))
+        for column in self._rising[:, ::-1].T:
+            value = value * s + column[known]
+        return np.where(piece < 0, self.before, value)
+
+    @cached_property
+    def _rising(self) -> np.ndarray:
+        rows = [[*row, *(0.0,) * (self._width - len(row))] for row in self.coefficients]
+        return np.array(rows)
+
     @cached_property
     def _reached(self) -> tuple[float, ...]:
         return tuple(knot - _ROUND_OFF * (1.0 + abs(knot)) for knot in self.knots)
@@ -189,6 +218,9 @@ class Constant(Trajectory):
     def __call__(self, t: float) -> float:
         return self.value
 
+    def along(self, times: np.ndarray) -> np.ndarray:
+        return np.full(len(times), self.value)
+
     @property
     def derivative(self) -> Trajectory:
         return Constant(0.0)
@@ -208,6 +240,9 @@ class Sum(Trajectory):
 
     def __call__(self, t: float) -> float:
         return sum(term(t) for term in self.terms)
+
+    def along(self, times: np.ndarray) -> np.ndarray:
+        return sum((term.along(times) for term in self.terms), np.zeros(len(times)))
 
     @cached_property
     def derivative(self) -> Trajectory:

@@ -47,6 +47,10 @@ class Shaped(Trajectory):
             return pieces.convolved(self.shaper.amplitudes, self.shaper.times)
         return self._copies
 
+    def along(self, times: np.ndarray) -> np.ndarray:
+        value = self._value
+        return value.along(times) if isinstance(value, PiecewisePolynomial) else super().along(times)
+
     def _copies(self, t: float) -> float:
         base = self.trajectory
         return sum([a * base(t - delay) for a, delay in zip(self.shaper.amplitudes, self.shaper.times, strict=True)])

@@ -45,10 +45,11 @@ class Tracking(Wrapper):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._pairs
+        _ = self.pairs
 
     @cached_property
-    def _pairs(self) -> Pairs:
+    def pairs(self) -> Pairs:
+        """Places of the signals that functions of time are for, and these."""
         return _indexed(self.reference, self.inputs, "Tracking")
 
     @property
@@ -70,7 +71,7 @@ class Tracking(Wrapper):
 
     def _deviation(self, t: float, y: np.ndarray) -> np.ndarray:
         deviation = np.array(y, dtype=float)
-        for place, reference in self._pairs:
+        for place, reference in self.pairs:
             deviation[place] -= reference(t)
         return deviation
 
@@ -94,14 +95,16 @@ class Commanded(Wrapper):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._pairs
+        _ = self.pairs
 
     @cached_property
-    def _pairs(self) -> Pairs:
+    def pairs(self) -> Pairs:
+        """Places of the signals that functions of time are for, and these."""
         return _indexed(self.signals, self.controller.inputs, "Commanded")
 
     @cached_property
-    def _measured(self) -> np.ndarray:
+    def measured(self) -> np.ndarray:
+        """Places of what is measured among what the controller inside reads."""
         return _places(self.inputs, self.controller.inputs)
 
     @property
@@ -126,9 +129,9 @@ class Commanded(Wrapper):
         return Commanded(discretised(self.controller, sample_time), self.signals)
 
     def _completed(self, t: float, y: np.ndarray) -> np.ndarray:
-        full = np.empty(len(self._measured) + len(self._pairs))
-        full[self._measured] = y
-        for place, signal in self._pairs:
+        full = np.empty(len(self.measured) + len(self.pairs))
+        full[self.measured] = y
+        for place, signal in self.pairs:
             full[place] = signal(t)
         return full
 
@@ -202,10 +205,11 @@ class FeedForward(Wrapper):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._pairs
+        _ = self.pairs
 
     @cached_property
-    def _pairs(self) -> Pairs:
+    def pairs(self) -> Pairs:
+        """Places of the signals that functions of time are for, and these."""
         return _indexed(self.commands, self.outputs, "FeedForward")
 
     @property
@@ -214,7 +218,7 @@ class FeedForward(Wrapper):
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         u = np.array(self.controller.command(t, x, y), dtype=float)
-        for place, signal in self._pairs:
+        for place, signal in self.pairs:
             u[place] += signal(t)
         return u
 
@@ -254,6 +258,11 @@ class Together:
         self._writes = tuple(_places(part.outputs, self.outputs) for part in parts)
 
     @property
+    def places(self) -> tuple[tuple[Controller, slice, np.ndarray, np.ndarray], ...]:
+        """Each part with its share of the states, of what is read and of what is commanded."""
+        return tuple(zip(self.parts, self._slices, self._reads, self._writes, strict=True))
+
+    @property
     def breaks(self) -> tuple[float, ...]:
         return _merged(*self.parts)
 
@@ -262,7 +271,7 @@ class Together:
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         u = np.zeros(len(self.outputs))
-        for part, own, reads, writes in zip(self.parts, self._slices, self._reads, self._writes, strict=True):
+        for part, own, reads, writes in self.places:
             u[writes] += part.command(t, x[own], y[reads])
         return u
 

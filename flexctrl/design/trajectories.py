@@ -38,6 +38,9 @@ class _Profile(Trajectory):
     def __call__(self, t: float) -> float:
         return self.pieces(t)
 
+    def along(self, times: np.ndarray) -> np.ndarray:
+        return self.pieces.along(times)
+
     @property
     def derivative(self) -> Trajectory:
         return self.pieces.derivative

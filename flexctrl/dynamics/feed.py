@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,7 +12,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.design.controller import Controller, as_controller
+from flexctrl.design.lowering import Lowered, lowered
 from flexctrl.errors import ControllerError
+from flexctrl.kernels.kernel import Compiled
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
@@ -69,7 +72,34 @@ class Feed:
         return np.array([self.model.outputs.index(name) for name in self.controller.inputs], dtype=int)
 
     @cached_property
-    def _writes(self) -> tuple[int, ...]:
+    def lowered(self) -> Lowered | None:
+        """The controller as a kernel; None if it is not sampled, or cannot be one."""
+        return None if self.controller is None or self.continuous else lowered(self.controller)
+
+    @cached_property
+    def _asked(self) -> Callable[[np.ndarray, np.ndarray], None] | None:
+        """The controller's kernel, where loops may use it too: so that it makes no difference who asks."""
+        backend = getattr(self.model, "backend", None)
+        if not isinstance(backend, Compiled) or self.lowered is None:
+            return None
+        k = self.lowered.kernel
+        return backend.bind(k, np.arange(k.n_in)[None], self.lowered.values[None], np.arange(k.n_out)[None])
+
+    def _said(
+        self, asked: Callable[[np.ndarray, np.ndarray], None], t: float, x: np.ndarray, y: np.ndarray
+    ) -> tuple[list[float], np.ndarray] | None:
+        """What the kernel says; None if that is no number."""
+        assert self.lowered is not None
+        answer = np.zeros(self.lowered.kernel.n_out)
+        asked(np.concatenate([y, x, self.lowered.now(t)]), answer)
+        if not np.isfinite(answer).all():
+            return None
+        commands = len(answer) - self.lowered.states
+        return self._total(answer[:commands]), answer[commands:]
+
+    @cached_property
+    def writes(self) -> tuple[int, ...]:
+        """Numbers of the inputs commanded."""
         assert self.controller is not None
         return tuple(self.model.inputs.index(name) for name in self.controller.outputs)
 
@@ -101,6 +131,8 @@ class Feed:
         """Return the inputs from a sample instant on, and the controller's state."""
         c = self.controller
         assert c is not None
+        if self._asked is not None and (said := self._said(self._asked, t, x, y)) is not None:
+            return said
         u = self._total(c.command(t, x, y))
         return u, np.asarray(c.update(t, x, y), dtype=float) if x.size else x
 
@@ -129,7 +161,7 @@ class Feed:
         u = self._base.copy()
         column = type(command) is np.ndarray and command.ndim == 1 and command.dtype == float
         values = command.tolist() if column else np.asarray(command, dtype=float).ravel().tolist()
-        writes = self._writes
+        writes = self.writes
         if len(values) != len(writes):
             raise ControllerError(
                 f"the controller's command has {len(values)} values; expected one for each of its {len(writes)} outputs"

@@ -85,7 +85,7 @@ class Rows:
         if self.every is None:
             return True
         if not isinstance(pace, Fixed):
-            return False
+            return sample > 0.0 and abs(self.every / sample - round(self.every / sample)) < _NEAR
         return all(abs(s - round(s)) < _NEAR for s in (self.every / pace.step, sample / pace.step))
 
     def due(self) -> tuple[float, float]:

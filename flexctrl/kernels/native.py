@@ -59,6 +59,7 @@ class Packed:
         words = np.zeros(len(known), dtype=_WHOLE)
         own: dict[str, Any] = {"_record": record, "_words": words, "_reals": words.view(FLOAT), "_kept": []}
         own["_places"] = {name: (i, kind) for i, (name, kind) in enumerate(known.items()) if kind in SCALARS}
+        own["_lent"] = {}
         self.__dict__.update(own)
         for i, (name, kind) in enumerate(known.items()):
             if kind in SCALARS:
@@ -69,8 +70,16 @@ class Packed:
         self.__dict__["_first"] = words.copy()
 
     def reset(self) -> None:
-        """Set all numbers to what they were first."""
+        """Set all numbers to what they were first, and give back what was lent."""
         self._words[:] = self._first
+        self._lent.clear()
+
+    def lend(self, name: str, record: Any) -> Packed:
+        """Put another record in the place of one until the numbers are set back; return it as machine code sees it."""
+        known = record_fields(type(self._record))  # type: ignore[arg-type]
+        inner = self._lent[name] = Packed(record)
+        self._words[list(known).index(name)] = inner._words.ctypes.data
+        return inner
 
     def _address(self, name: str, kind: Any, value: Any) -> int:
         if isinstance(kind, type):

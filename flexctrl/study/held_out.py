@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from flexctrl.design.piecewise import Trajectory
 from flexctrl.design.tracking import Commanded, OpenLoop, Together, Tracking
 from flexctrl.design.wrapping import Wrapper, breaks_of
@@ -23,6 +25,12 @@ class Times(Trajectory):
 
     def __call__(self, t: float) -> float:
         return self.factor * float(self.signal(t))
+
+    def along(self, times: np.ndarray) -> np.ndarray:
+        """Return the values at many instants."""
+        if isinstance(self.signal, Trajectory):
+            return self.factor * self.signal.along(times)
+        return super().along(times)
 
     @property
     def derivative(self) -> Trajectory:

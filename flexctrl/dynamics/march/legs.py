@@ -17,7 +17,9 @@ from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.steps import Point
 from flexctrl.model.motion import State
 
-__all__ = ["Leg", "Legs", "Span", "same"]
+__all__ = ["Leg", "Legs", "Span", "Told", "same"]
+
+_ON = 1e-6
 
 
 def same(u: np.ndarray, v: np.ndarray) -> bool:
@@ -71,6 +73,46 @@ class Held(NamedTuple):
         return found
 
 
+class Told(NamedTuple):
+    """Legs from sample to sample, written down by compiled loops.
+
+    Attributes
+    ----------
+    rate : numpy.ndarray
+        See `Supply`.
+    table : numpy.ndarray, shape (legs, 3 + inputs + states)
+        Where each starts, the length of its steps, their number, its inputs and the controller's state.
+    inputs : int
+    period : float
+        Between samples [s].
+    pacing : Pacing or None
+        How steps are controlled; None: they are of one length.
+    """
+
+    rate: np.ndarray
+    table: np.ndarray
+    inputs: int
+    period: float
+    pacing: Pacing | None
+
+    @property
+    def samples(self) -> np.ndarray:
+        """One a leg."""
+        return self.table
+
+    def legs(self) -> list[Leg]:
+        """The legs."""
+        return [self._leg(row) for row in self.table]
+
+    def _leg(self, row: np.ndarray) -> Leg:
+        t, size, steps = row[:3].tolist()
+        supply = Supply(row[3 : 3 + self.inputs].copy(), row[3 + self.inputs :].copy(), self.rate)
+        if self.pacing is None:
+            return Leg(supply, t, size, int(steps))
+        stop = (int(t / self.period + _ON) + 1) * self.period
+        return Leg(supply, t, self.pacing._replace(size=size, stop=stop), int(steps))
+
+
 @dataclass(eq=False)
 class Legs:
     """What a ride has done.
@@ -82,7 +124,7 @@ class Legs:
     memory : Memory
     first, moved : numpy.ndarray, shape (n,)
         Where the degrees of freedom were at first, and how far they had been from there.
-    parts : list of Leg or Held
+    parts : list of Leg, Held or Told
     """
 
     stepper: MarchingStepper
@@ -90,7 +132,7 @@ class Legs:
     memory: Memory
     first: np.ndarray
     moved: np.ndarray
-    parts: list[Leg | Held] = field(default_factory=list)
+    parts: list[Leg | Held | Told] = field(default_factory=list)
     end: AlphaPoint = field(init=False)
 
     def __post_init__(self) -> None:
@@ -100,13 +142,13 @@ class Legs:
     def bytes(self) -> float:
         """What it takes to remember the ride."""
         march, size = self.memory.march, self.start.state.q.size
-        count = sum(len(part.samples) if isinstance(part, Held) else 1 for part in self.parts)
+        count = sum(1 if isinstance(part, Leg) else len(part.samples) for part in self.parts)
         return 500.0 * (1 + count) + march.tangent.nbytes + march.mass.nbytes + 8.0 * (9 * size)
 
     @cached_property
     def legs(self) -> list[Leg]:
         """All legs; once they are, no others are to come."""
-        return [leg for part in self.parts for leg in (part.legs() if isinstance(part, Held) else [part])]
+        return [leg for part in self.parts for leg in ([part] if isinstance(part, Leg) else part.legs())]
 
     @cached_property
     def _starts(self) -> list[float]:

@@ -7,6 +7,7 @@ import math
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.closing import in_doubt, settled
 from flexctrl.dynamics.march.corners import passes
+from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
     CORNER,
@@ -17,8 +18,10 @@ from flexctrl.dynamics.march.record import (
     JUMP,
     REFACTOR,
     REMADE,
+    SAMPLED,
     SETTLE,
     SHORT,
+    SILENT,
     SINGULAR,
     WANTS_MASS,
     WANTS_TANGENT,
@@ -54,6 +57,8 @@ def run(m: March) -> int:
         return fixed(m)
     if m.task == CONTROLLED:
         return controlled(m)
+    if m.task == SAMPLED:
+        return sampled(m)
     if m.task == JUMP:
         return jump(m)
     if m.task == SETTLE:
@@ -70,6 +75,70 @@ def made_again(m: March) -> int:
         return weighed(m)
     tangent(m.flat, 1.0, to_v(m), to_rate(m), m.entries)
     return refactored(m)
+
+
+def sampled(m: March) -> int:
+    """Go from sample to sample of the law as long as there is room, and as it says numbers."""
+    law = m.law
+    while True:
+        if law.away == 0 and not set_out(m, law):
+            return DONE
+        status = fixed(m) if law.pace > 0.0 else hurried(m)
+        if status == WANTS_TANGENT:
+            return status
+        if status == WANTS_MASS:
+            return status
+        law.away = 0
+        if m.done > law.start:
+            enter_leg(law, m.done - law.start)
+            enter_inputs(law, law.start, m.done)
+        there = m.done == m.wanted if law.pace > 0.0 else m.stop - m.t <= 1e-12 * m.until
+        if status != DONE or not there:
+            return status
+        m.t = m.stop
+        m.rows[(1 + m.gauges.outputs) * (m.done - 1)] = m.stop
+        if m.stop >= law.nearly:
+            return DONE
+        if not said(law, m.rows[(1 + m.gauges.outputs) * (m.done - 1) + 1 :]):
+            return SILENT
+        law.passed += 1
+        if obeyed(law):
+            m.jumping = 1
+        enter_inputs(law, m.done - 1, m.done)
+
+
+def set_out(m: March, law: Law) -> bool:
+    """Set out for the next sample; tell whether there is room."""
+    m.stop = float(law.passed + 1) * law.period
+    if m.stop > law.last or law.legs >= law.wanted or law.passed - law.first >= law.samples:
+        return False
+    if law.pace > 0.0:
+        wanted = math.ceil((m.stop - m.t) / law.pace - 1e-6) + 0.0
+        count = max(1, int(wanted))
+        if m.done + count > law.room:
+            return False
+        m.h = (m.stop - m.t) / float(count)
+        m.wanted = m.done + count
+        law.size = m.h
+    else:
+        if m.done >= law.room:
+            return False
+        m.wanted = law.room
+        law.size = m.size
+    law.away = 1
+    law.start = m.done
+    law.begun = m.t
+    return True
+
+
+def hurried(m: March) -> int:
+    """Let the inputs jump if they are to, then take steps of controlled error."""
+    if m.jumping == 1:
+        status = jump(m)
+        if status != DONE:
+            return status
+        m.jumping = 0
+    return controlled(m)
 
 
 def fixed(m: March) -> int:

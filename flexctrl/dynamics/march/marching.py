@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
-from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
+from flexctrl.dynamics.march.law import Sampling, no_law
 from flexctrl.dynamics.march.loops import run
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
@@ -23,6 +24,7 @@ from flexctrl.dynamics.march.record import (
     JUMP,
     REFACTOR,
     REMADE,
+    SAMPLED,
     SETTLE,
     SINGULAR,
     WANTS_MASS,
@@ -141,6 +143,7 @@ class Marcher:
         self._inputs: Any = self.flattened.flat.u.data
         self.steps, self.clock = m.cell("done"), m.cell("t")
         self._kept = _NOTHING
+        self._heeded: tuple[Sampling, Packed] | None = None
         self.width = 1 + len(model.outputs)
         self.rows = m.rows.reshape(-1, self.width)
         self.times: Any = m.rows.data[:: self.width]
@@ -158,6 +161,7 @@ class Marcher:
     def done(self) -> None:
         """Leave the march to another run."""
         self.march.reset()
+        self._heeded = None
         self.flattened.flat.z[:] = 0.0
         self._kept = _NOTHING
         if len(_idle(self.model)) < _SPARE:
@@ -270,6 +274,22 @@ class Marcher:
         self._inputs[:] = array("d", u)
         self._jumping[0] = 1
 
+    def heed(self, feed: Feed) -> tuple[Sampling, Packed]:
+        """Take the feed's controller, which can be lowered, into the loops; return it, and its numbers there."""
+        if self._heeded is None or self._heeded[0].feed is not feed:
+            assert isinstance(self.model.backend, Compiled)
+            sampling = Sampling(feed, self.model.backend, self.flattened.flat.u, _CAPACITY)
+            self._heeded = sampling, self.march.lend("law", sampling.law)
+        return self._heeded
+
+    def sampled(self, pacing: Pacing | None) -> int:
+        """Go on from sample to sample of the law as it is set, by its steps or as paced; return how it ended."""
+        m = self.march
+        m.done, m.kept, m.wanted = 0, 0, 0
+        if pacing is not None:
+            m.size, m.largest, m.stop, m.until, m.relative, m.absolute = pacing
+        return self._through(SAMPLED)
+
     def travelled(self, pacing: float | Pacing, count: int) -> list[State]:
         """Take as many steps and return the states after them."""
         found: list[State] = []
@@ -376,6 +396,7 @@ def _march(F: Flattened, method: Method) -> March:
         gauges=F.gauges,
         corners=corners_of(F.model),
         closing=closing_of(F),
+        law=no_law(),
         fronts=F.plan.fronts,
         axes=F.axes,
         tangent=_factors(F),

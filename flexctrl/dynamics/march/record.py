@@ -7,17 +7,19 @@ from dataclasses import dataclass
 
 from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.corners import Corners
+from flexctrl.dynamics.march.law import Law
 from flexctrl.kernels.native import Reals
 from flexctrl.model.axes import Axes
 from flexctrl.model.flat import Flat
 from flexctrl.model.fronts import Fronts
 from flexctrl.model.gauges import Gauges
 
-DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT, CORNER = 0, 1, 2, 3, 4, 5, 6
+DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT, CORNER, SILENT = 0, 1, 2, 3, 4, 5, 6, 7
 """How a call ends: with all done; before it can go on; at a step that does not converge, or cannot be shorter; before
-one that passes a corner of a law of force, or a place where a loop of rigid parts may lock."""
+one that passes a corner of a law of force, or a place where a loop of rigid parts may lock; at a sample at which the
+law does not say numbers."""
 
-FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED = 0, 1, 2, 3, 4, 5, 6, 7
+FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """What to do."""
 
 FRESH, EVALUATE, CORRECT = 0, 1, 2
@@ -60,6 +62,7 @@ class March:
     gauges : Gauges
     corners : Corners
     closing : Closing
+    law : Law
     fronts : Fronts
     axes : Axes
     tangent, mass : Factors
@@ -121,6 +124,7 @@ class March:
     gauges: Gauges
     corners: Corners
     closing: Closing
+    law: Law
     fronts: Fronts
     axes: Axes
     tangent: Factors

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.feed import CommandError, Supply
-from flexctrl.dynamics.march.legs import Held, Leg, Legs, same
+from flexctrl.dynamics.march.law import Sampling
+from flexctrl.dynamics.march.legs import Held, Leg, Legs, Told, same
 from flexctrl.dynamics.march.marching import Pacing
-from flexctrl.dynamics.march.record import DONE
+from flexctrl.dynamics.march.record import DONE, SILENT
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed
+from flexctrl.kernels.native import Packed
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -27,6 +29,8 @@ __all__ = ["ride"]
 
 _NEAR = 1e-9
 _SECONDS = 0.1
+_FIRST = 8
+_SHARE = 0.2
 
 
 def ride(journey: Journey) -> bool:
@@ -59,7 +63,7 @@ class _Ride:
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
-        self.steps = j.mark.steps
+        self.steps, self.mute = j.mark.steps, False
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
@@ -69,6 +73,8 @@ class _Ride:
             stop = self.journey.stops.next
             if stop - m.t <= self.tick:
                 well = self._renew(stop)
+            elif self._lowered(stop):
+                well = self._told(began + _SECONDS)
             elif self._even(stop):
                 well = self._samples(began + _SECONDS)
             else:
@@ -88,6 +94,60 @@ class _Ride:
         if done:
             self._passed(Leg(self.supply, t, pacing, done), stop)
         return status == DONE and done > 0
+
+    def _lowered(self, stop: float) -> bool:
+        """Tell whether the controller can be asked by the loops themselves from here on."""
+        feed = self.journey.plan.feed
+        if feed.lowered is None or self.mute or stop > self.until + self.tick:
+            return False
+        return self._even(stop) if self.pace else not self.marcher.march.keeping
+
+    @property
+    def _ahead(self) -> bool:
+        """Whether there is another sample to go to."""
+        end = self.until + self.tick
+        return self.journey.stops.next <= end and self.marcher.march.t < self.until - self.tick
+
+    def _told(self, deadline: float) -> bool:
+        """Go from sample to sample with a controller in the loops; tell whether all is well."""
+        j, marcher, mark, stops = self.journey, self.marcher, self.journey.mark, self.journey.stops
+        m, (sampling, law) = marcher.march, marcher.heed(j.plan.feed)
+        law.pace, law.last, law.nearly = self.pace, self.until + self.tick, self.until - self.tick
+        paced = self.pace or self._paced(m.t, math.inf)[0]
+        pacing = paced if isinstance(paced, Pacing) else None
+        status, wanted, done = DONE, _FIRST, 1
+        while status == DONE and done and self._ahead and time.perf_counter() < deadline:
+            law.passed, law.legs, law.wanted, law.away = stops.passed, 0, min(wanted, law.room), 0
+            if not law.first <= stops.passed < law.first + law.samples:
+                law.first, law.samples = sampling.ahead(stops.passed, self.until)
+            sampling.state[:] = self.supply.x
+            began = time.perf_counter()
+            status = marcher.sampled(pacing and pacing._replace(size=mark.size))
+            wanted = 2 * wanted if time.perf_counter() - began < _SHARE * _SECONDS else max(1, wanted // 2)
+            done = m.done
+            self._enter_told(law, sampling, pacing)
+            if mark.left:
+                break
+        self.mute = status == SILENT
+        if m.jumping:
+            self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
+            m.jumping = 0
+        return self.mute or (status == DONE and self.jumped and done > 0)
+
+    def _enter_told(self, law: Packed, sampling: Sampling, pacing: Pacing | None) -> None:
+        """Enter samples in marks and rows."""
+        j, m, mark, inputs = self.journey, self.marcher.march, self.journey.mark, law.inputs
+        j.stops.passed = law.passed
+        width = 3 + inputs + law.states
+        table = law.told[: law.legs * width].reshape(law.legs, width)
+        mark.steps += m.done
+        mark.size = m.size if pacing is not None else m.h
+        mark.left = m.wanted - m.done if self.pace and law.legs and m.done else 0
+        self.supply = Supply(self.marcher.flattened.flat.u.copy(), sampling.state.copy(), self.supply.rate)
+        if m.done:
+            self.legs.parts.append(Told(self.supply.rate, table.copy(), inputs, law.period, pacing))
+            rows = law.rows[: m.done * inputs].reshape(m.done, inputs).copy()
+            j.rows.sampled(self.marcher.rows[: m.done], rows, self.marcher.states(), 1e-6 * mark.size)
 
     def _even(self, stop: float) -> bool:
         """Tell whether steps of one length go to a sample from where the last one was taken."""
