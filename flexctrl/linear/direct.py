@@ -1,4 +1,4 @@
-"""One sparse factorisation for each s."""
+"""One sparse factorisation for each s, and a step of refinement with a residual of extended precision."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["direct_transfer", "infinite", "state_at"]
 
 
 def direct_transfer(base: Scaled) -> Callable[[np.ndarray], np.ndarray]:
-    """One sparse LU with a step of refinement for each s.
+    """One sparse LU for each s.
 
     Parameters
     ----------
@@ -55,13 +55,14 @@ def state_at(model: LinearModel) -> Callable[[complex], np.ndarray]:
     B = model.B.astype(complex)
 
     def state(s: complex) -> np.ndarray:
-        A = sp.csc_matrix((K.data + s * C.data + s * s * M.data, K.indices, K.indptr), K.shape)
+        z = np.clongdouble(s)
+        A = sp.csc_matrix((K.data + z * C.data + z * z * M.data, K.indices, K.indptr), K.shape)
         try:
-            lu = sla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1)
+            lu = sla.splu(A.astype(complex), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1)
         except RuntimeError as error:
             raise infinite(s, "the model") from error
         x = lu.solve(B)
-        return np.asarray(x + lu.solve(B - A @ x))
+        return np.asarray(x + lu.solve((B - A @ x).astype(complex)))
 
     return state
 

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from flexctrl.linear.modal import ModalSystem
 from flexctrl.linear.model import LinearModel
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.resolvent import cached_resolvent
 from flexctrl.linear.statespace import first_order
 
@@ -48,7 +49,7 @@ def refined_transfer(
     """
     if np.finfo(LONG).eps > FINER * np.finfo(float).eps:
         return rough
-    state, residual = _state(system), _residual(linear)
+    state, residual = _state(system), _residual(linear, system.modes)
     loads = np.asarray(linear.B, complex)[:, :, None]
 
     def moving(s: np.ndarray) -> np.ndarray:
@@ -91,21 +92,28 @@ def _times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.asarray((A @ x.reshape(len(x), -1)).reshape(len(A), *x.shape[1:]))
 
 
-def _residual(linear: LinearModel) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """(q, s) ↦ B − (K + s C + s² M) q, shapes (n, m, N) and (N,)."""
+def _residual(linear: LinearModel, modes: Modes) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """(q, s) ↦ B − (Pᵀ K P + s C + s² M) q, shapes (n, m, N) and (N,); P takes out the rigid-body modes.
+
+    K resists these by its rounding, which at low frequencies is more than their inertia.
+    """
     K, C, M = (sp.csr_matrix(A).astype(LONG) for A in (linear.K, linear.C, linear.M))
     B = linear.B[:, :, None]
+    rigid = modes.shapes[:, modes.unstable : modes.unstable + modes.rigid].astype(LONG)
+    momenta = M @ rigid
 
     def residual(q: np.ndarray, s: np.ndarray) -> np.ndarray:
         n = len(q)
         parts = np.hstack([q.real.reshape(n, -1), q.imag.reshape(n, -1)]).astype(LONG)
 
-        def times(A: sp.csr_matrix) -> np.ndarray:
-            both = (A @ parts).reshape(n, 2, *q.shape[1:])
+        def joined(both: np.ndarray) -> np.ndarray:
+            both = both.reshape(n, 2, *q.shape[1:])
             return np.asarray(both[:, 0] + 1j * both[:, 1])
 
+        elastic = K @ (parts - rigid @ (momenta.T @ parts))
+        elastic = joined(elastic - momenta @ (rigid.T @ elastic))
         long = s.astype(np.clongdouble)
-        return np.asarray(B - times(K) - long * (times(C) + long * times(M)), dtype=complex)
+        return np.asarray(B - elastic - long * (joined(C @ parts) + long * joined(M @ parts)), dtype=complex)
 
     return residual
 

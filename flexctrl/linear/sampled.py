@@ -24,7 +24,7 @@ BLIND = 1e-11
 Evaluator: TypeAlias = "Callable[[np.ndarray], np.ndarray]"
 
 
-def sampled_transfer(base: Scaled, modes: Callable[[], Modes], top: float) -> Callable[[np.ndarray], np.ndarray]:
+def sampled_transfer(base: Scaled, modes: Modes, top: float) -> Callable[[np.ndarray], np.ndarray]:
     """Galerkin projection on modes, static solutions and solutions at some s, until the error is small at all s.
 
     The space starts with the modes given and P⁻¹ B, P = sym(K + a C + a² M), a > 0. For each s asked for, the
@@ -39,8 +39,8 @@ def sampled_transfer(base: Scaled, modes: Callable[[], Modes], top: float) -> Ca
     Parameters
     ----------
     base : Scaled
-    modes : callable
-        The lowest modes of the same model, past `top`; asked for when needed.
+    modes : Modes
+        The lowest of the same model, past `top`.
     top : float
         Largest |s|, rad/s: it sets the scale of a.
 
@@ -56,12 +56,11 @@ def sampled_transfer(base: Scaled, modes: Callable[[], Modes], top: float) -> Ca
     def evaluate(s: np.ndarray) -> np.ndarray:
         s = np.asarray(s, dtype=complex)
         if not evaluators and s.size <= FEW:
-            return direct(s) if s.all() else _with_rest(base, modes(), direct, s)
+            return direct(s) if s.all() else _with_rest(base, modes, direct, s)
         if not evaluators:
-            found = modes()
             few = [_through(base, np.arange(i, min(i + TOGETHER, count))) for i in range(0, count, TOGETHER)]
-            evaluators.extend(_of_few_inputs(part, found, top) for part in few)
-        return _with_rest(base, modes(), lambda z: np.concatenate([one(z) for one in evaluators], axis=1), s)
+            evaluators.extend(_of_few_inputs(part, modes, top) for part in few)
+        return _with_rest(base, modes, lambda z: np.concatenate([one(z) for one in evaluators], axis=1), s)
 
     return evaluate if count else direct
 

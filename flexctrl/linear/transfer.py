@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.condense import Scaled, scaled
 from flexctrl.linear.direct import direct_transfer
+from flexctrl.linear.free_motion import with_free_motion_apart
 from flexctrl.linear.modal import ModalSystem, rayleigh
 from flexctrl.linear.modal_sum import divided, modal_sum, outer
 from flexctrl.linear.model import LinearModel
@@ -27,6 +27,7 @@ MOST_COUPLED = 150
 FURTHER = 1.5
 UNSYMMETRIC = 1e-9
 COUPLED = 250
+FEW = 20
 
 
 def transfer(linear: LinearModel, top: float) -> Transfer:
@@ -76,10 +77,12 @@ def routed(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
     fit = rayleigh(base.model)
     reach, most = (FURTHER, MOST_COUPLED) if fit is None else (2.0, MOST_MODES)
     count = _modes_below(base, (reach * top) ** 2)
-    if count > most or base.stiffness[1] > UNSYMMETRIC:
+    if base.stiffness[1] > UNSYMMETRIC:
         return direct_transfer(base), False
+    if count > most:
+        return direct_transfer(with_free_motion_apart(base, modes_of(linear, base, FEW))[0]), False
     if fit is None:
-        return sampled_transfer(base, cache(lambda: modes_of(linear, base, count + 2)), top), True
+        return sampled_transfer(*with_free_motion_apart(base, modes_of(linear, base, max(count + 2, FEW))), top), True
     return residual_transfer(base, modes_of(linear, base, count + 2), fit, top), False
 
 
