@@ -17,6 +17,8 @@ import scipy.sparse as sp
 from flexctrl.linear.condense import Scaled
 from flexctrl.linear.modes import Modes
 
+BLIND = 1e-11
+
 __all__ = ["with_free_motion_apart"]
 
 
@@ -50,9 +52,9 @@ def with_free_motion_apart(base: Scaled, modes: Modes) -> tuple[Scaled, Modes]:
         M=sp.csc_matrix(T.T @ model.M @ T),
         C=_damping(model.C, T, count),
         K=sp.csc_matrix(sp.block_diag([sp.csc_matrix((count, count)), model.K[kept][:, kept]])),
-        B=T.T @ model.B,
-        Cq=model.Cq @ T,
-        Cv=model.Cv @ T,
+        B=np.vstack([_shares(free.T, model.B), model.B[kept]]),
+        Cq=np.hstack([_shares(model.Cq, free), model.Cq[:, kept]]),
+        Cv=np.hstack([_shares(model.Cv, free), model.Cv[:, kept]]),
         coordinates=names,
     )
     share = np.linalg.solve(free[gone], shapes[gone])
@@ -61,6 +63,12 @@ def with_free_motion_apart(base: Scaled, modes: Modes) -> tuple[Scaled, Modes]:
         replace(base, model=apart, scales=np.ones(len(names)), band=None),
         replace(modes, shapes=moved, coordinates=names, place=None),
     )
+
+
+def _shares(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Their product, where it is more than rounding."""
+    found = rows @ columns
+    return np.where(np.abs(found) > BLIND * (np.abs(rows) @ np.abs(columns)), found, 0.0)
 
 
 def _damping(C: sp.csc_matrix, T: sp.csc_matrix, count: int) -> sp.csc_matrix:

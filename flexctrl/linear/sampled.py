@@ -19,7 +19,6 @@ TOGETHER = 3
 SAMPLES = 8
 FEW = 24
 MOST_COLUMNS = 400
-BLIND = 1e-11
 
 Evaluator: TypeAlias = "Callable[[np.ndarray], np.ndarray]"
 
@@ -39,6 +38,7 @@ def sampled_transfer(base: Scaled, modes: Modes, top: float) -> Callable[[np.nda
     Parameters
     ----------
     base : Scaled
+        In coordinates with free motion apart.
     modes : Modes
         The lowest of the same model, past `top`.
     top : float
@@ -79,10 +79,8 @@ def _with_rest(base: Scaled, modes: Modes, evaluate: Evaluator, s: np.ndarray) -
     if not (still.any() and modes.rigid):
         return evaluate(s)
     rigid = modes.shapes[:, modes.unstable : modes.unstable + modes.rigid] / base.scales[:, None]
-    model, size = base.model, np.abs(rigid)
-    seen = (np.abs(model.Cq @ rigid) > BLIND * (np.abs(model.Cq) @ size)).any()
-    pushed = (np.abs(rigid.T @ model.B) > BLIND * (size.T @ np.abs(model.B))).any()
-    if seen and pushed:
+    model = base.model
+    if (model.Cq @ rigid).any() and (rigid.T @ model.B).any():
         raise infinite(0.0, "the model")
     values = np.empty((*model.D.shape, s.size), dtype=complex)
     values[..., ~still] = evaluate(s[~still])

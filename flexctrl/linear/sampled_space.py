@@ -19,11 +19,12 @@ from flexctrl.linear.resolvent import Resolvent, resolvent
 __all__ = ["Metric", "Space", "grown", "metric_of", "started"]
 
 ACCURACY = 2e-10
-ROUNDING = 32.0 * float(np.finfo(float).eps)
+ROUNDING = 3.2 * float(np.finfo(float).eps)
 DEPENDENT = 1e-12
 NOTHING = 1e-13
 CHUNK = 1000
 TINY = float(np.finfo(float).tiny)
+LONG = np.longdouble
 OUTSIDE = 2.0
 
 Faces: TypeAlias = "tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]"
@@ -56,6 +57,12 @@ class Metric:
     inverse: Callable[[np.ndarray], np.ndarray]
     root: Callable[[np.ndarray], np.ndarray]
     rows: tuple[np.ndarray, np.ndarray]
+
+    @cached_property
+    def exact(self) -> sp.csr_matrix:
+        """A in extended precision: where it is soft, little of its entries is left."""
+        model, a = self.model, self.a
+        return sp.csr_matrix(model.K.astype(LONG) + a * model.C.astype(LONG) + a * a * model.M.astype(LONG))
 
 
 def metric_of(model: LinearModel, a: float) -> Metric | None:
@@ -216,10 +223,11 @@ def grown(space: Space, vectors: np.ndarray) -> Space:
     metric = space.metric
     new, Wnew = _fresh(space, vectors)
     V, width = np.hstack([space.V, new]), new.shape[1]
-    moved = [X @ new for X in (metric.A, metric.C, metric.M)]
+    terms = (metric.exact, metric.C, metric.M)
+    moved = [np.asarray(X @ new, dtype=float) for X in terms]
     images = [
-        np.block([[old, space.V.T @ move], [new.T @ (X @ space.V), new.T @ move]])
-        for old, X, move in zip(space.images[:3], (metric.A, metric.C, metric.M), moved, strict=True)
+        np.block([[old, space.V.T @ move], [new.T @ np.asarray(X @ space.V, dtype=float), new.T @ move]])
+        for old, X, move in zip(space.images[:3], terms, moved, strict=True)
     ]
     forces = np.hstack([metric.skew @ new, *moved[1:]])
     Z, faces = _extended(space, np.hstack([Wnew, metric.root(metric.inverse(forces))]), width)

@@ -89,3 +89,61 @@ def test_rigid_poles_are_zero(held, rigid, drives, metric):
     sampled = linear.discretize(dt)
     assert isinstance(sampled, control.StateSpace)
     assert np.count_nonzero(np.abs(np.log(sampled.poles().astype(complex)) / dt) < 1e-9 * first) == 2 * count
+
+
+def slewing_crane(elements: int) -> LinearModel:
+    """Mast, jib and counterweight on a geared slew drive that turns freely; a rope with damping holds the load."""
+    box = fc.Section.box(fc.STEEL, width=0.4, height=0.4, web=0.006, flange=0.006)
+    mast = fc.Beam("mast", (0, 0, 0), (0, 0, 10), box, elements=elements)
+    jib = fc.Beam("jib", (0, 0, 10), (12, 0, 10), box, elements=elements)
+    rope = fc.Rope("rope", jib.end, (12, 0, 4), EA=5e6, damping=2e3)
+    load, hub = fc.PointMass("load", rope.end, 800.0), fc.RigidBody("hub", (0, 0, 10), 200.0, (20, 20, 20))
+    drive = fc.RotaryDrive("slew", hub.node, mast.end, axis="z", stiffness=40.0, ratio=200, inertia=0.02, damping=0.02)
+    structure = fc.Structure(
+        [mast, jib, rope, load, hub],
+        [
+            fc.Support(mast.start),
+            fc.Hinge(mast.end, hub.node, "z"),
+            fc.Weld(hub.node, jib.start),
+            fc.Pin(jib.end, rope.start),
+            fc.Pin(rope.end, load.node),
+        ],
+        [drive],
+        inputs=[fc.MotorTorque("torque", drive), fc.Force("wind", load.node, "y")],
+        outputs=[fc.DriveAngle("angle", drive), fc.Position("tip", jib.end, "y"), fc.Velocity("rate", jib.end, "y")],
+    )
+    effects = [fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(alpha=0.01, beta=5e-4)]
+    return fc.linearize(fc.assemble(structure, effects))
+
+
+def in_forty_digits(linear: LinearModel, omega: float) -> np.ndarray:
+    """The response of the matrices, K without what rounding sets against the rigid-body modes."""
+    mp = pytest.importorskip("mpmath", reason="forty digits need mpmath")
+    mp.mp.dps = 40
+    M, C, K = (mp.matrix(A.toarray().tolist()) for A in (linear.M, linear.C, linear.K))
+    modes = linear.modes()
+    R = mp.matrix(modes.shapes[:, : modes.rigid].tolist())
+    P = mp.eye(K.rows) - R * (R.T * M * R) ** -1 * R.T * M
+    Z, s = P.T * K * P, mp.mpc(0, omega)
+    Z = Z + s * C + s * s * M
+    columns = [mp.lu_solve(Z, mp.matrix(b.tolist())) for b in linear.B.T]
+    rows = mp.matrix(linear.Cq.tolist()) + s * mp.matrix(linear.Cv.tolist())
+    return np.array([[complex(x) for x in rows * column] for column in columns]).T
+
+
+@pytest.mark.parametrize("omega", [1e-3, 0.3])
+def test_rounding_of_the_stiffness_does_not_hold_free_motion_at_low_frequencies(omega):
+    linear = slewing_crane(1)
+    ours, exact = linear.frequency_response([omega]).values[:, :, 0], in_forty_digits(linear, omega)
+    assert np.abs(ours / exact - 1.0).max() < 1e-12
+
+
+def test_nor_in_models_too_large_for_all_their_modes():
+    """Against the state space, one frequency alone and among many (a projection)."""
+    linear = slewing_crane(24)
+    omega = np.geomspace(1e-3, 1.0, 40)
+    exact = linear.to_ss()(1j * omega)
+    many = linear.frequency_response(omega).values
+    assert np.abs(many / exact - 1.0).max() < 1e-8
+    few = linear.frequency_response(omega[:2]).values
+    assert np.abs(few / exact[..., :2] - 1.0).max() < 1e-9
