@@ -48,6 +48,11 @@ class Coefficients:
         gamma = 0.5 + alpha_f - alpha_m
         return cls(alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma)
 
+    @property
+    def damping(self) -> bool:
+        """Whether the highest frequencies lose energy: ρ < 1."""
+        return self.gamma > 0.5
+
     def blend(self, rate: np.ndarray, before: np.ndarray, algorithmic: np.ndarray) -> np.ndarray:
         """Return the method's own acceleration after a step, from the true ones at both ends and its own before."""
         return ((1.0 - self.alpha_f) * rate + self.alpha_f * before - self.alpha_m * algorithmic) / (1.0 - self.alpha_m)

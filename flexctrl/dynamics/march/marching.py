@@ -45,7 +45,7 @@ from flexctrl.model.motion import State
 
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
-_SHARE = 1e-3
+_SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
 _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed")
 _MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
@@ -421,7 +421,7 @@ def _march(F: Flattened, method: Method) -> March:
         gamma=c.gamma,
         least=method.least,
         loosest=max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
-        share=_SHARE,
+        share=_SHARE if c.damping else _KEEPING,
         price=_MADE if flat.tangents else _ASKED,
         asking=int(not flat.tangents),
         tolerance=method.least,
