@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.lowering import Lowered, lowered
 from flexctrl.errors import ControllerError
-from flexctrl.kernels.kernel import Compiled
+from flexctrl.kernels.kernel import FLOAT, Compiled
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
@@ -159,7 +159,7 @@ class Feed:
 
     def _total(self, command: Any) -> list[float]:
         u = self._base.copy()
-        column = type(command) is np.ndarray and command.ndim == 1 and command.dtype == float
+        column = type(command) is np.ndarray and command.ndim == 1 and command.dtype is FLOAT
         values = command.tolist() if column else np.asarray(command, dtype=float).ravel().tolist()
         writes = self.writes
         if len(values) != len(writes):

@@ -352,7 +352,7 @@ def jump(m: March) -> int:
     load(f)
     clear(f.padded, f.step)
     copy(f.padded, m.v, f.v)
-    if m.mass_for != 1.0 or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
+    if m.mass_for != 1.0 or spent(m) or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
         status = massed(m)
         if status != DONE:
             return status
@@ -367,6 +367,11 @@ def jump(m: March) -> int:
     pull(f)
     copy(f.padded, f.force, m.pulled)
     return DONE
+
+
+def spent(m: March) -> bool:
+    """Tell whether the mass was believed in as long as it may, and making it takes less than looking at it again."""
+    return m.asking == 0 and m.believed >= _TRUSTED
 
 
 def small(m: March) -> bool:
@@ -476,7 +481,8 @@ def weighed(m: March) -> int:
     if where >= 0:
         return SINGULAR
     m.mass_for = 1.0
-    m.missed = -1.0
+    m.missed = 0.0
+    m.believed = 0
     m.weighings += 1
     mark(m.axes, m.mass, f)
     return DONE

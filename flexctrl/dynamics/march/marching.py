@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from array import array
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -47,7 +46,7 @@ __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
 _SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
 _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed")
-_MADE, _ASKED = 5.0, 100.0
+_MADE, _ASKED = 3.0, 100.0
 _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
 _CAPACITY = 1024
@@ -200,6 +199,11 @@ class Marcher:
         return self.march.shelf if self.march.keeping else _CAPACITY
 
     @cached_property
+    def readings(self) -> list[np.ndarray]:
+        """The outputs after each step, row by row."""
+        return list(self.rows[:, 1:])
+
+    @cached_property
     def _state_width(self) -> int:
         return _state_width(self.flattened)
 
@@ -260,18 +264,20 @@ class Marcher:
         return status, m.done
 
     def begin(self) -> None:
-        """Begin rows and states anew."""
+        """Begin rows and states of steps of one length anew; see `on`."""
         self.march.done = self.march.kept = 0
+        self._task[0] = FIXED
 
     def on(self, h: float, wanted: int) -> int:
         """Go on with steps of one length until as many as wanted are done; return how it ended."""
-        self._h[0], self._wanted[0], self._task[0] = h, wanted, FIXED
+        self._h[0], self._wanted[0] = h, wanted
         status = self._run()
         return status if status == DONE else self._answered(status, FIXED)
 
     def jumps(self, u: list[float]) -> None:
         """Let the inputs jump before the next step of one length."""
-        self._inputs[:] = array("d", u)
+        for i, value in enumerate(u):
+            self._inputs[i] = value
         self._jumping[0] = 1
 
     def heed(self, feed: Feed) -> tuple[Sampling, Packed]:

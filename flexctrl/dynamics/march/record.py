@@ -88,8 +88,8 @@ class March:
     habit, trusted : float, int
         How much smaller each correction has been than the one before, and in how many steps that was only believed.
     price, spent, lately, served : float, int
-        What a tangent costs, in iterations; what was spent on it and on iterations since, how many steps take
-        lately, and how many there were.
+        What a tangent costs, in iterations; what was spent on it and on iterations since, how many the last step
+        took, and how many steps there were.
     trending : int
         Whether accelerations are expected to go on as they went.
     made_for, mass_for : float

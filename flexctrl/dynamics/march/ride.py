@@ -165,7 +165,7 @@ class _Ride:
         marcher, stops, mark = self.marcher, self.journey.stops, self.journey.mark
         last, nearly, pace, room = self.until + self.tick, self.until - self.tick, self.pace, marcher.room
         told, reads, sample = self.journey.plan.feed.told, self.journey.plan.feed.reads, stops.sample
-        clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.rows[:, 1:]
+        clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.readings
         held = Held(self.supply.rate, [])
         t, h, u, x, done, status = clock[0], mark.size, self.supply.u.tolist(), self.supply.x, 0, DONE
         marcher.begin()

@@ -22,7 +22,6 @@ _ASTRAY = 1.5
 _ITERATIONS = 12
 _TRUSTED = 8
 _HABIT = 0.002
-_FORGOTTEN = 0.25
 
 
 def step(m: March) -> int:
@@ -119,7 +118,7 @@ def reckon(m: March) -> None:
     """Enter the iterations of a step in the account of the tangent."""
     m.served += 1
     m.spent += m.iteration + 1.0
-    m.lately += _FORGOTTEN * (m.iteration + 1.0 - m.lately)
+    m.lately = m.iteration + 1.0
 
 
 def stale(m: March) -> bool:
