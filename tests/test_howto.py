@@ -23,6 +23,7 @@ PAGES_RUN = (
     "matlab",
     "sampling",
     "hoisting",
+    "travelling",
     "long_runs",
 )
 BLOCK = re.compile(r"^```python\n(?P<code>.*?)^```$(?:\n\n```text\n(?P<shown>.*?)^```$)?", re.DOTALL | re.MULTILINE)

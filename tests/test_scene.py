@@ -157,7 +157,7 @@ hold = { "carriage.travel.u" = 0.5 }
     girder = scene.structure.part("girder")
     assert scene.structure.part("carriage") == fc.Trolley("carriage", girder, at=1.0, mass=5.0)
     assert scene.rest.outputs == pytest.approx({"s": 1.5})
-    with pytest.raises(SceneError, match="there is no beam 'grider'.*girder"):
+    with pytest.raises(SceneError, match=r"there is no beam 'grider'.*girder"):
         load_scene(written(text.replace('along = "girder"', 'along = "grider"')))
 
 

@@ -94,6 +94,18 @@ def test_bridge_crane_controllers() -> None:
         assert np.abs(comparison.rigid["bend"]).max() < 1e-9 < np.abs(comparison.flexible["bend"]).max()
 
 
+def test_a_trolley_crosses_its_girder(tmp_path: Path) -> None:
+    found = _finished("travelling_trolley.py").names
+    runs, standing = found["runs"], found["standing"]
+    for run in runs.values():
+        assert run["s"][-1] == pytest.approx(found["START"] + found["DISTANCE"], abs=0.2)
+        assert np.abs(run["sag"] - standing(run["s"])).max() < 5e-3 * np.abs(run["sag"]).max()
+    left = {name: np.abs(run["sway"][run.t > 22.0]).max() for name, run in runs.items()}
+    assert left["shaped by ZVD"] < 0.02 * left["plain"]
+    found["draw"]().savefig(tmp_path / "travelling_trolley.png")
+    assert (tmp_path / "travelling_trolley.png").stat().st_size > 5_000
+
+
 def test_lee_frame_prints_what_its_page_shows_and_snaps_where_it_should() -> None:
     found = _finished("lee_frame.py")
     page = (ROOT / "docs" / "howto" / "paths.md").read_text(encoding="utf-8")
