@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from flexctrl.kernels.eights import eight, put, total
 from flexctrl.kernels.native import Reals, Wholes
 
-__all__ = ["Factorising", "LanczosRun", "Solving", "Tiles", "factorise", "lanczos", "solve"]
+__all__ = ["Factorising", "LanczosRun", "Solving", "Tiles", "factorise", "lanczos", "ready", "solve"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Factorising:
     ----------
     tiles : Tiles
     lower : numpy.ndarray
-        A, then L with the inverses of its tiles on the diagonal.
+        A, then L; ready for solving, with the inverses of its tiles on the diagonal.
     pivots : numpy.ndarray, shape (8 panels,)
         D.
     size : numpy.ndarray, shape (8 panels,)
@@ -130,8 +130,14 @@ def factorise(f: Factorising) -> int:
             for r in range(q, p + 1 + below):
                 into = f.lower[64 * (t.first[q] + r - q) :]
                 subtract(f.work[64 * (r - p) :], own[64 * (q - p) :], into)
-        invert(own, f.work)
     return negative
+
+
+def ready(f: Factorising) -> int:
+    """Make factors ready for solving."""
+    for p in range(f.tiles.panels):
+        invert(f.lower[64 * f.tiles.first[p] :], f.work)
+    return 0
 
 
 def eliminate(k: int, below: int, inverse: float, own: Reals) -> None:
@@ -177,23 +183,27 @@ def invert(own: Reals, work: Reals) -> None:
 
 def solve(s: Solving) -> int:
     """Solve for all right-hand sides."""
-    for i in range(s.count):
-        substitute(s.factor, s.x[8 * s.factor.tiles.panels * i :])
+    substitute(s.factor, s.count, s.x)
     return 0
 
 
-def substitute(f: Factorising, x: Reals) -> None:
-    """(L D Lᵀ)⁻¹ x in place."""
+def substitute(f: Factorising, count: int, x: Reals) -> None:
+    """(L D Lᵀ)⁻¹ x in place, for vectors x that stand one after the other."""
     t = f.tiles
+    n = 8 * t.panels
     for p in range(t.panels):
         own = f.lower[64 * t.first[p] :]
-        turn(own, x[8 * p :])
-        spread(t.below[p], own[64:], x[8 * p :], x[8 * p + 8 :], -1.0)
+        below = t.below[p]
+        for here in range(8 * p, count * n, n):
+            turn(own, x[here:])
+            spread(below, own[64:], x[here:], x[here + 8 :], -1.0)
     for p in range(t.panels - 1, -1, -1):
         own = f.lower[64 * t.first[p] :]
-        put(x[8 * p :], eight(x[8 * p :]) / eight(f.pivots[8 * p :]))
-        gather(t.below[p], own[64:], x[8 * p + 8 :], x[8 * p :], -1.0)
-        turn_back(own, x[8 * p :])
+        below = t.below[p]
+        for here in range(8 * p, count * n, n):
+            put(x[here:], eight(x[here:]) / eight(f.pivots[8 * p :]))
+            gather(below, own[64:], x[here + 8 :], x[here:], -1.0)
+            turn_back(own, x[here:])
 
 
 def turn(tile: Reals, x: Reals) -> None:
@@ -299,7 +309,7 @@ def lanczos(s: LanczosRun) -> int:
         last = s.size - 1
         for r in range(0, n, 8):
             put(z[r:], eight(s.images[last * n + r :]))
-        substitute(s.factor, z)
+        substitute(s.factor, 1, z)
         s.own[last] = 0.0
         for repeat in range(2):  # but for rounding, what is new stands across all but the last two
             for i in range(last, -1 if repeat > 0 else max(last - 2, -1), -1):

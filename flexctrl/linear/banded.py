@@ -139,12 +139,6 @@ class Band:
             held = np.append(held, info - 1)
         return None
 
-    def _diagonal(self, data: np.ndarray) -> np.ndarray:
-        """Diagonal of the matrix with these entries, in the band's order."""
-        diagonal, own = np.zeros(self.order.size), np.flatnonzero(self.rows == self.columns)
-        diagonal[self.rows[own]] = data[self.chosen[own]]
-        return diagonal
-
     def _stored(self, data: np.ndarray) -> np.ndarray:
         """Lower band column by column, shape (n, width + 1)."""
         n = self.order.size

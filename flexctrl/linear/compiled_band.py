@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.kernels.native import Packed
-from flexctrl.linear.band_loops import Factorising, LanczosRun, Solving, Tiles, factorise, lanczos, solve
+from flexctrl.linear.band_loops import Factorising, LanczosRun, Solving, Tiles, factorise, lanczos, ready, solve
 from flexctrl.linear.banded import Band, Factor
 from flexctrl.linear.krylov import NOTHING, Grown
 
@@ -50,10 +50,9 @@ class CompiledBand(Band):
     def whole(self, data: np.ndarray) -> np.ndarray:
         """As `lower`, with whole tiles on the diagonal."""
         tiles = self.lower(data)
-        own = tiles.reshape(-1, 8, 8)[self.tiles.first]
-        over = own.transpose(0, 2, 1).copy()
-        over[:, np.arange(8), np.arange(8)] = 0.0
-        tiles.reshape(-1, 8, 8)[self.tiles.first] += over
+        near = np.flatnonzero(self.rows >> 3 == self.columns >> 3)
+        across = (self._tiled[near] & ~63) + ((self.rows[near] & 7) << 3) + (self.columns[near] & 7)
+        tiles[across] = data[self.chosen[near]]
         return tiles
 
     def padded(self, x: np.ndarray) -> np.ndarray:
@@ -66,21 +65,22 @@ class CompiledBand(Band):
         """What `padded` was given."""
         return np.ascontiguousarray(rows.take(self.back, axis=1).T)
 
-    def _eliminated(self, data: np.ndarray) -> tuple[Any, int]:
-        t, lower = self.tiles, self.lower(data)
-        idle = np.arange(self.order.size % 8 or 8, 8)
-        lower[self.room - 64 + 9 * idle] = 1.0
+    def _eliminated(self, data: np.ndarray) -> tuple[Any, int, np.ndarray]:
+        """Factors, the number of negative pivots, and the diagonal of the matrix."""
+        t, n, lower = self.tiles, self.order.size, self.lower(data)
+        diagonal = lower.reshape(-1, 64)[t.first, ::9].ravel()[:n]
+        lower[self.room - 64 + 9 * np.arange(n % 8 or 8, 8)] = 1.0
         pivots, size = np.zeros((2, 8 * t.panels))
-        work = np.empty(64 * (int(t.below.max()) + 1))
-        f = Packed(Factorising(t, lower, pivots, size, work))
-        return f, f.bound(factorise)()
+        f = Packed(Factorising(t, lower, pivots, size, np.empty(64 * (int(t.below.max()) + 1))))
+        return f, f.bound(factorise)(), diagonal
 
     def factorise(self, data: np.ndarray) -> Factor | None:
         """See `Band`."""
-        f, negative = self._eliminated(data)
+        f, negative, diagonal = self._eliminated(data)
         n = self.order.size
         if negative or not np.isfinite(f.pivots).all():
             return None
+        f.bound(ready)()
 
         def solved(rhs: np.ndarray) -> np.ndarray:
             x = self.padded(rhs)
@@ -90,12 +90,12 @@ class CompiledBand(Band):
         def space(mass: np.ndarray, start: np.ndarray, image: np.ndarray) -> Recurrence:
             return Recurrence(self, f, mass, start, image)
 
-        return Factor(f.pivots[:n], f.size[:n], self.order, solved, space)
+        return Factor(f.pivots[:n], diagonal, self.order, solved, space)
 
     def negative(self, data: np.ndarray, near: Callable[[], np.ndarray], growth: float) -> int | None:
         """See `Band`. Counted by the pivots of an elimination without exchange, where rounding does not grow in it."""
-        f, negative = self._eliminated(data)
-        if negative >= 0 and (f.size[: self.order.size] <= growth * np.abs(self._diagonal(data))).all():
+        f, negative, diagonal = self._eliminated(data)
+        if negative >= 0 and (f.size[: diagonal.size] <= growth * np.abs(diagonal)).all():
             return negative
         return super().negative(data, near, growth)
 
@@ -127,9 +127,10 @@ class Recurrence:
         """See `Space`."""
         return self._band.unpadded(self._vectors[: self._size])
 
-    def combined(self, shares: np.ndarray) -> np.ndarray:
+    def combined(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Space`."""
-        return self._band.unpadded(shares.T @ self._vectors[: len(shares)])
+        vectors, images = (shares.T @ a[: len(shares)] for a in (self._vectors, self._images))
+        return self._band.unpadded(vectors), self._band.unpadded(images)
 
     def projected(self, known: int) -> np.ndarray:
         """See `Space`."""

@@ -8,7 +8,7 @@ from the inverted one, high pairs from the direct one in the M-orthogonal rest.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -203,6 +203,7 @@ def _polished(
     return x @ y, ritz
 
 
+@lru_cache(maxsize=4)
 def _noise(n: int, width: int) -> np.ndarray:
     return np.random.default_rng(width).standard_normal((n, width))
 

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import lapack
 
 __all__ = ["NOTHING", "Blocks", "Grown", "Krylov", "Space", "krylov"]
 
@@ -30,10 +31,13 @@ class Krylov:
         Descending.
     vectors : numpy.ndarray, shape (n, k)
         M-orthonormal, A⁻¹M y = θ y.
+    images : numpy.ndarray, shape (n, k)
+        M y.
     """
 
     theta: np.ndarray
     vectors: np.ndarray
+    images: np.ndarray
 
 
 class Grown(NamedTuple):
@@ -65,8 +69,8 @@ class Space(Protocol):
     def vectors(self) -> np.ndarray:
         """M-orthonormal Q, shape (n, size)."""
 
-    def combined(self, shares: np.ndarray) -> np.ndarray:
-        """The first vectors times shares, shape (known, k)."""
+    def combined(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The first vectors times shares, shape (known, k), and their products with M."""
 
     def grown(self, until: int) -> Grown:
         """Grow until the images of so many vectors are known."""
@@ -97,13 +101,13 @@ def krylov(space: Space, count: int) -> Krylov:
     check, step = 2 * count + max(space.width, SELDOM), max(space.width, count // 3)
     while True:
         known, rest, ended = space.grown(check)
-        theta, s = np.linalg.eigh(space.projected(known))
+        theta, s, _ = lapack.dsyevd(space.projected(known), lower=1)
         theta, s = theta[::-1], s[:, ::-1]
         miss = np.sqrt(np.square(rest @ s[-rest.shape[1] :]).sum(axis=0)) / np.maximum(theta, NOTHING * theta[0])
         wanted = _to_the_gap(theta, count)
         if ended or (wanted < known and (miss[:wanted] <= STILL).all() and miss[wanted] <= ROUGH):
             kept = slice(None, wanted + 1)
-            return Krylov(theta[kept], space.combined(s[:, kept]))
+            return Krylov(theta[kept], *space.combined(s[:, kept]))
         check = known + step
 
 
@@ -141,9 +145,9 @@ class Blocks:
         """See `Space`."""
         return self._Q[:, : self._size]
 
-    def combined(self, shares: np.ndarray) -> np.ndarray:
+    def combined(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Space`."""
-        return self._Q[:, : len(shares)] @ shares
+        return self._Q[:, : len(shares)] @ shares, self._MQ[:, : len(shares)] @ shares
 
     def projected(self, known: int) -> np.ndarray:
         """See `Space`."""

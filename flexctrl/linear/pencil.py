@@ -114,7 +114,7 @@ class ShiftedPencil:
         """
         space = self._space(start, 3 * (count + start.shape[1]))
         found = krylov(space, count)
-        image, near = self.M @ found.vectors, found.theta * found.vectors
+        image, near = found.images, found.theta * found.vectors
         after = near + self.inverse(image + self.sigma * (found.theta * image) - self.K @ near)
         return *self._within(found.vectors, image, after), space
 

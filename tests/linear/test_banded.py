@@ -69,7 +69,7 @@ def test_loops_say_the_same_uncompiled():
     pytest.importorskip("llvmlite")
     A, values = shuffled_band(30, 5, 3)
     band = band_of(A)
-    compiled, negative = band._eliminated(A.data)
+    compiled, negative, _ = band._eliminated(A.data)
     lower = band.lower(A.data)
     lower[-64 + 9 * np.arange(30 % 8, 8)] = 1.0
     plain = Factorising(band.tiles._record, lower, *np.zeros((2, 32)), np.empty(64 * 32))
