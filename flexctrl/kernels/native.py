@@ -92,7 +92,7 @@ class Packed:
         if not (isinstance(value, np.ndarray) and value.dtype == wanted and value.flags.c_contiguous):
             raise KernelError(f"record field {name!r} is no contiguous vector of {wanted}")
         self._kept.append(value)
-        return int(value.ctypes.data)
+        return int(value.__array_interface__["data"][0])  # quicker than value.ctypes
 
     def __getattr__(self, name: str) -> Any:
         if name not in self._places:

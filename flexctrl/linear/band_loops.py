@@ -42,8 +42,10 @@ class Factorising:
     tiles : Tiles
     lower : numpy.ndarray
         A, then L; ready for solving, with the inverses of its tiles on the diagonal.
+    turned : numpy.ndarray, shape (64 panels,)
+        Transposes of these inverses.
     pivots : numpy.ndarray, shape (8 panels,)
-        D.
+        D; ready for solving, D⁻¹.
     size : numpy.ndarray, shape (8 panels,)
         Diagonal of |L| |D| |L|ᵀ: how far rounding has grown, beside the diagonal of A (N. J. Higham, Accuracy and
         Stability of Numerical Algorithms, 2002, § 11.1).
@@ -53,6 +55,7 @@ class Factorising:
 
     tiles: Tiles
     lower: Reals
+    turned: Reals
     pivots: Reals
     size: Reals
     work: Reals
@@ -85,6 +88,8 @@ class LanczosRun:
         Of A.
     mass : numpy.ndarray
         Tiles of M, on the diagonal whole.
+    unit : numpy.ndarray, shape (64,)
+        A tile with ones on its diagonal.
     size : int
         Vectors there are.
     until : int
@@ -100,6 +105,7 @@ class LanczosRun:
 
     factor: Factorising
     mass: Reals
+    unit: Reals
     size: int
     until: int
     least: float
@@ -136,7 +142,12 @@ def factorise(f: Factorising) -> int:
 def ready(f: Factorising) -> int:
     """Make factors ready for solving."""
     for p in range(f.tiles.panels):
-        invert(f.lower[64 * f.tiles.first[p] :], f.work)
+        own = f.lower[64 * f.tiles.first[p] :]
+        invert(own, f.work)
+        for i in range(8):
+            for j in range(8):
+                f.turned[64 * p + 8 * i + j] = own[8 * j + i]
+        put(f.pivots[8 * p :], 1.0 / eight(f.pivots[8 * p :]))
     return 0
 
 
@@ -201,9 +212,8 @@ def substitute(f: Factorising, count: int, x: Reals) -> None:
         own = f.lower[64 * t.first[p] :]
         below = t.below[p]
         for here in range(8 * p, count * n, n):
-            put(x[here:], eight(x[here:]) / eight(f.pivots[8 * p :]))
-            gather(below, own[64:], x[here + 8 :], x[here:], -1.0)
-            turn_back(own, x[here:])
+            put(x[here:], eight(x[here:]) * eight(f.pivots[8 * p :]))
+            gather(below, own[64:], f.turned[64 * p :], x[here + 8 :], x[here:], -1.0)
 
 
 def turn(tile: Reals, x: Reals) -> None:
@@ -211,13 +221,6 @@ def turn(tile: Reals, x: Reals) -> None:
     left = eight(tile) * x[0] + eight(tile[8:]) * x[1] + eight(tile[16:]) * x[2] + eight(tile[24:]) * x[3]
     right = eight(tile[32:]) * x[4] + eight(tile[40:]) * x[5] + eight(tile[48:]) * x[6] + eight(tile[56:]) * x[7]
     put(x, left + right)
-
-
-def turn_back(tile: Reals, x: Reals) -> None:
-    """Put the product of a tile's transpose with x into x."""
-    before = eight(x)
-    for j in range(8):
-        x[j] = total(before * eight(tile[8 * j :]))
 
 
 def spread(count: int, tiles: Reals, x: Reals, y: Reals, sign: float) -> None:
@@ -237,8 +240,11 @@ def spread(count: int, tiles: Reals, x: Reals, y: Reals, sign: float) -> None:
         put(y[8 * q :], left + right)
 
 
-def gather(count: int, tiles: Reals, x: Reals, y: Reals, sign: float) -> None:
-    """Add the products of the transposes of tiles that stand one under the other with x to y, with a sign."""
+def gather(count: int, tiles: Reals, last: Reals, x: Reals, y: Reals, sign: float) -> None:
+    """Add the products of the transposes of tiles that stand one under the other with x to y, with a sign.
+
+    What comes of that is multiplied by a last tile.
+    """
     a = 0.0 * eight(y)
     b = a
     c = a
@@ -258,24 +264,21 @@ def gather(count: int, tiles: Reals, x: Reals, y: Reals, sign: float) -> None:
         f = f + z * eight(tile[40:])
         g = g + z * eight(tile[48:])
         h = h + z * eight(tile[56:])
-    y[0] += sign * total(a)
-    y[1] += sign * total(b)
-    y[2] += sign * total(c)
-    y[3] += sign * total(d)
-    y[4] += sign * total(e)
-    y[5] += sign * total(f)
-    y[6] += sign * total(g)
-    y[7] += sign * total(h)
+    left = (y[0] + sign * total(a)) * eight(last) + (y[1] + sign * total(b)) * eight(last[8:])
+    right = (y[2] + sign * total(c)) * eight(last[16:]) + (y[3] + sign * total(d)) * eight(last[24:])
+    left = left + (y[4] + sign * total(e)) * eight(last[32:]) + (y[5] + sign * total(f)) * eight(last[40:])
+    right = right + (y[6] + sign * total(g)) * eight(last[48:]) + (y[7] + sign * total(h)) * eight(last[56:])
+    put(y, left + right)
 
 
-def multiply(t: Tiles, lower: Reals, x: Reals, y: Reals) -> None:
-    """Put A x into y; tiles on the diagonal are whole."""
+def multiply(t: Tiles, lower: Reals, unit: Reals, x: Reals, y: Reals) -> None:
+    """Put A x into y; tiles on the diagonal are whole, and there is a unit tile."""
     for p in range(t.panels):
         put(y[8 * p :], 0.0 * eight(x))
     for p in range(t.panels):
         own = 64 * t.first[p]
         spread(t.below[p] + 1, lower[own:], x[8 * p :], y[8 * p :], 1.0)
-        gather(t.below[p], lower[own + 64 :], x[8 * p + 8 :], y[8 * p :], 1.0)
+        gather(t.below[p], lower[own + 64 :], unit, x[8 * p + 8 :], y[8 * p :], 1.0)
 
 
 def dot(n: int, a: Reals, b: Reals) -> float:
@@ -318,7 +321,7 @@ def lanczos(s: LanczosRun) -> int:
                 if i == last:
                     s.own[last] += share
         largest = max(largest, abs(s.own[last]))
-        multiply(t, s.mass, z, image)
+        multiply(t, s.mass, s.unit, z, image)
         length = math.sqrt(max(dot(n, z, image), 0.0))
         s.beside[last] = length
         if not length > s.least * largest:

@@ -143,7 +143,7 @@ class Band:
         """Lower band column by column, shape (n, width + 1)."""
         n = self.order.size
         storage = np.zeros(n * (self._width + 1))
-        storage[self._places] = data[self.chosen]
+        storage[self._places] = data.take(self.chosen)
         return storage.reshape(n, -1)
 
 
@@ -198,7 +198,7 @@ def band_of(A: sp.csc_matrix) -> Band | None:
     order = reverse_cuthill_mckee(sp.csr_matrix((A.data, A.indices, A.indptr), A.shape), symmetric_mode=True)
     back = np.empty_like(order)
     back[order] = np.arange(n)
-    rows, filled = back[A.indices], np.flatnonzero(np.diff(A.indptr))
+    rows, filled = back.take(A.indices), np.flatnonzero(np.diff(A.indptr))
     reach = np.arange(n)
     last = back[filled]
     reach[last] = np.maximum(last, np.maximum.reduceat(rows, A.indptr[filled])) if filled.size else last
@@ -206,7 +206,7 @@ def band_of(A: sp.csc_matrix) -> Band | None:
         return None
     columns = np.repeat(back, np.diff(A.indptr))
     chosen = np.flatnonzero(rows >= columns)
-    return _kind()(order, reach, chosen, rows[chosen], columns[chosen])
+    return _kind()(order, reach, chosen, rows.take(chosen), columns.take(chosen))
 
 
 def _width(reach: np.ndarray) -> int:

@@ -38,13 +38,13 @@ class CompiledBand(Band):
     def _tiled(self) -> np.ndarray:
         """Where the lower entries stand."""
         panel = self.columns >> 3
-        tile = self.tiles.first[panel] + (self.rows >> 3) - panel
+        tile = self.tiles.first.take(panel) + (self.rows >> 3) - panel
         return (tile << 6) + ((self.columns & 7) << 3) + (self.rows & 7)
 
     def lower(self, data: np.ndarray) -> np.ndarray:
         """Tiles of the lower triangle of the matrix with these entries in the order of the pattern."""
         tiles = np.zeros(self.room)
-        tiles[self._tiled] = data[self.chosen]
+        tiles[self._tiled] = data.take(self.chosen)
         return tiles
 
     def whole(self, data: np.ndarray) -> np.ndarray:
@@ -71,7 +71,9 @@ class CompiledBand(Band):
         diagonal = lower.reshape(-1, 64)[t.first, ::9].ravel()[:n]
         lower[self.room - 64 + 9 * np.arange(n % 8 or 8, 8)] = 1.0
         pivots, size = np.zeros((2, 8 * t.panels))
-        f = Packed(Factorising(t, lower, pivots, size, np.empty(64 * (int(t.below.max()) + 1))))
+        f = Packed(
+            Factorising(t, lower, np.empty(64 * t.panels), pivots, size, np.empty(64 * (int(t.below.max()) + 1)))
+        )
         return f, f.bound(factorise)(), diagonal
 
     def factorise(self, data: np.ndarray) -> Factor | None:
@@ -80,6 +82,7 @@ class CompiledBand(Band):
         n = self.order.size
         if negative or not np.isfinite(f.pivots).all():
             return None
+        pivots = f.pivots[:n].copy()
         f.bound(ready)()
 
         def solved(rhs: np.ndarray) -> np.ndarray:
@@ -90,7 +93,7 @@ class CompiledBand(Band):
         def space(mass: np.ndarray, start: np.ndarray, image: np.ndarray) -> Recurrence:
             return Recurrence(self, f, mass, start, image)
 
-        return Factor(f.pivots[:n], diagonal, self.order, solved, space)
+        return Factor(pivots, diagonal, self.order, solved, space)
 
     def negative(self, data: np.ndarray, near: Callable[[], np.ndarray], growth: float) -> int | None:
         """See `Band`. Counted by the pivots of an elimination without exchange, where rounding does not grow in it."""
@@ -147,6 +150,7 @@ class Recurrence:
             LanczosRun(
                 factor=self._factor,
                 mass=self._mass,
+                unit=np.eye(8).ravel(),
                 size=self._size,
                 until=until + 1,
                 least=NOTHING,

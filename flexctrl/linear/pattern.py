@@ -143,7 +143,7 @@ def _union(given: tuple[sp.csc_matrix, ...]) -> sp.csc_matrix:
 
 def _spread(A: sp.csc_matrix, pattern: sp.csc_matrix) -> sp.csc_matrix | None:
     """A with the entries of a wider pattern; None if it has others."""
-    if _same_pattern(A, pattern):
+    if A is pattern or _same_pattern(A, pattern):
         return A
     keys, wide = _keys(A), _keys(pattern)
     places = np.searchsorted(wide, keys)

@@ -72,7 +72,7 @@ def test_loops_say_the_same_uncompiled():
     compiled, negative, _ = band._eliminated(A.data)
     lower = band.lower(A.data)
     lower[-64 + 9 * np.arange(30 % 8, 8)] = 1.0
-    plain = Factorising(band.tiles._record, lower, *np.zeros((2, 32)), np.empty(64 * 32))
+    plain = Factorising(band.tiles._record, lower, np.empty(64 * 4), *np.zeros((2, 32)), np.empty(64 * 4))
     assert factorise(plain) == negative == np.count_nonzero(values < 0)
     np.testing.assert_allclose(plain.lower, compiled.lower, rtol=1e-8, atol=1e-8)
 
