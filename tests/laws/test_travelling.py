@@ -131,6 +131,15 @@ def test_pendulum_under_a_trolley_on_a_rigid_rail():
     assert np.allclose(np.sort(modes.omega[modes.rigid :]), expected, rtol=1e-9)
 
 
+def test_a_free_beam_with_a_free_trolley_has_seven_rigid_motions():
+    girder = fc.Beam("girder", (0, 0, 0), (1, 2, 3), SECTION, 3)
+    machine = fc.Structure([girder, fc.Trolley("trolley", girder, at=1.3, mass=5.0)])
+    linear = fc.linearize(fc.assemble(machine, LARGE, VM))
+    assert linear.modes().rigid == 7
+    named = [name for name in linear.certificate.rigid_modes if "translation" in name or "rotation" in name]
+    assert len(named) == 6
+
+
 def bead(at: float, supports: Sequence[str], drawn: Sequence[float]) -> tuple[fc.Model, fc.State]:
     """A bead on a rigid rod."""
     rod = fc.Beam("rod", (0, 0, 0), drawn, SECTION, 3)
