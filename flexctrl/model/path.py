@@ -248,7 +248,7 @@ def _begin(
     station = course.station(state, factor, Direction(np.zeros(len(balance.free)), float(rising)), 0)
     if isinstance(start, BranchPoint):
         away = across(course, station, start.mode[balance.free])
-        station = Station(state, factor, away, station.unstable, 0)
+        station = Station(state, factor, away, station.unstable, station.turned, 0)
     return course, station
 
 

@@ -17,7 +17,7 @@ from flexctrl.errors import SingularMatrixError
 from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import State
-from flexctrl.model.pivots import negative_pivots
+from flexctrl.model.pivots import negative_pivots, turned
 from flexctrl.model.solve import factorise
 
 __all__ = ["Course", "Direction", "Station"]
@@ -49,6 +49,8 @@ class Station:
         Of length one.
     unstable : int
         Negative pivots.
+    turned : int
+        What changes where the stiffness becomes singular.
     iterations : int
         Newton's, to get there.
     """
@@ -57,6 +59,7 @@ class Station:
     factor: float
     tangent: Direction
     unstable: int
+    turned: int
     iterations: int
 
 
@@ -136,8 +139,8 @@ class Course:
 
     def station(self, state: State, factor: float, along: Direction, iterations: int) -> Station:
         """Return an equilibrium with its tangent and stability."""
-        unstable = negative_pivots(self.stiffness(state, factor))
-        return Station(state, factor, self.tangent(state, factor, along), unstable, iterations)
+        K = self.stiffness(state, factor)
+        return Station(state, factor, self.tangent(state, factor, along), negative_pivots(K), turned(K), iterations)
 
     def step(self, start: Station, along: Direction, length: float, most: int = 12) -> Station | None:
         """Return the equilibrium at a distance along a direction, or none if the corrections do not shrink."""

@@ -98,7 +98,7 @@ class Walk:
         """Whether the path bends little between two stations, and stability changes there once at most."""
         if self.course.product(here.tangent, there.tangent) < _BEND:
             return False
-        changes = abs(there.unstable - here.unstable)
+        changes = abs(there.turned - here.turned)
         turns = here.tangent.factor * there.tangent.factor < 0.0
         return changes == 1 if turns else changes <= 1
 
@@ -135,6 +135,6 @@ class Walk:
         """The limit or branch point within a step, if there is one."""
         if here.tangent.factor * there.tangent.factor < 0.0:
             return [limit_between(self.course, here, length)], []
-        if here.unstable != there.unstable:
+        if here.turned != there.turned:
             return [], [branching_between(self.course, here, length)]
         return [], []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from flexctrl.linear.pencil import stiffness_noise
@@ -11,6 +12,9 @@ from flexctrl.linear.pencil import stiffness_noise
 ZERO_PIVOT = 1e-13
 """Pivots of a matrix scaled to a unit diagonal that count as zero."""
 
+
+SKEW = 1e-9
+"""A matrix is symmetric that differs from its transpose by a smaller share of its largest entry."""
 
 CLEAR_PIVOT = 1e-9
 """Positive pivots below it are looked at more closely: rounding may have made them."""
@@ -56,6 +60,38 @@ def negative_pivots(A: sp.spmatrix) -> int:
         values = np.linalg.eigvalsh((0.5 * (A + A.T)).toarray())
         return int((values < -1e-12 * np.abs(values).max()).sum())
     return int((found < -ZERO_PIVOT).sum())
+
+
+def turned(A: sp.spmatrix) -> int:
+    """Return a number that changes where a matrix that varies becomes singular.
+
+    Of a symmetric matrix it is the number of negative pivots. Of another, as of stiffness under loads that follow, the
+    quadratic form may turn negative in some direction and the matrix stay regular: there it is 1 if det A < 0, else 0.
+
+    Parameters
+    ----------
+    A : scipy.sparse matrix, shape (n, n)
+
+    Returns
+    -------
+    int
+    """
+    A = sp.csc_matrix(A)
+    if not A.nnz or abs(A - A.T).max() <= SKEW * np.abs(A.data).max():
+        return negative_pivots(A)
+    try:
+        lu = splu(A)
+    except RuntimeError:
+        return 0
+    exchanges = _exchanges(lu.perm_r) + _exchanges(lu.perm_c)
+    return (exchanges + int(np.count_nonzero(lu.U.diagonal() < 0.0))) % 2
+
+
+def _exchanges(order: np.ndarray) -> int:
+    """How many exchanges of two make a permutation, but for an even number."""
+    n = order.size
+    cycles = connected_components(sp.csr_matrix((np.ones(n), (np.arange(n), order)), (n, n)), directed=False)[0]
+    return n - int(cycles)
 
 
 def holds(A: sp.spmatrix) -> bool:

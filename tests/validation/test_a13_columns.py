@@ -67,15 +67,24 @@ def test_elastica(record, angle):
     )
 
 
-def beck(load: float) -> np.ndarray:
-    """The two lowest poles of Beck's column."""
+@cache
+def follower(*steady: str) -> fc.Model:
+    """Beck's column; with steady thrusts beside the one that follows."""
     beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), fc.Section(1e6, 1.0, 1.0, 1.0, 1.0, 1e-6), elements=20)
     structure = fc.Structure(
         [beam],
         [fc.Support(beam.start), *out_of_plane(beam.nodes[1:])],
-        inputs=[fc.FollowerForce("thrust", beam.end, "-x")],
+        inputs=[
+            fc.FollowerForce("thrust", beam.end, "-x"),
+            *(fc.Force(name, beam.end, "-x") for name in [other] if name),
+        ],
     )
-    model = fc.assemble(structure, NONLINEAR)
+    return fc.assemble(structure, NONLINEAR)
+
+
+def beck(load: float) -> np.ndarray:
+    """The two lowest poles of Beck's column."""
+    model = follower()
     linear = fc.linearize(model, fc.equilibrium(model, inputs={"thrust": load}))
     assert linear.certificate is not None
     assert linear.certificate.loads == ("thrust",)
@@ -94,6 +103,22 @@ def test_frequencies_of_becks_column(record, load, expected):
         source="closed form",
         tolerance=1e-3,
     )
+
+
+def test_becks_column_has_no_branch_point():
+    path = fc.equilibrium_path(follower(), load={"thrust": 19.0}, until=1.0)
+    assert not path.branchings
+    assert not path.limits
+
+
+def test_a_thrust_that_follows_in_part_buckles_where_its_determinant_vanishes():
+    """A share η ≤ ½ of the thrust follows: 1 − η + η cos kL … = 0 has roots P = (k L)² EI/L² (Leipholz)."""
+    share = 0.4
+    root = brentq(lambda k: share + (1.0 - share) * np.cos(k), 1.6, np.pi - 1e-9) ** 2
+    path = fc.equilibrium_path(
+        follower("steady"), load={"thrust": share * root, "steady": (1.0 - share) * root}, until=1.1
+    )
+    assert [p.factor for p in path.branchings] == pytest.approx([1.0], abs=1e-3)
 
 
 @pytest.mark.slow
