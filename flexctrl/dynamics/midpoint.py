@@ -78,7 +78,7 @@ class ConservingMidpoint:
         return Fixed(self.step)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
-        if model.motion.inner.size:
+        if model.motion.flows.size or model.switches.names:
             raise StructureError(
                 "ConservingMidpoint: has no rule for dry friction and motor lag; use AdaptiveAlpha, or leave them out"
             )

@@ -162,3 +162,28 @@ def test_what_cannot_be_is_refused():
         fc.ComponentModes(2.5)
     with pytest.raises(StructureError, match="did you mean 'b'"):
         fc.coarsen(beam(2), of=["bb"])
+
+
+METHODS = {
+    "AdaptiveAlpha": (fc.AdaptiveAlpha(), fc.Tolerance(1e-6, 1e-8)),
+    "GeneralizedAlpha": (fc.GeneralizedAlpha(5e-4), None),
+    "ConservingMidpoint": (fc.ConservingMidpoint(5e-4), None),
+    "Richardson of alpha": (fc.Richardson(fc.GeneralizedAlpha(1e-3, rho=1.0)), None),
+    "Richardson of midpoint": (fc.Richardson(fc.ConservingMidpoint(1e-3)), None),
+}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_of_integration_takes_modes(name):
+    """A soft pendulum of one element with two modes, let go from the horizontal, against the explicit method."""
+    section = fc.Section(EA=1e4, EI_y=2.0, EI_z=2.0, GJ=2.0, rhoA=1.0, rhoJ=1e-3)
+    rod = fc.Beam("rod", (0, 0, 0), (1, 0, 0), section)
+    outputs = [fc.Position(axis, rod.end, axis) for axis in "xz"]
+    structure = fc.planar(fc.Structure([rod], [fc.Support(rod.start, "u v w")], outputs=outputs), "y")
+    machine = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.Flexible(), fc.ComponentModes(2)])
+    exact = fc.simulate(machine, until=0.5, method=fc.ExplicitRungeKutta(), tolerance=fc.Tolerance(1e-9, 1e-9))
+    method, tolerance = METHODS[name]
+    run = fc.simulate(machine, until=0.5, method=method, tolerance=tolerance)
+    assert run.status is fc.Status.FINISHED
+    assert run.y[-1] == pytest.approx(exact.y[-1], abs=3e-4)
+    assert run.report.energy_residual < 1e-3

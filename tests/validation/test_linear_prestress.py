@@ -479,3 +479,35 @@ def test_lateral_buckling(record):
         source="closed form, zero of J₋₁⸝₄ (Prandtl 1899)",
         tolerance=2e-3,
     )
+
+
+def test_lateral_buckling_under_a_uniform_moment(record):
+    """A8: a strip on edge between forks, bent by a couple at each end.
+
+    A couple of fixed direction has no potential. Here it is a pair of forces along the strip on the ends of an upright
+    lever that the fork keeps from leaning, a quasi-tangential couple: K is symmetric.
+    """
+    section = fc.Section(EA=1e9, EI_y=1e4, EI_z=1.0, GJ=0.5, rhoA=1.0, rhoJ=1e-3)
+    beam = fc.Beam("strip", (0, 0, 0), (1, 0, 0), section, elements=24)
+    arms = [
+        fc.RigidBody(f"arm{x}", (x, 0, 0), 1.0, (1.0, 1.0, 1.0), points={"top": (x, 0, 0.1), "foot": (x, 0, -0.1)})
+        for x in (0, 1)
+    ]
+    forces = [fc.Force(f"{end}{x}", arm.point(end), "x") for x, arm in enumerate(arms) for end in ("top", "foot")]
+    joints = [fc.Weld(beam.start, arms[0].node), fc.Weld(beam.end, arms[1].node)]
+    joints += [fc.Support(beam.start, "u v w rx"), fc.Support(beam.end, "v w rx")]
+    model = assembled(fc.Structure([beam, *arms], joints, inputs=forces), MOVING)
+    unit = math.pi * math.sqrt(0.5)
+
+    def stiffness(share: float) -> float:
+        force = share * unit / 0.2
+        pulls = {"top0": force, "foot0": -force, "top1": -force, "foot1": force}
+        return softest(fc.linearize(model, fc.equilibrium(model, inputs=pulls)))
+
+    record(
+        "strip between forks under end couples: M L/(π √(EI GJ)) where K is singular, 24 elements",
+        ours=brentq(stiffness, 0.97, 1.03, xtol=1e-6),
+        reference=1.0,
+        source="closed form (Timoshenko & Gere 1961)",
+        tolerance=2e-3,
+    )
