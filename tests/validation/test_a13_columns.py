@@ -76,7 +76,7 @@ def follower(*steady: str) -> fc.Model:
         [fc.Support(beam.start), *out_of_plane(beam.nodes[1:])],
         inputs=[
             fc.FollowerForce("thrust", beam.end, "-x"),
-            *(fc.Force(name, beam.end, "-x") for name in [other] if name),
+            *(fc.Force(name, beam.end, "-x") for name in steady),
         ],
     )
     return fc.assemble(structure, NONLINEAR)
