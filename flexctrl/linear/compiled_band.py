@@ -164,7 +164,7 @@ class Recurrence:
         ended = bool(run.bound(lanczos)())
         known = run.size if ended else run.size - 1
         self._size = run.size
-        return Grown(known, self._coefficients[1:, known - 1 : known], ended)
+        return Grown(known, self._coefficients[1:, known - 1 : known], ended or known == self._band.order.size)
 
 
 def _lengthened(a: np.ndarray, rows: int) -> np.ndarray:
