@@ -96,6 +96,7 @@ _HOMES = {
     "flexctrl.dynamics.checkpoint": ("Autosave", "Checkpoint", "load_checkpoint"),
     "flexctrl.dynamics.run": ("EnergyBalance", "Moment", "Report", "Run", "Status", "Tolerance"),
     "flexctrl.dynamics.simulate": ("simulate",),
+    "flexctrl.dynamics.rail_force": ("rail_force",),
     "flexctrl.dynamics.sampled": ("sampled_response",),
     "flexctrl.design": ("Delayed", "Noisy", "OpenLoop", "Quantised", "RateLimited", "Sampled", "Saturated", "Tracking"),
     "flexctrl.study.loop": ("Loop", "open_loop"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.linalg import spsolve
 
 import flexctrl as fc
 
@@ -64,17 +63,10 @@ class Crossing:
         v[model.coordinate("trolley_slide")] = self.speed
         method = fc.GeneralizedAlpha(1.0 / self.speed / steps, rho)
         start, until = model.rest.with_(v=v), share / self.speed
-        return model, fc.simulate(model, until=until, start=start, inputs={"load": LOAD}, method=method)
-
-    def contact(self, model: fc.Model, state: fc.State) -> float:
-        """Force between trolley and beam over the weight."""
-        still, u, node = np.zeros(model.n), np.array([LOAD]), model.structure.nodes.index(self._node(model))
-        M = -model.slope(state, state.v, still, (0.0, 0.0, 1.0), u)
-        a = spsolve(M.tocsc(), model.balance(state, state.v, still) + model.loads(state, u))
-        return 1.0 + self.mass * float(model.motion.accelerations(state, state.v, a)[6 * node + 2]) / LOAD
+        how = {"inputs": {"load": LOAD}, "method": method, "tolerance": fc.Tolerance(1e-7, 1e-9)}
+        return model, fc.simulate(model, until=until, start=start, **how)
 
     @staticmethod
-    def _node(model: fc.Model) -> fc.Node:
-        trolley = model.structure.part("trolley")
-        assert isinstance(trolley, fc.Trolley)
-        return trolley.node
+    def contact(model: fc.Model, state: fc.State) -> float:
+        """Force of the trolley on the beam over the weight."""
+        return float(-fc.rail_force(model, state, "trolley", {"load": LOAD})[2]) / LOAD

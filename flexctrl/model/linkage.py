@@ -131,6 +131,11 @@ class Linkage(OpenLinkage):
         return _callable("stiffening", [self._pose, self._force], ca.vec(ca.densify(slope)))
 
     @cached_property
+    def on_rails(self) -> Callable[..., np.ndarray]:
+        """(pose, raw forces) → forces of trolleys on their rails, 3 each."""
+        return _callable("on_rails", [self._pose, self._force], self._on_rails(self._pose, self._force))
+
+    @cached_property
     def driven(self) -> Callable[..., np.ndarray]:
         """Pose → driven coordinates of all drives; angles between −π and π."""
         return _callable("driven", *self._driving)
@@ -246,11 +251,8 @@ class Linkage(OpenLinkage):
     @cached_property
     def _raw(self) -> ca.SX:
         """Raw rates of all nodes and of the source angles behind rigid shafts."""
-        import casadi as ca
 
-        motion = self._open_rates(self._pose, self._all(self._pose, self._rate))
-        drives = [self._drive_motion(link, self._pose, motion) for link in self.links if link.rigid]
-        return ca.vertcat(*[ca.vertcat(v, w) for v, w in motion], *[m.p["ratio"] * m.driven_rate for m in drives])
+        return self._open_raw(self._pose, self._open_rates(self._pose, self._all(self._pose, self._rate)))
 
     def _all(self, pose: ca.SX, rate: ca.SX) -> ca.SX:
         """Return all freedoms' rates: the dependent ones keep the loops closed."""

@@ -207,7 +207,7 @@ class Motion:
     @cached_property
     def tracks(self) -> tuple[Track, ...]:
         """What travels along rails, in the numbers of the linkage's nodes."""
-        return tuple(f for f in self.linkage.follows if isinstance(f, Track))
+        return self.linkage.tracks
 
     @cached_property
     def gauges(self) -> np.ndarray:

@@ -89,15 +89,47 @@ class OpenLinkage:
         G = ca.jacobian(ca.vertcat(*opening), every)
         return G[:, : self.free], G[:, self.free :]
 
-    def _open_rates(self, pose: ca.SX, every: ca.SX) -> list[tuple[ca.SX, ca.SX]]:
-        """Return velocities and spins of all nodes, loops left open."""
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """What travels along rails."""
+        return tuple(f for f in self.follows if isinstance(f, Track))
+
+    def _open_rates(self, pose: ca.SX, every: ca.SX, off: ca.SX | None = None) -> list[tuple[ca.SX, ca.SX]]:
+        """Return velocities and spins of all nodes, loops left open; ``off`` are those of trolleys off their rails."""
         base = [self._base(i, every) for i in range(self.count)]
         motion = [(b[:3], b[3:]) for b in base]
         for node, axes in self.lines:
             motion[node] = (motion[node][0], attitude(pose[:, node]) @ axes @ motion[node][1])
         for follow in self.follows:
             motion[follow.node] = self._followed(follow, motion, pose, every)
+            if off is not None and isinstance(follow, Track):
+                v, w = motion[follow.node]
+                motion[follow.node] = (v + off[:, self.tracks.index(follow)], w)
         return motion
+
+    def _open_raw(self, pose: ca.SX, motion: Sequence[tuple[ca.SX, ca.SX]]) -> ca.SX:
+        """Return raw rates of all nodes and of the source angles behind rigid shafts."""
+        import casadi as ca
+
+        drives = [self._drive_motion(link, pose, motion) for link in self.links if link.rigid]
+        return ca.vertcat(*[ca.vertcat(v, w) for v, w in motion], *[m.p["ratio"] * m.driven_rate for m in drives])
+
+    def _on_rails(self, pose: ca.SX, force: ca.SX) -> ca.SX:
+        """Return what raw forces, inertia among them, push trolleys off their rails with, shape (3 tracks).
+
+        The work of all on a motion off the rails; what closes loops works on it too, as much as it takes for the
+        dependent freedoms to be in balance.
+        """
+        import casadi as ca
+
+        every, off = ca.SX.sym("every", self.free + len(self.loops)), ca.SX.sym("off", 3, len(self.tracks))
+        both, own = ca.vertcat(every, ca.vec(off)), every.numel()
+        motion = self._open_rates(pose, every, off)
+        work = ca.jtimes(self._open_raw(pose, motion), both, force, True)
+        if not self.loops:
+            return work[own:]
+        G = ca.jacobian(ca.vertcat(*[_opening(loop, pose, motion) for loop in self.loops]), both)
+        return work[own:] - G[:, own:].T @ ca.solve(G[:, self.free : own].T, work[self.free : own])
 
     def _base(self, node: int, every: ca.SX) -> ca.SX:
         """Return the six values that a node's freedoms have by themselves."""

@@ -227,6 +227,33 @@ def test_any_orientation_and_both_loops_give_the_same_run():
     assert np.allclose(_swung(SKEW), plain, atol=1e-8)
 
 
+def test_wheels_share_what_a_body_weighs_and_its_moment():
+    """12 N on 6 kg: 2 m/s²; the body's 4 kg hang 0.3 m below the wheels, 0.6 m before and behind its centre."""
+    model = fc.assemble(carriage(), (*LARGE, fc.Gravity()), VM)
+    loads = {name: fc.rail_force(model, model.rest, name, {"push": 12.0}) for name in ("front", "back")}
+    more = 4.0 * 2.0 * 0.3 / 1.2
+    assert np.allclose(loads["front"][[1, 2]], (0.0, -3.0 * G - more), atol=1e-9)
+    assert np.allclose(loads["back"][[1, 2]], (0.0, -3.0 * G + more), atol=1e-9)
+    assert loads["front"][0] + loads["back"][0] == pytest.approx(-12.0)
+    with pytest.raises(fc.errors.StructureError, match=r"no trolley 'fornt'.*front"):
+        fc.rail_force(model, model.rest, "fornt")
+
+
+def test_wheel_load_of_a_swinging_load():
+    """A load that passes its lowest place at 2 m/s on a rope of 1 m pulls with m (g + v²/l); the trolley is held."""
+    girder = fc.Beam("girder", (0, 0, 0), (LENGTH, 0, 0), SECTION, 4)
+    trolley = fc.Trolley("trolley", girder, at=1.3, mass=5.0)
+    load, rope = fc.PointMass("load", (1.3, 0, -1), 3.0), fc.Rope("rope", trolley.node, (1.3, 0, -1), EA=1.0)
+    pins = [fc.Pin(rope.start, trolley.node), fc.Pin(rope.end, load.node)]
+    held = [fc.Support(girder.start), fc.Support(trolley.travel, "u")]
+    model = fc.assemble(fc.Structure([girder, trolley, load, rope], [*held, *pins]), (LARGE[0], fc.Gravity()), VM)
+    rates = [-2.0 if name.endswith("ry") else 0.0 for name in model.coordinates]
+    state = model.rest.with_(v=np.array(rates))
+    assert abs(model.rates(state)[6 * model.structure.number(load.node)]) == pytest.approx(2.0)
+    push = fc.rail_force(model, state, trolley)
+    assert np.allclose(push, (0.0, 0.0, -5.0 * G - 3.0 * (G + 4.0)), atol=1e-9)
+
+
 @pytest.mark.slow
 def test_a_run_ends_with_the_rail():
     model = fc.assemble(crane(), LARGE)
@@ -244,14 +271,13 @@ def test_a_bead_that_leaves_its_rod_is_stopped():
     assert run.final.t == pytest.approx(np.sqrt(2.0 * 3.5 / (0.8 * G)), rel=1e-6)
 
 
-@pytest.mark.slow
-def test_two_trolleys_carry_one_body():
-    """A rigid carriage on two of them: s₂ − s₁ follows; half the weight on each, the girder straight."""
+def carriage() -> fc.Structure:
+    """A rigid body on two trolleys, on a girder that is held everywhere."""
     girder = fc.Beam("girder", (0, 0, 0), (LENGTH, 0, 0), SECTION, 4)
     front, back = (fc.Trolley(name, girder, at=at, mass=1.0) for name, at in (("front", 2.6), ("back", 1.4)))
     eyes = {"front": front.node.position, "back": back.node.position}
     body = fc.RigidBody("body", (2.0, 0, -0.3), 4.0, (0.1, 0.5, 0.5), points=eyes)
-    machine = fc.Structure(
+    return fc.Structure(
         [girder, front, back, body],
         [
             *(fc.Support(girder.node(i)) for i in range(5)),
@@ -261,7 +287,12 @@ def test_two_trolleys_carry_one_body():
         inputs=[fc.Force("push", front.travel, "x")],
         outputs=[fc.Position("front", front.travel, "x"), fc.Position("back", back.travel, "x")],
     )
-    model = fc.assemble(machine, LARGE, VM)
+
+
+@pytest.mark.slow
+def test_two_trolleys_carry_one_body():
+    """s₂ − s₁ follows."""
+    model = fc.assemble(carriage(), LARGE, VM)
     run = fc.simulate(model, until=0.5, inputs={"push": 12.0}, method=fc.GeneralizedAlpha(0.01))
     assert run["front"][-1] == pytest.approx(2.6 + 0.5 * 2.0 * 0.25, rel=1e-9)
     assert run["back"][-1] == pytest.approx(run["front"][-1] - 1.2, abs=1e-9)
