@@ -23,7 +23,16 @@ _NEAR = 1e-10
 
 
 class CommandError(ControllerError):
-    """A controller commands what is no finite number."""
+    """A controller commands what is no finite number, or raises an exception: that is its cause."""
+
+
+def _blamed(error: Exception) -> ControllerError:
+    """Return what a run says of an exception in a controller."""
+    if isinstance(error, ControllerError):
+        return error
+    blamed = CommandError(f"the controller raised {type(error).__name__}: {error}")
+    blamed.__cause__ = error
+    return blamed
 
 
 @dataclass(frozen=True)
@@ -133,8 +142,11 @@ class Feed:
         assert c is not None
         if self._asked is not None and (said := self._said(self._asked, t, x, y)) is not None:
             return said
-        u = self._total(c.command(t, x, y))
-        return u, np.asarray(c.update(t, x, y), dtype=float) if x.size else x
+        try:
+            u = self._total(c.command(t, x, y))
+            return u, np.asarray(c.update(t, x, y), dtype=float) if x.size else x
+        except Exception as error:
+            raise _blamed(error)  # noqa: B904 - its cause is set
 
     def restart(self, state: State, supply: Supply) -> Supply:
         """Return the inputs after a break of a continuous command."""
@@ -144,8 +156,11 @@ class Feed:
         """Return the inputs that a continuous controller in state x gives."""
         assert self.controller is not None
         y = self.measured(state)
-        rate = np.asarray(self.controller.rate(state.t, x, y), dtype=float) if x.size else x
-        return Supply(np.array(self._total(self.controller.command(state.t, x, y))), x, rate)
+        try:
+            rate = np.asarray(self.controller.rate(state.t, x, y), dtype=float) if x.size else x
+            return Supply(np.array(self._total(self.controller.command(state.t, x, y))), x, rate)
+        except Exception as error:
+            raise _blamed(error)  # noqa: B904 - its cause is set
 
     def between(self, before: Supply, after: Supply, share: tuple[float, float], state: State) -> Supply:
         """Return the inputs within a step: ``share`` of it done, and its length; the state there."""
@@ -189,10 +204,13 @@ class Feed:
     def _answer(self, t: float, y: np.ndarray, before: Supply, h: float) -> Supply:
         c = self.controller
         assert c is not None
-        if not before.x.size:
-            return Supply(np.array(self._total(c.command(t, before.x, y))), before.x, before.x)
-        x = _trapezoidal(c, t, y, before, h)
-        return Supply(np.array(self._total(c.command(t, x, y))), x, np.asarray(c.rate(t, x, y), dtype=float))
+        try:
+            if not before.x.size:
+                return Supply(np.array(self._total(c.command(t, before.x, y))), before.x, before.x)
+            x = _trapezoidal(c, t, y, before, h)
+            return Supply(np.array(self._total(c.command(t, x, y))), x, np.asarray(c.rate(t, x, y), dtype=float))
+        except Exception as error:
+            raise _blamed(error)  # noqa: B904 - its cause is set
 
     def slope(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return ∂(generalised forces of the inputs)/∂(own motion) through a continuous controller."""

@@ -24,9 +24,9 @@ from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Mar
 from flexctrl.dynamics.stops import Stops
 from flexctrl.model.model import Model
 
-__all__ = ["Journey", "Plan"]
+__all__ = ["SMALLEST", "Journey", "Plan"]
 
-_SMALLEST = 1e-12
+SMALLEST = 1e-12
 _BLOCK = 1000
 _BLOCK_BYTES = 16e6
 _NEAR = 1e-9
@@ -98,6 +98,7 @@ class Journey:
     events: list[Occurrence] = field(default_factory=list)
     status: Status = Status.FINISHED
     message: str = ""
+    fault: BaseException | None = None
     saved: Checkpoint | None = None
     _memory: Any = None
     _told: float = 0.0
@@ -117,6 +118,7 @@ class Journey:
             self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
         except CommandError as error:
             self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
+            self.fault = error.__cause__
         self.books.close(self.point)
 
     @property
@@ -242,14 +244,14 @@ class Journey:
             after = self.stepper.step(self.point, h)
         except StepError:
             self.mark.rejected += 1
-            if h < 2e-3 * self.mark.size or h < _SMALLEST:
+            if h < 2e-3 * self.mark.size or h < SMALLEST:
                 raise
             return self._halved(h, stop)
         try:
             self._accept(after, stop)
         except _Missed:
             self.mark.rejected += 1
-            if h < 2e-3 * self.mark.size or h < _SMALLEST:
+            if h < 2e-3 * self.mark.size or h < SMALLEST:
                 raise
             self._halved(h, stop)
 
@@ -257,7 +259,7 @@ class Journey:
         """Take a step in two; what ends the first short of its half is made up by the second."""
         end = self.point.state.t + h
         self._take(0.5 * h, stop)
-        if self.status is Status.FINISHED and (left := end - self.point.state.t) > _SMALLEST * h:
+        if self.status is Status.FINISHED and (left := end - self.point.state.t) > SMALLEST * h:
             self._take(left, stop)
 
     # -- steps of controlled length
@@ -273,7 +275,7 @@ class Journey:
             h = until - t
         why = ""
         while True:
-            if h < _SMALLEST * max(1.0, t):
+            if h < SMALLEST * max(1.0, t):
                 raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
             try:
                 after = self.stepper.step(self.point, h)
@@ -382,7 +384,7 @@ class Journey:
         lead = _LEAD * h if corner else 0.0
         at = crossing.t - lead
         for _ in range(_LANDINGS):
-            if at - t <= _SMALLEST * h:
+            if at - t <= SMALLEST * h:
                 return before, replace(crossing, t=t)
             try:
                 after = self._towards(before, at - t) if corner else self.stepper.step(before, at - t)

@@ -210,6 +210,8 @@ class Run:
         Where to go on from: the last instant at which nothing was yet cut to fit the end of the run.
     track : Track
         The steps, as far as they are kept; see `at`.
+    fault : BaseException or None
+        What the controller raised, where that ended the run; ``raise run.fault`` shows its lines.
     """
 
     t: np.ndarray
@@ -225,6 +227,7 @@ class Run:
     events: tuple[Occurrence, ...] = field(repr=False)
     checkpoint: Checkpoint = field(repr=False)
     track: Track = field(repr=False)
+    fault: BaseException | None = field(default=None, repr=False)
 
     def __getitem__(self, signal: str) -> np.ndarray:
         if signal in self.outputs:

@@ -16,7 +16,7 @@ from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track, curves_of
 from flexctrl.dynamics.events import Event, Watch
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.journey import Journey, Plan
+from flexctrl.dynamics.journey import SMALLEST, Journey, Plan
 from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.record import InMemory, Record
 from flexctrl.dynamics.rows import Rows
@@ -83,8 +83,8 @@ def simulate(
     Returns
     -------
     Run
-        Whatever happens: a step that fails and Ctrl-C end the run with their status, and all that
-        was computed until then.
+        Whatever happens: a step that fails, an exception in the controller and Ctrl-C end the run with their status,
+        and all that was computed until then.
 
     Raises
     ------
@@ -98,6 +98,8 @@ def simulate(
     """
     if not (math.isfinite(until) and until > 0.0):
         raise StructureError(f"simulate: until = {until}; expected seconds > 0")
+    if until < SMALLEST:
+        raise StructureError(f"simulate: until = {until} s; no step is shorter than {SMALLEST:g} s: give a longer time")
     if every is not None and not every > 0.0:
         raise StructureError(f"simulate: every = {every}; expected seconds > 0")
     record = record or InMemory()
@@ -245,6 +247,7 @@ def _result(journey: Journey) -> Run:
         tuple(journey.events),
         checkpoint,
         journey.track,
+        journey.fault,
     )
 
 

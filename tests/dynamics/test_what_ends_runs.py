@@ -1,0 +1,74 @@
+"""What ends a run early keeps what was computed, and says why."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.errors import ControllerError, StructureError
+
+
+def swing() -> fc.Model:
+    spring, mass = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=100.0), fc.PointMass("mass", (1, 0, 0), 1.0)
+    structure = fc.Structure(
+        [spring, mass],
+        [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")],
+        inputs=[fc.Force("push", mass.node, "x")],
+        outputs=[fc.Position("x", mass.node, "x")],
+    )
+    return fc.assemble(structure, [fc.LargeRotation()])
+
+
+class Faulty:
+    """A controller with a bug that shows after a while."""
+
+    inputs, outputs = ("x",), ("push",)
+
+    def __init__(self, sample_time: float, after: float, states: int = 0) -> None:
+        self.sample_time, self.after, self.states = sample_time, after, states
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(self.states)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([{}["gain"] if not self.states and t >= self.after else 0.0])
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return x * (1 // int(t < self.after))
+
+    update = rate
+
+
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(1e-2), fc.ConservingMidpoint(1e-2)], ids=str)
+@pytest.mark.parametrize("sample_time", [0.0, 0.1])
+@pytest.mark.parametrize("states", [0, 1])
+def test_a_controller_that_raises_ends_the_run_and_nothing_is_lost(method, sample_time, states):
+    model = swing()
+    start = model.displace([0.3])
+    run = fc.simulate(model, Faulty(sample_time, 0.45, states), until=1.0, start=start, method=method, every=0.01)
+    assert run.status is fc.Status.FAILED
+    raised = "ZeroDivisionError" if states else "KeyError: 'gain'"
+    assert f"the controller raised {raised}" in run.report.message
+    assert "t = 0." in run.report.message
+    assert isinstance(run.fault, ZeroDivisionError if states else KeyError)
+    assert run.fault.__traceback__ is not None
+    assert 0.35 < run.t[-1] <= 0.5
+    assert run["x"] == pytest.approx(1.0 + 0.3 * np.cos(10.0 * run.t), abs=5e-3)
+
+
+def test_a_run_that_finishes_has_no_fault():
+    assert fc.simulate(swing(), until=0.1).fault is None
+
+
+def test_a_controller_that_raises_at_once_is_told_with_its_cause():
+    with pytest.raises(ControllerError, match="raised KeyError") as told:
+        fc.simulate(swing(), Faulty(0.1, 0.0), until=1.0)
+    assert isinstance(told.value.__cause__, KeyError)
+
+
+@pytest.mark.parametrize("until", [1e-300, 5e-324, 1e-13])
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(1e-3), fc.ExplicitRungeKutta()], ids=str)
+def test_an_end_before_the_shortest_step_is_refused(until, method):
+    with pytest.raises(StructureError, match="no step is shorter than 1e-12"):
+        fc.simulate(swing(), until=until, method=method)
