@@ -62,11 +62,13 @@ class Coefficients:
 class AlphaPoint(Point):
     """A point of the method: its own accelerations beside the true ones, and how these grow.
 
-    ``trend`` is the change of the true accelerations over the last step, zero where it predicts worse than none.
+    ``trend`` is the change of the true accelerations over the last step, ``lean`` the share of the one before that
+    best foretold it: the next one is expected to be that share of it.
     """
 
     algorithmic: np.ndarray
     trend: np.ndarray
+    lean: float = 1.0
 
 
 class Tangent(NamedTuple):
@@ -171,7 +173,7 @@ class Stepper:
         c, now = self.coefficients, point.state
         to_v = c.gamma / (h * c.beta)
         to_rate = (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
-        rate = point.rate + point.trend
+        rate = point.rate + point.lean * point.trend
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
         step = h * now.v + h * h * ((0.5 - c.beta) * point.algorithmic + c.beta * algorithmic)
         v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
@@ -208,9 +210,9 @@ class Stepper:
                 worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part of it bend"
             )
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
-        return AlphaPoint(
-            state, rate, self.feed.at(state, point.supply, h), algorithmic, _trend(point, rate, self.weight)
-        )
+        change = rate - point.rate
+        lean = _lean(change * self.weight, point.trend * self.weight)
+        return AlphaPoint(state, rate, self.feed.at(state, point.supply, h), algorithmic, change, lean)
 
     def _astray(self, unforeseen: np.ndarray) -> bool:
         """Tell whether Newton's method heads for a turn that the motion did not announce: another root."""
@@ -253,12 +255,10 @@ class Stepper:
         return float(local.max(initial=0.0)) / allowed
 
 
-def _trend(before: AlphaPoint, rate: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the change of the accelerations, if going on with the last change was the better guess."""
-    change = rate - before.rate
-    still, onward = (float(np.abs(a) @ weight) for a in (change, change - before.trend))
-    guessed_well = onward < still if before.trend.any() else still > 0.0
-    return change if guessed_well else np.zeros_like(change)
+def _lean(change: np.ndarray, before: np.ndarray) -> float:
+    """Return the share of the change before that is nearest to a change, within ±1."""
+    square = float(before @ before)
+    return min(1.0, max(-1.0, float(change @ before) / square)) if square > 0.0 else 1.0
 
 
 def _quickest(plain: Stepper) -> Any:

@@ -188,7 +188,7 @@ def test_the_march_runs_uncompiled():
     record = slow.march._record
     assert compiled.entered(point).fixed(1e-4, 6) == DONE
     slow.entered(point)
-    record.t, record.h, record.wanted, record.trending = 0.0, 1e-4, 6, 0
+    record.t, record.h, record.wanted, record.lean = 0.0, 1e-4, 6, point.lean
     for record.task in (SETTLE, FIXED):
         assert tasks(record) == DONE
     m = compiled.march

@@ -217,13 +217,12 @@ def growth(error: float) -> float:
 
 
 def judge(m: March) -> None:
-    """Work out the method's own acceleration at the end of the step, and with it the error."""
+    """Work out the error: by how much the method's own acceleration changes."""
     f = m.flat
     local = 0.0 * eight(m.weight)
     for i in range(0, f.padded, 8):
         own = eight(m.algorithmic[i:])
         lead = blended(m, eight(f.rate[i:]), eight(m.rate[i:]), own)
-        put(m.lead[i:], lead)
         local = larger(local, abs(lead - own) * eight(m.weight[i:]))
     m.error = abs(m.beta - 1.0 / 6.0) * m.h * m.h * largest(local)
 
@@ -236,24 +235,30 @@ def accept(m: March) -> None:
     one = zero + 1.0
     still = zero
     onward = zero
+    shared = zero
+    square = zero
     far = zero
     for i in range(0, f.padded, 8):
         rate = eight(f.rate[i:])
         change = rate - eight(m.rate[i:])
         still = still + abs(change) * eight(m.weight[i:])
-        onward = onward + abs(change - eight(m.trend[i:])) * eight(m.weight[i:])
+        before = eight(m.trend[i:])
+        onward = onward + abs(change - before) * eight(m.weight[i:])
+        told = eight(m.weight[i:]) * before
+        shared = shared + told * eight(m.weight[i:]) * change
+        square = square + told * told
         reach = larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:])))
         way = reach * eight(m.weight[i:])
         radian = way + one - larger(way, one)
         far = larger(far, way + eight(m.turns[i:]) * (radian - way))
         put(m.reach[i:], reach)
         put(m.trend[i:], change)
+        put(m.algorithmic[i:], blended(m, rate, eight(m.rate[i:]), eight(m.algorithmic[i:])))
         put(m.rate[i:], rate)
-        put(m.algorithmic[i:], eight(m.lead[i:]))
         put(m.v[i:], eight(f.v[i:]))
     m.reached = max(m.reached, largest(far))
     tighten(m, total(still), total(onward))
-    trend(m, total(still), total(onward))
+    lean(m, total(shared), total(square))
     m.t += m.h
     enter(m)
     note(m)
@@ -270,13 +275,9 @@ def tighten(m: March, still: float, onward: float) -> None:
     m.tolerance = min(max(m.least, m.share * m.error * smooth), m.loosest)
 
 
-def trend(m: March, still: float, onward: float) -> None:
-    """Expect accelerations to go on as they went, if that was the better guess for the last step."""
-    if m.trending == 1 and not onward < still:
-        m.trending = 0
-        clear(m.flat.padded, m.trend)
-    else:
-        m.trending = 1 if still > 0.0 else 0
+def lean(m: March, shared: float, square: float) -> None:
+    """Choose the share of the last change of accelerations that the next one is expected to be."""
+    m.lean = min(1.0, max(-1.0, shared / square)) if square > 0.0 else 1.0
 
 
 def enter(m: March) -> None:

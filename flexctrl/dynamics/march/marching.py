@@ -46,7 +46,7 @@ __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
 _SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
 _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed")
-_MADE, _ASKED = 3.0, 100.0
+_MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
 _CAPACITY = 1024
@@ -213,7 +213,7 @@ class Marcher:
         F.enter(point.state)
         m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
         m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
-        m.trending, m.phase, m.attempt, m.t = int(point.trend.any()), FRESH, 0, point.state.t
+        m.lean, m.phase, m.attempt, m.t = point.lean, FRESH, 0, point.state.t
         self.supply(point.supply.u)
         self.open(point.state.q, np.zeros(self.model.n), False)
         return self
@@ -245,7 +245,7 @@ class Marcher:
     def point(self, supply: Supply) -> AlphaPoint:
         """Return where the march stands."""
         m, F = self.march, self.flattened
-        return AlphaPoint(F.state(m.v, m.t), F.own(m.rate), supply, F.own(m.algorithmic), F.own(m.trend))
+        return AlphaPoint(F.state(m.v, m.t), F.own(m.rate), supply, F.own(m.algorithmic), F.own(m.trend), m.lean)
 
     def fixed(self, h: float, count: int) -> int:
         """Take up to ``count`` steps of one length; return how it ended."""
@@ -369,13 +369,13 @@ class Marcher:
         if not count:
             return []
         n, nodes, width = f.n, 12 * f.nodes, self._state_width
-        table = self.march.states[: count * width].reshape(count, width).copy()
+        table = self.march.states[: count * width].reshape(count, width)
         poses = table[:, :nodes].reshape(count, -1, 12)
-        x, R = np.ascontiguousarray(poses[:, :, :3]), np.ascontiguousarray(poses[:, :, 3:])
+        x, R = poses[:, :, :3].copy(), poses[:, :, 3:].copy()
         q, v = np.empty((2, count, n))
         q[:, F.plan.order] = table[:, nodes : nodes + n]
         v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
-        driven, shown = np.split(table[:, nodes + 2 * f.padded : width - 1], [f.drives], axis=1)
+        driven, shown = np.split(table[:, nodes + 2 * f.padded : width - 1].copy(), [f.drives], axis=1)
         t = table[:, width - 1].tolist()
         R = R.reshape(count, -1, 3, 3)
         dry = self.model.rest.dry
@@ -394,7 +394,7 @@ def _idle(model: Model) -> list[Marcher]:
 
 def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
-    v, rate, algorithmic, trend, lead, pulled, reach, first = np.zeros((8, flat.padded))
+    v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
     state = _state_width(F)
     shelf = int(min(_CAPACITY, max(1, _BYTES // (8 * state))))
     return March(
@@ -412,7 +412,6 @@ def _march(F: Flattened, method: Method) -> March:
         rate=rate,
         algorithmic=algorithmic,
         trend=trend,
-        lead=lead,
         pulled=pulled,
         weight=F.ordered(method.weight),
         turns=F.ordered(method.turning.astype(float)),

@@ -90,8 +90,8 @@ class March:
     price, spent, lately, served : float, int
         What a tangent costs, in iterations; what was spent on it and on iterations since, how many the last step
         took, and how many steps there were.
-    trending : int
-        Whether accelerations are expected to go on as they went.
+    lean : float
+        What share of their last change accelerations are expected to change by; see `AlphaPoint`.
     made_for, mass_for : float
         Step for which the tangent was made; 1 once the mass has been.
     missed, believed : float, int
@@ -108,8 +108,8 @@ class March:
         Dissipated power; work of the inputs and energy dissipated.
     v, rate, algorithmic, trend : Reals
         At the start of the step; see `AlphaPoint`.
-    lead, pulled : Reals
-        The method's own acceleration at its end; the inputs' forces at its start.
+    pulled : Reals
+        The inputs' forces at its start.
     weight, turns : Reals
         One over the yardsticks; 1 for what turns.
     reach, first : Reals
@@ -134,7 +134,6 @@ class March:
     rate: Reals
     algorithmic: Reals
     trend: Reals
-    lead: Reals
     pulled: Reals
     weight: Reals
     turns: Reals
@@ -178,7 +177,7 @@ class March:
     spent: float = 0.0
     lately: float = 0.0
     served: int = 0
-    trending: int = 0
+    lean: float = 1.0
     made_for: float = -1.0
     mass_for: float = 0.0
     missed: float = -1.0

@@ -16,7 +16,7 @@ from flexctrl.model.fronts import factor
 
 __all__ = ["blended", "refactored", "step", "to_rate", "to_v"]
 
-_TURNED = 0.05
+_TURNED = 0.03
 _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
@@ -41,11 +41,11 @@ def step(m: March) -> int:
 
 
 def predict(m: March) -> None:
-    """Guess the end of the step: accelerations go on as in the last one."""
+    """Guess the end of the step: accelerations change as in the last one, by the share that told that one best."""
     f = m.flat
     h = m.h
     for i in range(0, f.padded, 8):
-        rate = eight(m.rate[i:]) + eight(m.trend[i:])
+        rate = eight(m.rate[i:]) + m.lean * eight(m.trend[i:])
         own = eight(m.algorithmic[i:])
         lead = blended(m, rate, eight(m.rate[i:]), own)
         put(f.rate[i:], rate)
