@@ -37,8 +37,8 @@ class Tolerance:
     Parameters
     ----------
     relative : float
-        Local error per step over the distance moved so far, that of the freedom that has moved most; by default methods
-        a rotation counts as a radian at most, or what spins would excuse errors of all else.
+        Local error per step over the distance moved so far, that of the freedom that has moved most; it counts as
+        a radian or the size of the machine at most, or what spins or travels would excuse errors of all else.
     absolute : float
         Local error per step below which nothing is asked [rad, and m over the size of the machine].
 

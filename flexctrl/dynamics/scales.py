@@ -43,7 +43,7 @@ def _yardsticks(model: Model) -> np.ndarray:
 def farthest(model: Model, moved: np.ndarray) -> float:
     """Return how far the freedom has moved that has moved most: what relative tolerances are relative to.
 
-    A rotation counts as a radian at most, or what spins would excuse errors of all else.
+    A radian, or the size of the machine, at most: or what spins or travels would excuse errors of all else.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def farthest(model: Model, moved: np.ndarray) -> float:
         In yardsticks.
     """
     way = moved * (1.0 / yardsticks(model))
-    radian = way + 1.0 - np.maximum(way, 1.0)  # the compiled loops work this out in the same order, to the bit
-    return float((way + turning(model) * (radian - way)).max(initial=0.0))
+    # no more than 1; the compiled loops work it out in the same order, to the bit
+    return float((way + 1.0 - np.maximum(way, 1.0)).max(initial=0.0))
 
 
 def once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:

@@ -249,8 +249,7 @@ def accept(m: March) -> None:
         square = square + told * told
         reach = larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:])))
         way = reach * eight(m.weight[i:])
-        radian = way + one - larger(way, one)
-        far = larger(far, way + eight(m.turns[i:]) * (radian - way))
+        far = larger(far, way + one - larger(way, one))
         put(m.reach[i:], reach)
         put(m.trend[i:], change)
         put(m.algorithmic[i:], blended(m, rate, eight(m.rate[i:]), eight(m.algorithmic[i:])))

@@ -16,6 +16,8 @@ from flexctrl.linear.reduction.result import ReducedModel, galerkin
 
 __all__ = ["MomentMatching"]
 
+NOTHING_NEW = 1e-11
+
 Solver = Callable[[np.ndarray], np.ndarray]
 
 
@@ -62,33 +64,46 @@ class MomentMatching:
                 f"MomentMatching needs points and an order above the {r} rigid-body modes; got "
                 f"{len(self.points)} points, order {self.order}"
             )
-        columns = _collect(full, rigid, self.points, min(self.order, len(full.coordinates)) - r)
-        names = (*(f"rigid{j + 1}" for j in range(r)), *(f"krylov{j + 1}" for j in range(columns.shape[1])))
-        return galerkin(full, self, np.hstack([rigid, columns]), names, np.eye(len(names), r))
+        basis = _collect(full, rigid, self.points, min(self.order, len(full.coordinates)))
+        names = (*(f"rigid{j + 1}" for j in range(r)), *(f"krylov{j + 1}" for j in range(basis.shape[1] - r)))
+        return galerkin(full, self, basis, names, np.eye(len(names), r))
 
 
 def _collect(full: LinearModel, rigid: np.ndarray, points: tuple[complex, ...], room: int) -> np.ndarray:
-    """Round-robin over the points, M-orthonormal to the rigid modes, until the room is used."""
-    sources = [_directions(full, rigid, complex(s)) for s in points]
-    scale = np.sqrt(np.maximum(abs(full.K).diagonal(), np.finfo(float).tiny))
-    basis = np.zeros((len(scale), 0))
+    """The rigid modes, then round-robin over the points what is new, until the room is used."""
+    sources, weight = [_directions(full, rigid, complex(s)) for s in points], _weight(full)
+    basis = rigid
     for _ in range(2 * room + 2):
         for source in sources:
             for column in next(source).T:
-                free = column - rigid @ (rigid.T @ (full.M @ column))
-                basis = _extended(basis, scale * free)
+                basis = _extended(basis, column, weight)
                 if basis.shape[1] == room:
-                    return basis / scale[:, None]
-    return basis / scale[:, None]
+                    return basis
+    return basis
 
 
-def _extended(basis: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Append the part of the column that is new (Gram–Schmidt, twice)."""
-    size = np.linalg.norm(column)
-    for _ in range(2):
-        column = column - basis @ (basis.T @ column)
-    rest = np.linalg.norm(column)
-    return np.column_stack([basis, column / rest]) if rest > 1e-10 * size else basis
+def _weight(full: LinearModel) -> sp.csc_matrix:
+    """M, and so little of K that only what has no mass shows it: what is light and stiff keeps its mass beside all."""
+    stiffness, mass = abs(full.K.diagonal()), full.M.diagonal()
+    heavy = (mass > 0.0) & (stiffness > 0.0)
+    fastest = float((stiffness[heavy] / mass[heavy]).max(initial=0.0)) or 1.0
+    return sp.csc_matrix(full.M + (0.5 / fastest) * (full.K + full.K.T))
+
+
+def _extended(basis: np.ndarray, column: np.ndarray, weight: sp.csc_matrix) -> np.ndarray:
+    """Append the part of the column that is new, of weight 1 (Gram–Schmidt, three times)."""
+    size = _length(column, weight)
+    for _ in range(3):
+        column = column - basis @ (basis.T @ (weight @ column))
+        rest = _length(column, weight)
+        if rest <= NOTHING_NEW * size:
+            return basis
+        column, size = column / rest, 1.0
+    return np.column_stack([basis, column])
+
+
+def _length(column: np.ndarray, weight: sp.csc_matrix) -> float:
+    return float(np.sqrt(max(float(column @ (weight @ column)), 0.0)))
 
 
 def _directions(full: LinearModel, rigid: np.ndarray, s: complex) -> Iterator[np.ndarray]:
