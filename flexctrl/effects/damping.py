@@ -96,7 +96,7 @@ class RayleighDamping(Effect):
 
 @dataclass(frozen=True)
 class ModalDamping(Effect):
-    """C = M Φ diag(2 ζᵢ ωᵢ) Φᵀ M from the undamped modes about the machine's equilibrium.
+    """C = M Φ diag(2 ζᵢ ωᵢ) Φᵀ M from the undamped modes about the machine's equilibrium; 0 is no damping.
 
     Parameters
     ----------

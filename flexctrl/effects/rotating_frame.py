@@ -36,7 +36,7 @@ class RotatingFrame(Effect):
     its bent axis as weight does, so that a blade's stiffening converges with the fourth power of the mesh.
 
     The stored energy includes the potential −½∫|Ω × (x − c)|² dm: what is conserved is the Jacobi integral.
-    Drag on velocities (α of `RayleighDamping`) is that of air which turns with the frame.
+    Drag on velocities (α of `RayleighDamping`) is that of air which turns with the frame; the air of `Wind` does not.
 
     Parameters
     ----------
@@ -100,6 +100,20 @@ class RotatingFrame(Effect):
         spin = ca.DM(self.rate)
         return -ca.cross(spin, ca.cross(spin, x - ca.DM(self.center)))
 
+    def turns(self, vector: Vector) -> bool:
+        """Tell whether a vector that is fixed outside turns in the frame: it is not along the axis.
+
+        Parameters
+        ----------
+        vector : tuple of 3 floats
+
+        Returns
+        -------
+        bool
+        """
+        across = np.linalg.norm(np.cross(self.rate, vector))
+        return bool(across > 1e-9 * np.linalg.norm(self.rate) * np.linalg.norm(vector))
+
     def check_beside(self, others: Sequence[Effect]) -> None:
         """Refuse what cannot be steady in a turning frame, and a linear model that would lack the stiffening."""
         if not any(self.rate):
@@ -109,10 +123,9 @@ class RotatingFrame(Effect):
                 "RotatingFrame: needs LargeRotation() or GeometricStiffness(), without which the pull that stiffens "
                 "spinning parts is left out"
             )
-        for g in (np.array(e.g) for e in others if isinstance(e, Gravity)):
-            across = np.linalg.norm(np.cross(self.rate, g))
-            if across > 1e-9 * np.linalg.norm(self.rate) * np.linalg.norm(g):
+        for g in (e.g for e in others if isinstance(e, Gravity)):
+            if self.turns(g):
                 raise StructureError(
-                    f"RotatingFrame: gravity {tuple(g.tolist())} would turn in a frame that turns about {self.rate}; "
+                    f"RotatingFrame: gravity {g} would turn in a frame that turns about {self.rate}; "
                     "let gravity point along the axis, or leave one of both out"
                 )

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.places import by_place, not_negative
+from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.errors import StructureError
 from flexctrl.structure.elements import Beam, Node
 from flexctrl.structure.freedoms import Vector, check_finite, parse_point
@@ -23,6 +25,9 @@ class Wind(Effect):
     rest and the aerodynamic damping ½ ρ c_d A (|w| I + w wᵀ/|w|), twice as large along the wind as across it. What the
     wind does to the machine is in the books under dissipation, negative where it drives.
 
+    In a `RotatingFrame` the air does not turn along: v is the speed seen from outside, and the wind blows along the
+    axis (across it, it would turn for who turns). There drag has no potential, and K of linear models is unsymmetric.
+
     Parameters
     ----------
     areas : mapping of str to float
@@ -36,7 +41,8 @@ class Wind(Effect):
     Raises
     ------
     StructureError
-        For a value out of range; when the model is assembled, for a place that there is not.
+        For a value out of range; when the model is assembled, for a place that there is not, and in a
+        `RotatingFrame` for wind across its axis or with `GeometricStiffness`, which has no room for an unsymmetric K.
 
     Examples
     --------
@@ -60,6 +66,19 @@ class Wind(Effect):
     def check_on(self, structure: Structure) -> None:
         """Look for every place."""
         self.shares(structure)
+
+    def check_beside(self, others: Sequence[Effect]) -> None:
+        """Refuse wind that would turn in a frame that turns, and drag without a potential in a model of K alone."""
+        for frame in (e for e in others if isinstance(e, RotatingFrame) and any(e.rate)):
+            if any(isinstance(e, GeometricStiffness) for e in others):
+                raise StructureError(
+                    "Wind: in a RotatingFrame it needs LargeRotation() instead of GeometricStiffness()"
+                )
+            if frame.turns(self.speed):
+                raise StructureError(
+                    f"Wind: speed {self.speed} would turn in a frame that turns about {frame.rate}; "
+                    "let the wind blow along the axis, or describe the machine in axes that do not turn"
+                )
 
     def shares(self, structure: Structure) -> list[tuple[Node, float]]:
         """Return the nodes that have a drag area, and how much of it [m²].

@@ -82,7 +82,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     )
     empty = sp.csr_matrix((motion.n, motion.n))
     model = Model(structure, parts, motion, runs, empty)
-    modal = [p for p in parts if isinstance(p, ModalDamping)]
+    modal = [p for p in parts if isinstance(p, ModalDamping) and np.any(p.ratios)]
     return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
 
 

@@ -92,12 +92,17 @@ def _axis(contact: Contact) -> tuple[float, ...]:
 
 
 def pieces(
-    kind: Kind, parts: list[str], nodes: list[list[int]], slots: list[list[int]], parameters: list[list[float]]
+    kind: Kind,
+    parts: list[str],
+    nodes: list[list[int]],
+    slots: list[list[int]],
+    parameters: list[list[float]],
+    effects: tuple[Effect, ...] = (),
 ) -> Family:
-    """Return a family whose kernels depend on nothing but the kind."""
+    """Return a family whose kernels depend on the kind and a few effects alone."""
     count = len(parts)
     return Family(
-        kernels_of(kind, ()),
+        kernels_of(kind, effects),
         tuple(parts),
         np.array(nodes, dtype=int).reshape(count, kind.nodes),
         np.array(slots, dtype=int).reshape(count, kind.drives),

@@ -226,8 +226,8 @@ def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     felt, carried = m, ca.SX(1, 1)
     if _turning(effects):
         first, second = nodes
-        felt = beam.beam_motion(_inertial(effects, first), _inertial(effects, second), parameters, modal)
-        parked = (_inertial(effects, _still(first)), _inertial(effects, _still(second)))
+        felt = beam.beam_motion(seen_outside(effects, first), seen_outside(effects, second), parameters, modal)
+        parked = (seen_outside(effects, _still(first)), seen_outside(effects, _still(second)))
         still = tuple(0.0 * eta if k else eta for k, eta in enumerate(modal))
         carried = beam_inertia.kinetic_energy(beam.beam_motion(*parked, parameters, still))
     inertia = whole_force(felt, beam_inertia.inertial_force(felt))
@@ -259,7 +259,8 @@ def _turning(effects: tuple[Effect, ...]) -> bool:
     return any(type(e).inertial is not Effect.inertial for e in effects)
 
 
-def _inertial(effects: tuple[Effect, ...], node: NodeMotion) -> NodeMotion:
+def seen_outside(effects: tuple[Effect, ...], node: NodeMotion) -> NodeMotion:
+    """Return the motion of a node as its inertia feels it: seen from an inertial frame."""
     for effect in effects:
         node = effect.inertial(node)
     return node
@@ -299,13 +300,27 @@ def _heavy_rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: 
     half = ca.vertcat(0.5 * parameters[-1], ca.SX(6, 1))
     ends = [_body(effects, [node], slot, half) for node in nodes]
     first, second = nodes
-    apart = pieces.body_energy(replace(first, v=first.v - second.v), pieces.named(pieces.BODY_PARAMETERS, half))
     return Shares(
         pieces.rope_share(*(e.inertia for e in ends)),
         rope.force + pieces.rope_share(*(e.force for e in ends)),
-        ends[0].kinetic + ends[1].kinetic - apart / 6.0,
-        rope.stored + ends[0].stored + ends[1].stored,
+        ends[0].kinetic + ends[1].kinetic - _apart(first, second, half),
+        rope.stored + ends[0].stored + ends[1].stored + _carried_apart(effects, first, second, half),
     )
+
+
+def _apart(first: NodeMotion, second: NodeMotion, half: ca.SX) -> ca.SX:
+    """What m/12 [[5, 1], [1, 5]] lacks of the kinetic energy of half the mass at either end."""
+    relative = replace(first, v=first.v - second.v)
+    return pieces.body_energy(relative, pieces.named(pieces.BODY_PARAMETERS, half)) / 6.0
+
+
+def _carried_apart(effects: tuple[Effect, ...], first: NodeMotion, second: NodeMotion, half: ca.SX) -> ca.SX:
+    """The same of what a turning frame carries along: what the centrifugal potential at the ends has too much."""
+    import casadi as ca
+
+    if not _turning(effects):
+        return ca.SX(1, 1)
+    return _apart(seen_outside(effects, _still(first)), seen_outside(effects, _still(second)), half)
 
 
 def rope_pull(effects: tuple[Effect, ...], m: pieces.LineMotion) -> ca.SX:
@@ -323,8 +338,8 @@ def _body(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     force = sum((e.body(node, p) for e in effects), ca.SX(6, 1))
     stored = sum((e.body_energy(node, p) for e in effects), ca.SX(1, 1))
     if _turning(effects):
-        stored = stored - pieces.body_energy(_inertial(effects, _still(node)), p)
-    return Shares(pieces.body_inertia(_inertial(effects, node), p), force, pieces.body_energy(node, p), stored)
+        stored = stored - pieces.body_energy(seen_outside(effects, _still(node)), p)
+    return Shares(pieces.body_inertia(seen_outside(effects, node), p), force, pieces.body_energy(node, p), stored)
 
 
 def _point(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:

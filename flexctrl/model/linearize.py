@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.effects.rotating_frame import RotatingFrame
+from flexctrl.effects.wind import Wind
 from flexctrl.errors import LinearizationError, MechanismError
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.model.audit import audit
@@ -27,9 +29,9 @@ _BALANCED, _ROUND_OFF = 1e-6, 1e-12
 def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str, float] | None = None) -> LinearModel:
     """Return the linear model about an equilibrium: M q̈ + C q̇ + K q = B u, geometric stiffness in K.
 
-    K is symmetric unless loads without a potential are at work (`FollowerForce`, `FollowerTorque`, or a
-    `Torque` about a fixed axis): then what they add is kept, the certificate names them, and the damped poles
-    tell flutter from divergence.
+    K is symmetric unless loads without a potential are at work (`FollowerForce`, `FollowerTorque`, a `Torque`
+    about a fixed axis, or `Wind` in a `RotatingFrame`): then what they add is kept, the certificate names them, and
+    the damped poles tell flutter from divergence.
 
     Parameters
     ----------
@@ -99,7 +101,9 @@ def _without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:
     """The loads at work that have no potential: they may make K unsymmetric."""
     kinds = (FollowerForce, FollowerTorque, Torque)
     signals = model.structure.inputs if model.large else ()
-    return tuple(s.name for s, value in zip(signals, u, strict=False) if value and isinstance(s, kinds))
+    turning = any(isinstance(e, RotatingFrame) and any(e.rate) for e in model.effects)
+    drag = tuple("Wind" for e in model.effects if turning and isinstance(e, Wind))
+    return tuple(s.name for s, value in zip(signals, u, strict=False) if value and isinstance(s, kinds)) + drag
 
 
 def _derivative(

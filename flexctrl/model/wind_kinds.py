@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
+from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.wind import Wind
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.model.families import Family
 from flexctrl.model.frictions import pieces
-from flexctrl.model.kinds import Kind, Shares
+from flexctrl.model.kinds import Kind, Shares, seen_outside
 from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def _wind(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     """½ ρ c_d A and w are the parameters."""
     import casadi as ca
 
-    past = p[1:4] - nodes[0].v
+    past = p[1:4] - seen_outside(effects, nodes[0]).v
     force = p[0] * ca.sqrt(ca.dot(past, past) + _CALM) * past
     return Shares(ca.SX(3, 1), force, ca.SX(1, 1), ca.SX(1, 1), -ca.dot(force, nodes[0].v))
 
@@ -45,12 +46,14 @@ def wind_families(structure: Structure, effects: Sequence[Effect]) -> tuple[Fami
     -------
     tuple of Family
     """
-    return tuple(_family(structure, e) for e in effects if isinstance(e, Wind) and e.density and e.shares(structure))
+    frames = tuple(e for e in effects if isinstance(e, RotatingFrame))
+    winds = (e for e in effects if isinstance(e, Wind) and e.density and e.shares(structure))
+    return tuple(_family(structure, e, frames) for e in winds)
 
 
-def _family(s: Structure, effect: Wind) -> Family:
+def _family(s: Structure, effect: Wind, frames: tuple[Effect, ...]) -> Family:
     shares = effect.shares(s)
     rows = [[0.5 * effect.density * area, *effect.speed] for _, area in shares]
     return pieces(
-        _WIND, [node.part for node, _ in shares], [[s.number(n)] for n, _ in shares], [[]] * len(shares), rows
+        _WIND, [node.part for node, _ in shares], [[s.number(n)] for n, _ in shares], [[]] * len(shares), rows, frames
     )

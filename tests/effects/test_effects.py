@@ -43,7 +43,12 @@ def somewhere(model: fc.Model):
     return model.displace(0.2 * np.random.default_rng(0).normal(size=model.n)).with_(v=v), v, a
 
 
-NOTHING = [fc.RayleighDamping(0.0, 0.0), fc.Gravity((0.0, 0.0, 0.0)), fc.RotatingFrame((0.0, 0.0, 0.0))]
+NOTHING = [
+    fc.RayleighDamping(0.0, 0.0),
+    fc.ModalDamping((0.0, 0.0)),
+    fc.Gravity((0.0, 0.0, 0.0)),
+    fc.RotatingFrame((0.0, 0.0, 0.0)),
+]
 
 
 @pytest.mark.parametrize("others", [[fc.LargeRotation()], MOVING, [fc.Flexible()]], ids=["rigid", "flexible", "small"])
@@ -55,6 +60,17 @@ def test_effects_at_zero_strength_are_as_if_they_were_not_there(others):
     slope, same = (m.slope(state, v, a, (1.0, 1.0, 1.0), np.zeros(0)).toarray() for m in (without, with_))
     assert np.allclose(same, slope, rtol=0, atol=1e-13 * np.abs(slope).max())
     assert with_.energy(state) == pytest.approx(without.energy(state), rel=1e-13)
+
+
+def test_no_modal_damping_needs_no_equilibrium():
+    """A hoist whose motor is free falls, and has no modes to damp."""
+    load, top = fc.PointMass("load", (0, 0, -5), 10.0), fc.PointMass("top", (0, 0, 0), 1.0)
+    winch = fc.Winch("winch", load.node, top.node, EA=1e5, radius=0.1, ratio=1.0, inertia=0.02)
+    hoist = fc.Structure([load, top], [fc.Support(top.node)], [winch])
+    falling = [fc.LargeRotation(), fc.Gravity()]
+    without, with_ = (fc.assemble(hoist, [*falling, *e], fc.CasadiVM()) for e in ([], [fc.ModalDamping(0.0)]))
+    assert with_.coordinates == without.coordinates
+    assert with_.viscous.nnz == 0
 
 
 def cost(model: fc.Model) -> dict[str, int]:

@@ -171,7 +171,7 @@ def without_strength(case: Case) -> list:
     drives = dict.fromkeys((d.name for d in case.structure.drives), 0.0)
     places = {p.name: 0.0 for p in case.structure.elements if isinstance(p, fc.PointMass | fc.RigidBody)}
     neutral = [fc.RayleighDamping(0.0, 0.0), fc.Backlash(drives), fc.ViscousFriction(drives)]
-    neutral += [fc.CoulombFriction(drives), fc.Wind(places, (10.0, 0.0, 0.0))]
+    neutral += [fc.CoulombFriction(drives), fc.Wind(places, (10.0, 0.0, 0.0)), fc.ModalDamping(0.0)]
     return [e for e in neutral if type(e) not in map(type, case.effects)]
 
 
