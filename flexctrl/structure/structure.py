@@ -34,7 +34,7 @@ from flexctrl.structure.signals import (
     Torque,
     Velocity,
 )
-from flexctrl.structure.trolleys import Trolley, check_rails, tracks_of
+from flexctrl.structure.trolleys import Trolley, check_rails, check_travels, tracks_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -351,6 +351,7 @@ def _check_trolleys(s: Structure) -> None:
         )
     if not isinstance(s.joints, JoinTable):
         check_rails(s.elements, s.joints, f"Structure {s.name!r}")
+        check_travels(s.joints, s.drives, (*s.inputs, *s.outputs))
 
 
 def _check_coincidence(s: Structure) -> None:

@@ -10,12 +10,14 @@ import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.chains import BeamChain
+from flexctrl.structure.drives import Drive, Winch
 from flexctrl.structure.elements import Beam, Node, Part, PointMass
 from flexctrl.structure.freedoms import TRANSLATIONS, TRAVEL, check_finite, check_name
-from flexctrl.structure.joints import Joint, Weld
+from flexctrl.structure.joints import Joint, Support, Weld
 from flexctrl.structure.relations import Track
+from flexctrl.structure.signals import Force, Input, Output, Position, SwayAngle, Velocity
 
-__all__ = ["Trolley", "check_rails", "tracks_of"]
+__all__ = ["Trolley", "check_rails", "check_travels", "tracks_of"]
 
 _STRAIGHT = 1e-6
 
@@ -140,6 +142,50 @@ def check_rails(elements: Sequence[Part], joints: Sequence[Joint], owner: str) -
         off = np.linalg.norm(np.subtract(_point(rail, trolley.distance), trolley.at))
         if off > _STRAIGHT * length or trolley.distance > length:
             raise StructureError(f"{who}: its rail lies elsewhere; make it along the beams that the structure has")
+
+
+def check_travels(joints: Sequence[Joint], drives: Sequence[Drive], signals: Sequence[Input | Output]) -> None:
+    """Raise StructureError where a node that is nowhere in space is taken for a place.
+
+    Parameters
+    ----------
+    joints : sequence of Joint
+    drives : sequence of Drive
+    signals : sequence of Input or Output
+
+    Raises
+    ------
+    StructureError
+    """
+    for joint in joints:
+        if not isinstance(joint, Support):
+            _refuse_travels(joint.nodes, str(joint))
+    for drive in drives:
+        both = (drive.node, drive.against)
+        if isinstance(drive, Winch) or not _alike(*both):
+            _refuse_travels(both, f"drive {drive.name!r}")
+    for signal in signals:
+        who = f"{type(signal).__name__} {signal.name!r}"
+        if isinstance(signal, SwayAngle):
+            _refuse_travels((signal.top, signal.load), who)
+        elif isinstance(signal, Position | Velocity | Force):
+            nodes = signal.at if isinstance(signal, Force) else (signal.at, signal.minus)
+            along = abs(signal.direction[0]) > 1.0 - 1e-12
+            if not along or (not isinstance(signal, Force) and not _alike(*nodes)):
+                _refuse_travels(nodes, who)
+
+
+def _alike(node: Node, other: Node | None) -> bool:
+    return other is None or (node.freedoms == TRAVEL) == (other.freedoms == TRAVEL)
+
+
+def _refuse_travels(nodes: Sequence[Node | None], who: str) -> None:
+    for node in nodes:
+        if node is not None and node.freedoms == TRAVEL:
+            raise StructureError(
+                f"{who}: {node.part}.travel is no place in space, only how far {node.part} has travelled (direction "
+                f"'x'); for where it is take {node.part}.node"
+            )
 
 
 def tracks_of(elements: Sequence[Part], number: Mapping[tuple[str, int], int]) -> tuple[Track, ...]:

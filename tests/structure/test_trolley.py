@@ -72,3 +72,24 @@ def test_rails_that_the_structure_does_not_have():
     beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), SECTION)
     with pytest.raises(fc.errors.StructureError, match="needs joints"):
         fc.Structure([beam, fc.Trolley("trolley", beam, at=0.5, mass=2.0)], table)
+
+
+def test_how_far_is_no_place():
+    """Here it even coincides with where the trolley is drawn."""
+    girder = fc.Beam("girder", (0, 0, 0), (3, 0, 0), SECTION, 3)
+    trolley = fc.Trolley("trolley", girder, at=1.0, mass=2.0)
+    load = fc.PointMass("load", (1, 0, -1), 1.0)
+    rope = fc.Rope("rope", trolley.node, load.node, EA=1e3)
+    parts, hung = [girder, trolley, load, rope], fc.Pin(rope.end, load.node)
+    joints = [fc.Support(girder.start), fc.Pin(rope.start, trolley.node), hung]
+    fc.Structure(parts, joints, inputs=[fc.Force("push", trolley.travel, "-x")])
+    for change in (
+        {"joints": [fc.Support(girder.start), fc.Pin(rope.start, trolley.travel), hung]},
+        {"inputs": [fc.Force("push", trolley.travel, "z")]},
+        {"outputs": [fc.Position("place", trolley.travel, "x", minus=load.node)]},
+        {"outputs": [fc.SwayAngle("sway", trolley.travel, load.node, "x")]},
+        {"drives": [fc.Winch("winch", load.node, trolley.travel, EA=1e3, radius=0.1)]},
+        {"drives": [fc.LinearDrive("drive", trolley.travel, girder.end, radius=0.1, stiffness=1.0)]},
+    ):
+        with pytest.raises(fc.errors.StructureError, match=r"trolley.travel is no place in space.*take trolley.node"):
+            fc.Structure(parts, **{"joints": joints, **change})
