@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,7 @@ __all__ = ["Direction", "Event", "Occurrence", "Watch"]
 
 _DUST = 1e-13
 _SLOPE = 1e-2
+_HALVINGS = 20
 
 
 class Direction(Enum):
@@ -255,7 +257,8 @@ class Watch:
                 continue
             rising = fb > 0.0
             if side != 0.0 and direction is not (Direction.FALLING if rising else Direction.RISING):
-                at = _root(lambda s: value(s)[gauge], a, b, fb) if fa * fb < 0.0 else a
+                own = partial(_one_of, value, gauge)
+                at = _root(own, a, b, fb) if fa * fb < 0.0 else _return(own, a, b, fb, dust)
                 found.append(Crossing(at, gauge, rising))
             side = np.sign(fb)
         return found
@@ -313,6 +316,27 @@ class _Along:
     def __call__(self, t: float) -> np.ndarray:
         state = self.curve.at(t)
         return self.watch.values(state, self.supply(state).u)
+
+
+def _one_of(value: Callable[[float], np.ndarray], gauge: int, t: float) -> float:
+    return float(value(t)[gauge])
+
+
+def _return(f: Callable[[float], float], a: float, b: float, fb: float, dust: float) -> float:
+    """Return when what starts at zero comes back through it, having gone the other way than at b; a if it never does.
+
+    A contact that has just broken loose may stick again within the step.
+    """
+    low = a
+    for _ in range(_HALVINGS):
+        t = 0.5 * (low + b)
+        if (ft := f(t)) * fb < 0.0 and abs(ft) > dust:
+            return _root(f, t, b, fb)
+        if ft * fb > 0.0:
+            b, fb = t, ft
+        else:
+            low = t
+    return a
 
 
 def _root(f: Callable[[float], float], a: float, b: float, fb: float) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from recorder import Absolute
+from scipy.integrate import solve_ivp
 
 import flexctrl as fc
 
@@ -138,3 +139,75 @@ def test_free_play(record):
         source="nothing dissipates",
         tolerance=Absolute(1e-6),
     )
+
+
+LIFT, LOAD, LIMIT, MOTOR, GEAR = 5.0, 10.0, 1.5, 0.02, 100.0
+
+
+def hoist() -> fc.Model:
+    """A load let go on a damped rope whose drum the motor's friction holds, but for the first swing."""
+    top, load = fc.PointMass("top", (0, 0, LIFT), 1.0), fc.PointMass("load", (0, 0, 0), LOAD)
+    winch = fc.Winch("winch", load.node, top.node, EA=1e5, radius=0.1, ratio=0.1 * GEAR, inertia=MOTOR, damping=200.0)
+    structure = fc.Structure(
+        [top, load],
+        [fc.Support(top.node, "u v w"), fc.Support(load.node, "u v")],
+        drives=[winch],
+        outputs=[fc.DriveAngle("angle", winch), fc.Position("height", load.node, "z")],
+    )
+    effects = [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch(), fc.CoulombFriction({"winch": LIMIT})]
+    return fc.assemble(structure, effects)
+
+
+def slipped() -> tuple[float, float, float]:
+    """When the drum breaks loose, when it sticks again, and how far the motor has turned: by DOP853, phase by phase."""
+
+    def pulls(y: np.ndarray) -> tuple[float, float]:
+        z, a, vz, va = y
+        out = LIFT + a / GEAR
+        stretch = LIFT - z - out
+        pull = 1e5 / out * stretch + 200.0 * (-vz - va / GEAR)
+        return pull, (pull + 0.5 * 1e5 / out**2 * stretch**2) / GEAR
+
+    def slope(t: float, y: np.ndarray, slides: bool) -> list[float]:
+        pull, torque = pulls(y)
+        return [y[2], y[3], pull / LOAD - 9.81, (torque - LIMIT) / MOTOR if slides else 0.0]
+
+    def loose(t: float, y: np.ndarray, slides: bool) -> float:
+        return pulls(y)[1] - LIMIT
+
+    def stops(t: float, y: np.ndarray, slides: bool) -> float:
+        return y[3] if t > first.t[-1] + 1e-4 else 1.0
+
+    loose.terminal = stops.terminal = True  # type: ignore[attr-defined]
+    how = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
+    first = solve_ivp(slope, (0, 1), [0.0] * 4, args=(False,), events=loose, **how)
+    second = solve_ivp(slope, (first.t[-1], 1), first.y[:, -1], args=(True,), events=stops, **how)
+    return first.t[-1], second.t[-1], second.y[1, -1]
+
+
+HOISTED = {
+    "explicit Runge–Kutta": (fc.ExplicitRungeKutta(), fc.Tolerance(1e-8, 1e-11), 1e-6),
+    "adaptive alpha": (fc.AdaptiveAlpha(), fc.Tolerance(1e-8, 1e-11), 5e-3),
+    "generalised alpha": (fc.GeneralizedAlpha(2e-4), None, 5e-3),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HOISTED)
+def test_a_hoist_held_by_friction_slips_once(record, name):
+    """The drum breaks loose and sticks again within a step that the load's swing alone would allow."""
+    method, tolerance, share = HOISTED[name]
+    loose, stuck, angle = slipped()
+    run = fc.simulate(hoist(), until=0.2, method=method, tolerance=tolerance)
+    assert run.status is fc.Status.FINISHED
+    assert len(run.events) == 2
+    record(
+        f"D14 hoist held by friction, {name}: drum loose and stuck again [s], motor angle [rad]",
+        ours=[*(event.t for event in run.events), run["angle"][-1]],
+        reference=[loose, stuck, angle],
+        source="scipy's DOP853, phase by phase",
+        tolerance=share,
+    )
+    late = run["angle"][run.t > stuck + 0.02]
+    assert np.ptp(late) <= 1e-12
+    assert run.report.rejected_steps < 50

