@@ -1,80 +1,42 @@
-"""The controller: commands and shapers, feedback and observers, and the hardware round them."""
+"""The controller: commands and shapers, feedback and observers, and the hardware round them; loaded when used."""
 
 from __future__ import annotations
 
-from flexctrl.design.controller import Controller, as_controller
-from flexctrl.design.feedback import FilteredRate, observer, observer_feedback, pd, pi, pid, state_feedback
-from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
-from flexctrl.design.optimal import Estimator, Regulator, bryson, kalman, lqg, lqr
-from flexctrl.design.piecewise import Constant, PiecewisePolynomial, Sum, Trajectory
-from flexctrl.design.shaper import Mode, Shaper, convolve
-from flexctrl.design.shapers import ei, um_zv, um_zv_fit, um_zvd, um_zvd_fit, zv, zvd, zvdd
-from flexctrl.design.shaping import CoarseGridWarning, Shaped, fir
-from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Together, Tracking
-from flexctrl.design.trajectories import (
-    MinimumJerk,
-    Ramp,
-    Spline,
-    Step,
-    Table,
-    TimeOptimalPendulum,
-    TrapezoidalVelocity,
-)
-from flexctrl.errors import ControllerError, DesignError
+import importlib
+from typing import Any
 
-__all__ = [
-    "AntiWindup",
-    "CoarseGridWarning",
-    "Commanded",
-    "Constant",
-    "Controller",
-    "ControllerError",
-    "Delayed",
-    "DesignError",
-    "Estimator",
-    "FeedForward",
-    "FilteredRate",
-    "MinimumJerk",
-    "Mode",
-    "Noisy",
-    "OpenLoop",
-    "PiecewisePolynomial",
-    "Quantised",
-    "Ramp",
-    "RateLimited",
-    "Regulator",
-    "Sampled",
-    "Saturated",
-    "Shaped",
-    "Shaper",
-    "Spline",
-    "Step",
-    "Sum",
-    "Table",
-    "TimeOptimalPendulum",
-    "Together",
-    "Tracking",
-    "Trajectory",
-    "TrapezoidalVelocity",
-    "as_controller",
-    "bryson",
-    "convolve",
-    "ei",
-    "fir",
-    "kalman",
-    "lqg",
-    "lqr",
-    "observer",
-    "observer_feedback",
-    "pd",
-    "pi",
-    "pid",
-    "state_feedback",
-    "um_zv",
-    "um_zv_fit",
-    "um_zvd",
-    "um_zvd_fit",
-    "zv",
-    "zvd",
-    "zvdd",
-]
+_HOMES = {
+    "flexctrl.design.controller": ("Controller", "as_controller"),
+    "flexctrl.design.feedback": ("FilteredRate", "observer", "observer_feedback", "pd", "pi", "pid", "state_feedback"),
+    "flexctrl.design.hardware": ("AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated"),
+    "flexctrl.design.optimal": ("Estimator", "Regulator", "bryson", "kalman", "lqg", "lqr"),
+    "flexctrl.design.piecewise": ("Constant", "PiecewisePolynomial", "Sum", "Trajectory"),
+    "flexctrl.design.shaper": ("Mode", "Shaper", "convolve"),
+    "flexctrl.design.shapers": ("ei", "um_zv", "um_zv_fit", "um_zvd", "um_zvd_fit", "zv", "zvd", "zvdd"),
+    "flexctrl.design.shaping": ("CoarseGridWarning", "Shaped", "fir"),
+    "flexctrl.design.tracking": ("Commanded", "FeedForward", "OpenLoop", "Together", "Tracking"),
+    "flexctrl.design.trajectories": (
+        "MinimumJerk",
+        "Ramp",
+        "Spline",
+        "Step",
+        "Table",
+        "TimeOptimalPendulum",
+        "TrapezoidalVelocity",
+    ),
+    "flexctrl.errors": ("ControllerError", "DesignError"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'flexctrl.design' has no attribute {name!r}")
+    value = globals()[name] = getattr(importlib.import_module(_HOME[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

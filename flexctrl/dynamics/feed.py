@@ -6,17 +6,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.design.controller import Controller, as_controller
-from flexctrl.design.lowering import Lowered, lowered
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import FLOAT, Compiled
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+
+if TYPE_CHECKING:
+    from flexctrl.design.lowering import Lowered
 
 _SMALL = 1e-7
 _NEAR = 1e-10
@@ -83,7 +85,11 @@ class Feed:
     @cached_property
     def lowered(self) -> Lowered | None:
         """The controller as a kernel; None if it is not sampled, or cannot be one."""
-        return None if self.controller is None or self.continuous else lowered(self.controller)
+        if self.controller is None or self.continuous:
+            return None
+        from flexctrl.design.lowering import lowered  # all kinds of controllers: not for runs without any
+
+        return lowered(self.controller)
 
     @cached_property
     def _asked(self) -> Callable[[np.ndarray, np.ndarray], None] | None:

@@ -53,7 +53,7 @@ class Expressions:
 
     def _fail(self, what: str) -> KernelError:
         code = self.function.__code__
-        place = f"{code.co_filename}:{code.co_firstlineno + self.line - 1}"
+        place = f"{code.co_filename}:{self.line}"
         return KernelError(f"{self.function.__name__} cannot be compiled: {what} ({place})")
 
     def _new(self, hint: str = "v") -> str:

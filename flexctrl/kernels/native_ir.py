@@ -11,9 +11,9 @@ functions of the same part. Every variable keeps the type of its first value, ``
 from __future__ import annotations
 
 import ast
-import inspect
-import textwrap
+import linecache
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from flexctrl.kernels.native_expressions import Expressions
@@ -30,9 +30,8 @@ class Translation(Expressions):
 
     def assembly(self) -> str:
         """Return the definition in LLVM assembly."""
-        source = textwrap.dedent(inspect.getsource(self.function))
-        (tree,) = ast.parse(source).body
-        assert isinstance(tree, ast.FunctionDef)
+        code = self.function.__code__
+        tree = _definitions(code.co_filename)[code.co_firstlineno]
         heads = []
         for name, kind in self.parameters:
             heads.append(f"{llvm_type(kind)}{' noalias' if kind in VECTORS else ''} %{name}.in")
@@ -130,6 +129,14 @@ class Translation(Expressions):
 
     def _continue(self, s: ast.Continue) -> None:
         self._go(self.loops[-1][0])
+
+
+@cache
+def _definitions(file: str) -> dict[int, ast.FunctionDef]:
+    """Return the functions of a file by the lines in which they begin, decorators included."""
+    tree = ast.parse("".join(linecache.getlines(file)))
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return {min([node.lineno, *(d.lineno for d in node.decorator_list)]): node for node in found}
 
 
 def _loaded(target: ast.expr) -> ast.expr:

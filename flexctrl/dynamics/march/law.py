@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.design.lowering import Lowered
 from flexctrl.dynamics.feed import Feed
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.model.flat import clear
+
+if TYPE_CHECKING:
+    from flexctrl.design.lowering import Lowered
 
 __all__ = ["Law", "Sampling", "enter_inputs", "enter_leg", "no_law", "obeyed", "said"]
 
