@@ -29,8 +29,10 @@ def _data(found: Ledger) -> dict[str, object]:
         "output_change": found.minimal_change.outputs_worst,
         "outputs": found.minimal_change.outputs,
         "poles_change": found.minimal_change.poles,
+        "pole": found.minimal_change.pole,
         "margins_change": found.minimal_change.margins,
         "speedup": found.speedup,
+        "noise": found.noise,
         "states": found.minimal_size.states,
         "nonzeros": found.minimal_size.nonzeros,
     }
@@ -51,6 +53,7 @@ def _entry(e: Entry) -> dict[str, object]:
     if e.change is None or e.size is None:
         return {**base, "failure": e.failure}
     change = {"output_change": e.change.outputs_worst, "outputs": e.change.outputs, "poles_change": e.change.poles}
+    change |= {"pole": e.change.pole}
     size = {"states": e.size.states, "nonzeros": e.size.nonzeros, "instructions": e.size.instructions}
     return {**base, **change, "margins_change": e.change.margins, **size}
 

@@ -32,7 +32,7 @@ def ledger_figure(ledger: Ledger) -> Figure:
     held = 100.0 * ledger.minimal_change.outputs_worst
     figure.suptitle(
         f"{ledger.name}: {len(ledger.minimal_set)} of {len(ledger.entries)} effects keep the outputs within "
-        f"{held:.2g} %, {ledger.speedup:.1f} times faster",
+        f"{held:.2g} %, {ledger.pace}",
         fontsize=11,
         color=INK,
     )

@@ -48,14 +48,18 @@ class Change:
     outputs : mapping of str to float
         max |Δy| over the largest |y| of the first, by output.
     poles : float
-        Largest |Δs|/|s| among the slow poles, paired so that the sum is least; NaN without any.
+        Largest |Δs| over the larger |s| of both among the slow poles, paired so that the sum is least: 1 where one
+        comes to rest or runs away, 2 at most; NaN without any.
     margins : float
         Largest relative change of a gain or phase margin; NaN without a linear loop.
+    pole : complex
+        The pole of the first answer that changes so [1/s]; NaN without any.
     """
 
     outputs: Mapping[str, float]
     poles: float
     margins: float
+    pole: complex = complex("nan")
 
     @property
     def outputs_worst(self) -> float:
@@ -121,7 +125,8 @@ def change_between(first: Answer, second: Answer) -> Change:
     Change
     """
     outputs = outputs_apart(first.run, second.run)
-    return Change(outputs, _poles_apart(first.poles, second.poles), _margins_apart(first.margins, second.margins))
+    poles, pole = _poles_apart(first.poles, second.poles)
+    return Change(outputs, poles, _margins_apart(first.margins, second.margins), pole)
 
 
 def outputs_apart(first: Run, second: Run) -> dict[str, float]:
@@ -146,14 +151,15 @@ def _apart(first: Run, second: Run, name: str) -> float:
     return float(gap / size) if size > 0.0 else float(gap > 0.0)
 
 
-def _poles_apart(first: np.ndarray, second: np.ndarray) -> float:
+def _poles_apart(first: np.ndarray, second: np.ndarray) -> tuple[float, complex]:
+    """The largest change of a pole, and which it is."""
     if not first.size or not second.size:
-        return np.nan
-    gaps = np.abs(first[:, None] - second[None, :]) / np.abs(first)[:, None]
+        return np.nan, complex("nan")
+    gaps = np.abs(first[:, None] - second) / np.maximum(np.abs(first)[:, None], np.abs(second))
     if gaps.shape[0] > gaps.shape[1]:  # poles that are gone
         gaps = np.hstack([gaps, np.ones((gaps.shape[0], gaps.shape[0] - gaps.shape[1]))])
-    pairs = linear_sum_assignment(gaps)
-    return float(gaps[pairs].max())
+    found = gaps[linear_sum_assignment(gaps)]
+    return float(found.max()), complex(first[int(np.argmax(found))])
 
 
 def _margins_apart(first: Mapping[str, tuple[float, float]], second: Mapping[str, tuple[float, float]]) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from time import thread_time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["Entry", "Ledger", "ledger"]
+
+_DEARER, _CHEAPER = 1.05, 0.95
+_LONG = 5.0
+_NOISE = 0.05
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,7 @@ class Entry:
     change : Change or None
         What the answer loses without it; None if the scene cannot be run without it.
     cost_ratio : float
-        Time of the full scene over the time without the effect, in the same process; NaN if it cannot be run.
+        Processor time of the full scene over that without the effect, in the same process; NaN if it cannot be run.
     size : Size or None
         Of the scene without it.
     keep : bool
@@ -94,8 +99,10 @@ class Ledger:
     minimal_change : Change
         Of the minimal set against the full one: interactions included.
     speedup : float
-        Time of the full scene over that of the minimal set.
+        Processor time of the full scene over that of the minimal set.
     minimal_size : Size
+    noise : float
+        Relative spread of the times of the full scene, run several times: smaller differences of times say nothing.
     scene : Scene
         The scene with the minimal set.
     """
@@ -109,7 +116,16 @@ class Ledger:
     minimal_change: Change
     speedup: float
     minimal_size: Size
+    noise: float
     scene: Subject = field(repr=False)
+
+    @property
+    def pace(self) -> str:
+        """How fast the minimal set is, in words: faster or slower where that was measured beyond the noise."""
+        factor = max(self.speedup, 1.0 / self.speedup)
+        if factor <= 1.0 + self.noise:
+            return "as fast"
+        return f"{factor:.1f} × {'faster' if self.speedup > 1.0 else 'slower'}"
 
     @property
     def minimal_set(self) -> tuple[str, ...]:
@@ -135,21 +151,23 @@ class Ledger:
 
     def __str__(self) -> str:
         wide = max([len(e.name) for e in self.entries], default=6)
-        heads = ("outputs", "poles", "margins", "time", "states", "nonzeros")
-        lines = [f"{'without':<{wide}}" + "".join(f"  {head:>9}" for head in heads)]
+        heads = ("outputs", "poles", "of pole", "margins", "time", "states", "nonzeros")
+        lines = [f"{'without':<{wide}}" + "".join(f"  {head:>{_width(head)}}" for head in heads)]
         lines += [self._line(e, wide) for e in self.entries]
         kept = ", ".join(self.minimal_set) or "nothing"
         change, asked = _percent(self.minimal_change.outputs_worst), _percent(self.tolerance)
         size = f"{self.minimal_size.states} of {self.size.states} states"
-        lines += [f"kept: {kept}", f"outputs within {change} (asked: {asked}), {self.speedup:.1f} × faster, {size}"]
+        lines += [f"kept: {kept}", f"outputs within {change} (asked: {asked}), {self.pace}, {size}"]
         return "\n".join(lines)
 
     def _line(self, e: Entry, wide: int) -> str:
         if e.change is None or e.size is None:
             return f"{e.name:<{wide}}  kept: {e.failure}"
-        changes = (_percent(c) for c in (e.change.outputs_worst, e.change.poles, e.change.margins))
-        cells = (*changes, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)
-        return (f"{e.name:<{wide}}" + "".join(f"  {c:>9}" for c in cells) + ("  keep" if e.keep else "")).rstrip()
+        outputs, poles, margins = (_percent(c) for c in (e.change.outputs_worst, e.change.poles, e.change.margins))
+        pole = f"{e.change.pole:.2g}" if e.change.poles > 0.0 else "–"
+        cells = [f"{c:>9}" for c in (margins, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)]
+        line = "  ".join([f"{e.name:<{wide}}", f"{outputs:>9}", f"{poles:>9}", f"{pole:>{_width('of pole')}}", *cells])
+        return line + ("  keep" if e.keep else "")
 
 
 def ledger(
@@ -163,7 +181,8 @@ def ledger(
 
     Every effect is left out in turn and the scene run again. What changes an output by no more than ``tolerance``
     is a candidate to go. All candidates are left out together; where they do more together than alone, they are
-    taken back, the weightiest first, until the answer holds. An effect whose absence makes the run dearer stays.
+    taken back, the weightiest first, until the answer holds. An effect whose absence makes the run dearer stays, and
+    so does a way to give that saves nothing: beams that are stiffer keep their freedoms.
 
     Parameters
     ----------
@@ -207,7 +226,12 @@ class _Trial:
     scene: Subject
     answer: Answer
     size: Size
-    wall: float
+    times: list[float]
+
+    def again(self) -> None:
+        """Run once more, unless that takes long: the first run may have compiled."""
+        if not self.times or self.times[0] < _LONG:
+            self.times.append(_timed(self.scene)[1])
 
 
 class _Auditor:
@@ -216,7 +240,7 @@ class _Auditor:
     def __init__(self, scene: Subject, tolerance: float, margins: float, progress: Callable[[float], None]) -> None:
         self.tolerance, self.margins, self.progress = tolerance, margins, progress
         self.items = omissions(scene)
-        self.done, self.expected = 0, 2 * len(self.items) + 4
+        self.done, self.expected = 0, 2 * len(self.items) + 5
         self.full = self._tried(scene)
 
     def drawn_up(self) -> Ledger:
@@ -225,8 +249,8 @@ class _Auditor:
         minimal = self._without(gone) if gone else self.full
         assert isinstance(minimal, _Trial)
         names = {o.name for o in gone}
+        self._measure([*trials.values(), minimal])
         entries = tuple(self._entry(o.name, trials[o.name], o.name not in names) for o in self.items)
-        speedup = self._ratio(minimal)
         self.progress(1.0)
         return Ledger(
             self.full.scene.name,
@@ -236,26 +260,31 @@ class _Auditor:
             self.full.size,
             minimal.answer,
             change_between(self.full.answer, minimal.answer),
-            speedup,
+            self._ratio(minimal),
             minimal.size,
+            self._noise,
             minimal.scene,
         )
 
     def _smallest(self, trials: dict[str, _Trial | str]) -> list[Omission]:
         """What may go, all at once."""
-        fit = [o for o in self.items if self._may_go(trials[o.name])]
+        fit = [o for o in self.items if self._may_go(o, trials[o.name])]
         fit.sort(key=lambda o: self._weight(trials[o.name]))
         while fit:
             together = self._without(fit)
-            if isinstance(together, _Trial) and self._holds(together):
+            if isinstance(together, _Trial) and self._holds(together) and self._work(together) <= _DEARER:
                 return fit
             fit.pop()
         return []
 
-    def _may_go(self, trial: _Trial | str) -> bool:
+    def _may_go(self, omission: Omission, trial: _Trial | str) -> bool:
         if not isinstance(trial, _Trial) or not self._holds(trial):
             return False
-        return trial.size.work <= 1.05 * self.full.size.work
+        return self._work(trial) <= (_DEARER if omission.spares else _CHEAPER)
+
+    def _work(self, trial: _Trial) -> float:
+        """Counted work over that of the full scene."""
+        return trial.size.work / max(self.full.size.work, 1e-300)
 
     def _weight(self, trial: _Trial | str) -> float:
         assert isinstance(trial, _Trial)
@@ -282,27 +311,43 @@ class _Auditor:
             return str(error).splitlines()[0]
 
     def _tried(self, scene: Subject) -> _Trial:
-        run = scene.run()
+        run, taken = _timed(scene)
         if run.status is Status.INTERRUPTED:
             raise KeyboardInterrupt
         if run.status is not Status.FINISHED:
             raise FlexctrlError(f"the run ended early: {run.report.message}")
-        trial = _Trial(scene, answer_of(scene, run), _size(scene, run), run.report.wall_s)
+        trial = _Trial(scene, answer_of(scene, run), _size(scene, run), [taken])
         self._tick()
         return trial
 
+    def _measure(self, trials: list[_Trial | str]) -> None:
+        """Time everything once more, the full scene before, amid and after."""
+        others = [t for t in trials if isinstance(t, _Trial) and t is not self.full]
+        middle = len(others) // 2
+        for trial in (self.full, *others[:middle], self.full, *others[middle:], self.full):
+            trial.again()
+            self._tick()
+
     def _ratio(self, trial: _Trial) -> float:
-        """Time of the full scene over that of another, run once more in turn; each by its quickest run."""
-        if trial is self.full:
-            return 1.0
-        for one in (self.full, trial):
-            one.wall = min(one.wall, one.scene.run().report.wall_s)
-        self._tick()
-        return self.full.wall / trial.wall
+        """Time of the full scene over that of another, each by its quickest run."""
+        return min(self.full.times) / min(trial.times)
+
+    @property
+    def _noise(self) -> float:
+        later = self.full.times[1:] or self.full.times
+        return max(_NOISE, max(later) / min(later) - 1.0)
 
     def _tick(self) -> None:
         self.done += 1
         self.progress(min(0.99, self.done / self.expected))
+
+
+def _timed(scene: Subject) -> tuple[Run, float]:
+    """A run and its processor time [s], which other processes hardly disturb."""
+    model = scene.model
+    began = thread_time()
+    run = scene.run(model)
+    return run, max(thread_time() - began, 1e-9)
 
 
 def _size(scene: Subject, run: Run) -> Size:
@@ -316,3 +361,7 @@ def _size(scene: Subject, run: Run) -> Size:
 
 def _percent(value: float) -> str:
     return "–" if not np.isfinite(value) else f"{100.0 * value:.3g} %"
+
+
+def _width(head: str) -> int:
+    return 14 if head == "of pole" else 9

@@ -82,10 +82,13 @@ class Omission:
     name : str
     without : callable
         Scene → the same without it.
+    spares : bool
+        Whether something is gone then, or only much stiffer.
     """
 
     name: str
     without: Callable[[Subject], Subject]
+    spares: bool = True
 
 
 def omissions(scene: Subject) -> tuple[Omission, ...]:
@@ -136,7 +139,7 @@ def _of_deforming(effect: Deforming, structure: Structure) -> list[Omission]:
     if len(parts) > 1:
         found = [Omission(f"{snake(kind)}_{p.name}", partial(_stiffened_part, kind, p.name)) for p in parts]
     if isinstance(effect, BeamFlexibility):
-        found += [Omission(f"beam_{name}", partial(_stiffened_section, name)) for name in _RIGIDITIES]
+        found += [Omission(f"beam_{name}", partial(_stiffened_section, name), spares=False) for name in _RIGIDITIES]
     return found
 
 

@@ -11,7 +11,7 @@ import flexctrl as fc
 from flexctrl.errors import StructureError
 from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
-from flexctrl.study.answers import answer_of, change_between
+from flexctrl.study.answers import Answer, answer_of, change_between
 
 
 def trolley(**changes) -> fc.Scene:
@@ -98,6 +98,29 @@ def test_leaving_out_flexibility_takes_states_away(drawn_up):
 
 
 @pytest.mark.slow
+def test_what_saves_nothing_stays():
+    """Torsion of a beam that nothing twists: the stiffer one has all its freedoms."""
+    beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), fc.Section.tube(fc.STEEL, 0.03, 0.002))
+    push, tip = fc.Force("push", beam.end, "z"), fc.Position("tip", beam.end, "z")
+    structure = fc.Structure([beam], [fc.Support(beam.start)], inputs=[push], outputs=[tip])
+    simulation = fc.Simulation(until=0.02, method=fc.GeneralizedAlpha(1e-3))
+    scene = fc.Scene(structure, effects=[fc.BeamFlexibility()], loads={"push": 10.0}, simulation=simulation)
+    entry = fc.ledger(scene, 0.02)["beam_torsion"]
+    assert entry.change.outputs_worst < 1e-6
+    assert entry.keep
+
+
+def test_a_pole_that_moves_far_is_named():
+    """Over the larger magnitude of both: one from near rest has changed wholly, not 70000 %."""
+    run = fc.simulate(trolley().model, until=0.01)
+    first, second = Answer(run, np.array([1e-3 + 0j, 2 + 3j])), Answer(run, np.array([-0.7 + 0j, 2 + 3j]))
+    change = change_between(first, second)
+    assert change.poles == pytest.approx(1.0, abs=2e-3)
+    assert change.pole == 1e-3
+    assert np.isnan(change_between(first, replace(first, poles=np.zeros(0))).pole)
+
+
+@pytest.mark.slow
 def test_margins_can_be_held_too(scene):
     held = fc.ledger(scene, 0.01, margin_tolerance=1e-12)
     for entry in held.entries:
@@ -109,7 +132,10 @@ def test_margins_can_be_held_too(scene):
 def test_its_words_and_picture(drawn_up):
     text = str(drawn_up)
     assert "rope_stretch" in text
-    assert "× faster" in text
+    assert replace(drawn_up, speedup=2.0, noise=0.2).pace == "2.0 × faster"
+    assert replace(drawn_up, speedup=0.5, noise=0.2).pace == "2.0 × slower"
+    assert replace(drawn_up, speedup=1.3, noise=0.4).pace == replace(drawn_up, speedup=0.8, noise=0.4).pace == "as fast"
+    assert drawn_up.noise > 0.0
     figure = drawn_up.plot()
     assert len(figure.axes) == 2
 
