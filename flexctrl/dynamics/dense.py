@@ -16,7 +16,7 @@ from flexctrl.dynamics.steps import Point, Stepper
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
-__all__ = ["Curve", "Dense", "Hermite", "Track", "curves_of"]
+__all__ = ["Booked", "Curve", "Dense", "Hermite", "Track", "curves_of"]
 
 
 class Curve(Protocol):
@@ -69,6 +69,14 @@ class Hermite:
         place = s * (first + s * (bend + s * twist))
         rate = (first + s * (2.0 * bend + s * 3.0 * twist))[: len(turning)] / h
         return self.local.place(self.start, place, rate + s * s * turning, t)
+
+
+@runtime_checkable
+class Booked(Protocol):
+    """A curve that knows what was turned over on it."""
+
+    def turned_over(self) -> tuple[float, float] | None:
+        """Return the work of the inputs and what was dissipated [J]; None where that is to be integrated."""
 
 
 def curves_of(model: Model, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:

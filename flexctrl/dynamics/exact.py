@@ -17,6 +17,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.modal_equations import closed, opened
 from flexctrl.dynamics.propagator import NODES, Propagator
+from flexctrl.dynamics.quadratic import Turnover
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
@@ -109,6 +110,7 @@ class _Stepper:
             self.closed = self.feed.continuous
             self.equations = closed(self.equations, self.model, self.feed) if self.closed else self.equations
         self.propagator = Propagator(self.equations.first)
+        self.turnover = Turnover(self.model, self.equations)
 
     def recall(self, memory: None) -> None:
         """There is nothing to go on from but the point."""
@@ -249,3 +251,11 @@ class _Curve:
         """Return the state at a time of the step."""
         h = self.after.state.t - self.before.state.t
         return self.stepper.at(self.before, self.after.course, (t - self.before.state.t) / h, h)
+
+    def turned_over(self) -> tuple[float, float] | None:
+        """Return work of the inputs and losses over the step where the equations' own inputs are held."""
+        course = self.after.course
+        if course[1:].any() or (self.stepper.feed.continuous and not self.stepper.closed):
+            return None
+        w = self.stepper._inputs(self.before.supply.u)
+        return self.stepper.turnover.over(self.before.modal, w, self.after.state.t - self.before.state.t)
