@@ -15,7 +15,7 @@ from flexctrl.linear.banded import Band, band_of
 from flexctrl.linear.eigen import coordinate_scales
 from flexctrl.linear.massless import DENSE_BLOCK, Massless, as_dense, massless, pivots, solved
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.pattern import congruent, mirror, symmetric
+from flexctrl.linear.pattern import asymmetry, congruent, mirror, symmetric
 from flexctrl.linear.words import motions_in_words
 
 __all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map"]
@@ -98,9 +98,9 @@ class Scaled:
 
     @cached_property
     def stiffness(self) -> tuple[sp.csc_matrix, float]:
-        """The symmetric part of K, and the largest entry of the rest relative to K's largest."""
+        """The symmetric part of K, and the largest entry of K − Kᵀ relative to the stiffnesses it stands between."""
         even, gap = symmetric(self.model.K, self._across)
-        return even, gap / max(float(np.abs(even.data).max(initial=0.0)), np.finfo(float).tiny)
+        return even, asymmetry(self.model.K, even) if gap else 0.0
 
     @cached_property
     def mass(self) -> sp.csc_matrix:
@@ -155,10 +155,11 @@ def scaled(linear: LinearModel) -> Scaled:
     MechanismError
         For a motion with neither mass nor stiffness (nor damping), by coordinate names.
     LinearizationError
-        For a motion without mass on negative stiffness: as its mass vanishes it runs away ever faster.
+        For a motion without mass on negative stiffness: as its mass vanishes it runs away ever faster; and for one
+        that velocities of others push.
     """
     result = linear._scaled
-    loose, falling = result.massless.mechanisms, result.massless.falling
+    loose, falling, pushed = result.massless.mechanisms, result.massless.falling, result.massless.pushed
     if loose.shape[1]:
         raise MechanismError(
             f"{loose.shape[1]} motion(s) with neither mass nor stiffness: {_told(loose, linear, result.scales)}. "
@@ -169,6 +170,11 @@ def scaled(linear: LinearModel) -> Scaled:
             f"{falling.shape[1]} motion(s) without mass on negative stiffness (buckled, or upside down): "
             f"{_told(falling, linear, result.scales)}. As mass vanishes they run away ever faster, so there is no "
             "model without it: give them mass, take load off, or linearise about a stable equilibrium."
+        )
+    if pushed.shape[1]:
+        raise LinearizationError(
+            f"{pushed.shape[1]} motion(s) without mass and without damping of their own, which velocities of others "
+            f"push: {_told(pushed, linear, result.scales)}. Give them inertia (rhoJ of a section) or damping."
         )
     return result
 

@@ -42,12 +42,15 @@ class Massless:
         Neither mass, damping nor stiffness.
     falling : scipy.sparse.csc_matrix, shape (n, f)
         Static ones of negative stiffness, as of a buckled column: the less mass, the faster they run away.
+    pushed : scipy.sparse.csc_matrix, shape (n, p)
+        Static ones that velocities of others push (gyroscopic): they would need the derivative of the inputs.
     """
 
     static: sp.csc_matrix
     relaxing: sp.csc_matrix
     mechanisms: sp.csc_matrix
     falling: sp.csc_matrix
+    pushed: sp.csc_matrix
 
     @property
     def every(self) -> sp.csc_matrix:
@@ -74,28 +77,25 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix, band: Band | 
     Raises
     ------
     LinearizationError
-        If M is not positive semidefinite, or a massless freedom without damping of its own is pushed by
-        velocities of others (gyroscopic), which would need the derivative of the inputs.
+        If M is not positive semidefinite.
     """
     if _heavy(M, band):
         none = sp.csc_matrix((M.shape[0], 0))
-        return Massless(none, none, none, none)
+        return Massless(none, none, none, none, none)
     null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
     if not null.shape[1]:
-        return Massless(null, null, null, null)
+        return Massless(null, null, null, null, null)
     own = _restricted(C, null)
     undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK)
     static, relaxing = null @ undamped, null @ damped
-    if static.shape[1] and max(_peak(C @ static), _peak(C.T @ static)) > 1e-11 * _peak(C):
-        raise LinearizationError(
-            "a massless freedom without damping of its own is moved by velocities of others; give it inertia or damping"
-        )
+    push = np.maximum(*(abs(A @ static).max(axis=0).toarray().ravel() for A in (C, C.T)))
+    pushed = static[:, push > 1e-11 * _peak(C)]
     held = _restricted(K, static)
     free, _ = null_split(held, STIFFNESS_RANK, size=_size(K, static).diagonal())
     if relaxing.shape[1] and static.shape[1] and not free.shape[1]:
         relaxing = relaxing - static @ solved(static.T @ K @ static, static.T @ K @ relaxing)
     down = sp.csc_matrix((held.shape[0], 0)) if free.shape[1] else _downhill(held)
-    return Massless(*(sp.csc_matrix(basis) for basis in (static, relaxing, static @ free, static @ down)))
+    return Massless(*(sp.csc_matrix(basis) for basis in (static, relaxing, static @ free, static @ down, pushed)))
 
 
 def null_split(

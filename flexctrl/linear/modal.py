@@ -9,7 +9,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError
-from flexctrl.linear.condense import Scaled, refuse_improper, scaled
+from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled
 from flexctrl.linear.massless import solved
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, ROUND_OFF, Modes, modes_of, refuse_unsymmetric
@@ -96,6 +96,8 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
             f"a complete modal form of {len(linear.coordinates)} freedoms is too much; give modes(count) or "
             "reduce the model first"
         )
+    if modes is None and linear._scaled.stiffness[1] > ROUND_OFF:
+        linear = condense(linear)
     even = _with_even_stiffness(linear)
     base = scaled(even)
     chosen = modes_of(even, base, None) if modes is None else modes

@@ -7,9 +7,10 @@ import copy
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["aligned", "congruent", "mirror", "symmetric", "with_entries"]
+__all__ = ["aligned", "asymmetry", "congruent", "mirror", "symmetric", "with_entries"]
 
 SMALL = 200
+ROUNDED = 1e-3
 
 
 def aligned(*matrices: sp.spmatrix) -> tuple[sp.csc_matrix, ...]:
@@ -110,6 +111,28 @@ def symmetric(A: sp.csc_matrix, across: np.ndarray | None = None) -> tuple[sp.cs
         over = A.data[across]
     gap = float(np.abs(A.data - over).max(initial=0.0))
     return (A if gap == 0.0 else with_entries(A, 0.5 * (A.data + over))), gap
+
+
+def asymmetry(A: sp.csc_matrix, even: sp.csc_matrix) -> float:
+    """Largest entry of A − Aᵀ, each relative to the diagonal entries in its row and column.
+
+    Stiff members that are light must not hide that soft and heavy ones are loaded by forces without a potential.
+
+    Parameters
+    ----------
+    A, even : scipy.sparse.csc_matrix, shape (n, n)
+        The latter ½ (A + Aᵀ).
+
+    Returns
+    -------
+    float
+    """
+    odd = sp.coo_matrix(A - A.T)
+    own = np.abs(even.diagonal())
+    size = np.where(own > 0.0, own, abs(even).max(axis=1).toarray().ravel())
+    one, other = size[odd.row], size[odd.col]
+    between = np.maximum(np.sqrt(one * other), ROUNDED * np.maximum(one, other))
+    return float((np.abs(odd.data) / np.maximum(between, np.finfo(float).tiny)).max(initial=0.0))
 
 
 def _columns(A: sp.spmatrix) -> sp.csc_matrix:
