@@ -233,9 +233,9 @@ def _rate_limited(law: RateLimited, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
     import casadi as ca
 
     n = x.numel() - len(law.outputs)
-    wish, after = tracer.of(law.controller, x[:n], y)
+    wish, after = tracer.of(law.controller, x[:n, :], y)
     down, up = (tracer.number(change) for change in law.changes)
-    u = _clipped(wish, x[n:] + down, x[n:] + up)
+    u = _clipped(wish, x[n:, :] + down, x[n:, :] + up)
     return u, ca.vertcat(after, u)
 
 
@@ -244,8 +244,8 @@ def _delayed(law: Delayed, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
 
     width = len(law.outputs)
     n = x.numel() - law.samples * width
-    u, after = tracer.of(law.controller, x[:n], y)
-    return (x[n : n + width], ca.vertcat(after, x[n + width :], u)) if law.samples else (u, after)
+    u, after = tracer.of(law.controller, x[:n, :], y)
+    return (x[n : n + width, :], ca.vertcat(after, x[n + width :, :], u)) if law.samples else (u, after)
 
 
 def _quantised(law: Quantised, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
@@ -317,7 +317,7 @@ def _together(law: Together, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
 
     u, after = ca.SX.zeros(len(law.outputs)), []
     for part, own, reads, writes in law.places:
-        command, state = tracer.of(part, x[own], y[reads.tolist()])
+        command, state = tracer.of(part, x[own, :], y[reads.tolist(), :])
         for i, place in enumerate(writes.tolist()):
             u[place] = u[place] + command[i]
         after.append(state)
