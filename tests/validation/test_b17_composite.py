@@ -2,8 +2,9 @@
 
 The section of A5, coupled in bending and torsion; generalised alpha of 5 ms with ρ = 0, as in the source. The source's
 numbers are those of one spectral element with 5 nodes: written again here from its equations (`spectral_rod`), that
-element gives them to 3e-5 of the largest, and with 7 nodes it is up to 3.6 % elsewhere from 0.2 s on. Against the 7 nodes, that
-is without the error of the source's mesh, ours are within 1 % throughout; against the 5 nodes over the first bend.
+element gives them to 3e-5 of the largest, and with 7 nodes it is up to 3.6 % elsewhere from 0.2 s on. Against the 7
+nodes, that is without the error of the source's mesh, ours are within 1 % throughout; against the 5 nodes over the
+first bend.
 """
 
 from __future__ import annotations
