@@ -29,7 +29,7 @@ def crane() -> fc.Model:
 def both(model: fc.Model, monkeypatch: pytest.MonkeyPatch, **how) -> tuple[fc.dynamics.run.Run, fc.dynamics.run.Run]:
     told = fc.simulate(model, **how)
     with monkeypatch.context() as patch:
-        patch.setattr("flexctrl.dynamics.feed.lowered", lambda law: None)
+        patch.setattr("flexctrl.design.lowering.lowered", lambda law: None)
         return told, fc.simulate(model, **how)
 
 
