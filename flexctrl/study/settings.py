@@ -21,7 +21,7 @@ from flexctrl.study.omissions import Subject
 
 __all__ = ["Fidelity", "Setting", "sweep"]
 
-_MODES = 3
+_MODES = 1
 
 
 def _rigid(effects: Sequence[Effect]) -> list[Effect]:

@@ -37,7 +37,7 @@ class Point:
     error : float
         Largest |Δy| of an output over its largest magnitude in the reference; infinite if the run failed.
     time_ratio : float
-        Time of the run over that of a fixed calculation in the same process; infinite if the run failed.
+        Processor time of the run over that of a fixed calculation in the same process; infinite if the run failed.
     steps : int
     failure : str
         Why the run ended early; empty if it did not.
@@ -200,9 +200,10 @@ class _Study:
             scene = setting.of(self.scene)
             runs, times = [], []
             for _ in range(_REPEATS):
-                unit = calibration()
+                unit, began = calibration(), time.process_time()
                 runs.append(finished(scene))
-                times.append(runs[-1].report.wall_s / min(unit, calibration()))
+                took = time.process_time() - began
+                times.append(took / min(unit, calibration()))
         except FlexctrlError as error:
             return Point(setting, np.inf, np.inf, 0, str(error).splitlines()[0])
         return Point(setting, error_of(reference.run, runs[0]), min(times), runs[0].report.steps)
@@ -227,14 +228,14 @@ class _Study:
 
 
 def calibration() -> float:
-    """Return the time of a fixed calculation [s]: small dense solves, as runs are made of."""
+    """Return the processor time of a fixed calculation [s]: small dense solves, as runs are made of."""
     A = np.eye(40) + 0.01 * np.arange(1600.0).reshape(40, 40) % 0.7
     b: np.ndarray = np.ones(40)
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in range(100):
         b = np.linalg.solve(A, b)
         b = b / np.abs(b).max()
-    return time.perf_counter() - began
+    return time.process_time() - began
 
 
 class _Store:

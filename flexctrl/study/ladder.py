@@ -1,0 +1,230 @@
+"""The fidelity ladder: one scene under ever more physics, what each rung is worth and what it costs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.exact import Exact
+from flexctrl.dynamics.run import Run, Tolerance
+from flexctrl.dynamics.steps import Integrator
+from flexctrl.errors import FlexctrlError, StructureError
+from flexctrl.study.omissions import Subject
+from flexctrl.study.reference import Reference, certified, error_of, finished
+from flexctrl.study.settings import Fidelity, Setting, sweep
+from flexctrl.study.work_precision import calibration
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Ladder", "Rung", "ladder", "rungs"]
+
+_REPEATS = 3
+_FINER = 2
+_STEPS = 1000
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A scene at one fidelity.
+
+    Attributes
+    ----------
+    name : str
+        ``rigid``, ``rigid, shafts``, ``linear``, ``component modes``, ``full`` or ``refined``.
+    setting : Setting
+    error : float
+        Largest |Δy| of an output over its largest magnitude in the reference; infinite if the run failed.
+    time_ratio : float
+        Processor time of the run over that of a fixed calculation in the same process; infinite if it failed.
+    freedoms, steps : int
+    failure : str
+        Why the run ended early; empty if it did not.
+    """
+
+    name: str
+    setting: Setting
+    error: float
+    time_ratio: float
+    freedoms: int
+    steps: int
+    failure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """A scene from rigid to refined.
+
+    Attributes
+    ----------
+    name : str
+    rungs : tuple of Rung
+        From the least physics to the most; what changes nothing of the scene is left out.
+    reference : Reference
+        What errors are measured against.
+    """
+
+    name: str
+    rungs: tuple[Rung, ...]
+    reference: Reference
+
+    def __getitem__(self, name: str) -> Rung:
+        for rung in self.rungs:
+            if rung.name == name:
+                return rung
+        raise StructureError(f"the ladder has no rung {name!r}; it has {', '.join(r.name for r in self.rungs)}")
+
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """How many times faster each rung is than the next: one fewer than there are rungs."""
+        return tuple(b.time_ratio / a.time_ratio for a, b in pairwise(self.rungs))
+
+    def plot(self) -> Figure:
+        """Draw error against time, rung by rung.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from flexctrl.plots.ladder import ladder_figure
+
+        return ladder_figure(self)
+
+    def __str__(self) -> str:
+        wide = max(len(r.name) for r in self.rungs)
+        lines = [f"{'rung':<{wide}}  {'freedoms':>8}  {'steps':>7}  {'error':>9}  {'time':>8}  {'next takes':>10}"]
+        for rung, gain in zip(self.rungs, (*self.gains, np.nan), strict=True):
+            if rung.failure:
+                lines.append(f"{rung.name:<{wide}}  {rung.failure}")
+                continue
+            told = f"{rung.freedoms:>8}  {rung.steps:>7}  {rung.error:9.2e}  {rung.time_ratio:8.3g}"
+            beyond = f"  {f'{gain:.1f} ×':>10}" if np.isfinite(gain) else ""
+            lines.append(f"{rung.name:<{wide}}  {told}{beyond}")
+        return "\n".join([*lines, f"reference: {self.reference.setting}; known to {self.reference.uncertainty:.1e}"])
+
+
+def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
+    """Return the rungs that a scene has, by name, from the least physics to the most.
+
+    Every rung is run as the scene is, but for the linear one, which is integrated exactly, and the refined one: twice
+    the elements, half the steps or an eighth of the tolerance.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    tuple of (str, Setting)
+    """
+    method, tolerance = scene.simulation.method or AdaptiveAlpha(), scene.simulation.tolerance
+    found = [(s.fidelity.value, s) for s in sweep(scene, meshes=(1,), methods=[(method, tolerance)])]
+    exact = Exact(_spacing(scene))
+    named = [(n, replace(s, method=exact) if s.fidelity is Fidelity.LINEAR else s) for n, s in found]
+    return (*named, ("refined", Setting(Fidelity.FULL, _FINER, *_finer(method, tolerance))))
+
+
+def _spacing(scene: Subject) -> float:
+    """Where the exact motion is looked at: at samples of the controller, else where results are wanted."""
+    plan = scene.simulation
+    sample = scene.law.sample_time if scene.law is not None else 0.0
+    return float(sample or plan.every or plan.until / _STEPS)
+
+
+def _finer(method: Integrator, tolerance: Tolerance) -> tuple[Integrator, Tolerance]:
+    if isinstance(method, GeneralizedAlpha):
+        return replace(method, step=0.5 * method.step), tolerance
+    return method, Tolerance(tolerance.relative / 8.0, tolerance.absolute / 8.0)
+
+
+def ladder(
+    scene: Subject,
+    *,
+    rungs: Sequence[tuple[str, Setting]] = (),
+    tolerance: float = 0.01,
+    progress: Callable[[float], None] | None = None,
+) -> Ladder:
+    """Run a scene at every fidelity: rigid, with elastic shafts, linear, component modes, full, refined.
+
+    All are the same scene with other effects. Errors are against a certified reference, finer than the refined rung.
+    Times are the shortest of several runs, taken in turn, over that of a fixed calculation made in between.
+
+    Parameters
+    ----------
+    scene : Scene
+    rungs : sequence of (str, Setting)
+        Names and settings; default: `rungs` of the scene.
+    tolerance : float
+        The reference is to be known to a third of this, relative to each output's largest magnitude.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Returns
+    -------
+    Ladder
+
+    Raises
+    ------
+    StructureError
+        For a tolerance that is not positive, or a scene without a simulation.
+    FlexctrlError
+        If the reference cannot be certified; see `work_precision`.
+    """
+    if not tolerance > 0.0:
+        raise StructureError(f"ladder: tolerance = {tolerance}; expected a relative error > 0, e.g. 0.01")
+    if scene.simulation is None:
+        raise StructureError(f"ladder: scene {scene.name!r} has no simulation; give at least until = … (seconds)")
+    every = scene.simulation.every or scene.simulation.until / _STEPS
+    base = scene.with_(controller=scene.law, simulation=replace(scene.simulation, every=every, rigid_twin=False))
+    chosen, tell = tuple(rungs) or _rungs(base), progress or (lambda done: None)
+    reference = certified(base, [setting for _, setting in chosen], tolerance)
+    tried = [_Tried(name, setting, setting.of(base)) for name, setting in chosen]
+    for i in range(_REPEATS):
+        for k, one in enumerate(tried):
+            tell((1.0 + i * len(tried) + k) / (1.0 + _REPEATS * len(tried)))
+            one.again()
+    tell(1.0)
+    return Ladder(base.name, tuple(one.rung(reference) for one in tried), reference)
+
+
+_rungs = rungs
+
+
+@dataclass
+class _Tried:
+    """A rung that is being tried."""
+
+    name: str
+    setting: Setting
+    scene: Subject
+    run: Run | None = None
+    time: float = np.inf
+    failure: str = ""
+
+    def again(self) -> None:
+        """Run it once more, unless it cannot be."""
+        if self.failure:
+            return
+        try:
+            if self.run is None:
+                self.run = finished(self.scene)  # compiles what is new
+            unit = calibration()
+            began = time.process_time()
+            finished(self.scene)
+            took = time.process_time() - began
+            self.time = min(self.time, took / min(unit, calibration()))
+        except FlexctrlError as error:
+            self.failure = str(error).splitlines()[0]
+
+    def rung(self, reference: Reference) -> Rung:
+        """What was found."""
+        if self.failure or self.run is None:
+            return Rung(self.name, self.setting, np.inf, np.inf, self.scene.model.n, 0, self.failure)
+        error, report = error_of(reference.run, self.run), self.run.report
+        return Rung(self.name, self.setting, error, self.time, report.dofs, report.steps)
