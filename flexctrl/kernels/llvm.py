@@ -77,6 +77,8 @@ def best_lanes(n: int) -> int:
     A block of 8 (AVX-512) takes as long as 1.75 blocks of 4, measured on a beam element: divisions and
     the moves of gathered entries take their time for each item.
     """
+    if n == 1:
+        return 1
     features = _host_features()
     if features.get("avx512vl") and 1.75 * -(-n // 8) < -(-n // 4):
         return 8

@@ -10,7 +10,7 @@ import numpy as np
 from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch
-from flexctrl.mechanics.matrices import bending, coupling, plane_masses
+from flexctrl.mechanics.matrices import beam_mass, bending, coupling, plane_masses
 from flexctrl.model import kinds
 from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
@@ -82,7 +82,7 @@ def families_of(
         _beams(kinds.BEAM, structure, effects, [b for b in bent if not b.section.shears], rigid),
         _beams(kinds.SHEARING_BEAM, structure, effects, [b for b in bent if b.section.shears], rigid),
         *modal,
-        _beams(kinds.BEAM, structure, stiff, [b for b in beams if b.name in rigid], rigid),
+        _rigid_beams(structure, stiff, [b for b in beams if b.name in rigid]),
         lines_family(kinds.SPRING, structure, effects, springs),
         lines_family(kinds.ROPE, structure, effects, ropes),
         lines_family(kinds.HEAVY_ROPE, structure, effects, [p for p in heavy if p.name not in rigid]),
@@ -148,6 +148,22 @@ def _beams(
     parameters = [_beam_parameters(b, b.length * (j - i) / b.elements)[: kind.parameters] for b, i, j in spans]
     numbers = first + np.arange(len(spans) * kind.drives)
     return _family(kind, effects, [b.name for b, _, _ in spans], nodes, parameters, numbers)
+
+
+def _rigid_beams(s: Structure, effects: tuple[Effect, ...], beams: list[Beam]) -> Family:
+    nodes = [[s.number(b.start), s.number(b.end)] for b in beams]
+    rows = [[b.section.rhoA * b.length, *_inertia(b)[((0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2))].tolist()] for b in beams]
+    return _family(kinds.RIGID_BEAM, effects, [b.name for b in beams], nodes, rows)
+
+
+def _inertia(b: Beam) -> np.ndarray:
+    """The inertia of a rigid beam about its middle: its element's mass matrix on a turn."""
+    turn = np.zeros((12, 3))
+    turn[3:6] = turn[9:12] = np.eye(3)
+    for first, sign in ((0, -0.5), (6, 0.5)):
+        turn[first + 1, 2], turn[first + 2, 1] = sign * b.length, -sign * b.length
+    local = turn.T @ beam_mass(b.section, b.length) @ turn
+    return b.axes @ local @ b.axes.T
 
 
 def _beam_parameters(b: Beam, length: float) -> list[float]:

@@ -342,6 +342,20 @@ def _body(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     return Shares(pieces.body_inertia(seen_outside(effects, node), p), force, pieces.body_energy(node, p), stored)
 
 
+def _rigid_beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    """A body at the middle of two nodes that turn together."""
+    import casadi as ca
+
+    first, second = nodes
+    middle = replace(first, x=0.5 * (first.x + second.x), v=0.5 * (first.v + second.v), a=0.5 * (first.a + second.a))
+    shares = _body(effects, [middle], slot, parameters)
+
+    def spread(force: ca.SX) -> ca.SX:
+        return ca.vertcat(0.5 * force[:3], 0.5 * force[3:], 0.5 * force[:3], 0.5 * force[3:])
+
+    return replace(shares, inertia=spread(shares.inertia), force=spread(shares.force))
+
+
 def _point(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
     shares = _body(effects, nodes, slot, parameters)
     return Shares(shares.inertia[:3], shares.force[:3], shares.kinetic, shares.stored)
@@ -391,6 +405,7 @@ SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
 ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
 HEAVY_ROPE = Kind("heavy_rope", 2, 3, 0, len(pieces.LINE_PARAMETERS) + 1, _heavy_rope)
 POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)
+RIGID_BEAM = Kind("rigid_beam", 2, 6, 0, len(pieces.BODY_PARAMETERS), _rigid_beam)
 BODY = Kind("body", 1, 6, 0, len(pieces.BODY_PARAMETERS), _body)
 ROTARY_DRIVE = Kind("rotary_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _rotary)
 LINEAR_DRIVE = Kind("linear_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _linear)

@@ -89,6 +89,12 @@ class Linkage(OpenLinkage):
             _kernel("driven", *self._driving),
         )
 
+    def _squared(self, node: int, R: ca.SX) -> ca.SX:
+        """Return a rotation freed of round-off drift; one that never changes has none."""
+        import casadi as ca
+
+        return R if ca.is_equal(R, _rotation(self._pose[:, node]), 2) else _orthonormal(R)
+
     @property
     def _placing(self) -> Terms:
         return [self._pose, self._rate], self._closed_place()
@@ -260,8 +266,17 @@ class Linkage(OpenLinkage):
 
         if not self.loops:
             return rate
+        if self.idle:
+            return ca.vertcat(rate, ca.SX.zeros(len(self.loops)))
         onto, within = self._loop_slopes(pose)
         return ca.vertcat(rate, -ca.solve(within, onto @ rate))
+
+    @cached_property
+    def idle(self) -> bool:
+        """Whether no independent freedom opens a loop, wherever it is: the dependent ones stay as they are."""
+        import casadi as ca
+
+        return bool(self.loops) and not ca.sparsify(self._loop_slopes(self._pose)[0]).nnz()
 
     def _closed_place(self) -> ca.SX:
         """Return the new pose; the dependent steps are found by Newton's method with the slopes after a first guess.
@@ -274,6 +289,8 @@ class Linkage(OpenLinkage):
         if not self.loops:
             return self._open_place(old, step)
         dependent = self._all(old, step)[self.free :]
+        if self.idle:
+            return self._open_place(old, ca.vertcat(step, dependent))
         _, within = self._loop_slopes(ca.reshape(self._open_place(old, ca.vertcat(step, dependent)), 12, self.count))
         for _ in range(_CLOSING):
             dependent = dependent - ca.solve(within, self._gaps(self._open_place(old, ca.vertcat(step, dependent))))

@@ -59,7 +59,7 @@ def closing_of(F: Flattened) -> Closing:
     """Return the loops of a model."""
     motion, base = F.model.motion, F.model.motion.linkage
     loops, free = len(base.loops) if F.model.large else 0, base.free
-    if not loops:
+    if not loops or base.idle:
         empty, none = np.zeros(0), np.zeros(0, dtype=int)
         return Closing(0, 0, 0, (), empty, empty, none, empty, 0.0)
     pose = (NODE_SLOT * motion.nodes[:, None] + np.arange(12)).ravel()
