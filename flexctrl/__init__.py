@@ -105,6 +105,7 @@ _HOMES = {
     "flexctrl.study.root_locus": ("CriticalGain", "RootLocus", "critical_gains", "root_locus"),
     "flexctrl.study.zeros": ("SensorChoice", "Zeros", "sensor_choices", "zeros"),
     "flexctrl.study.compare": ("Comparison", "compare"),
+    "flexctrl.study.ladder": ("Ladder", "ladder"),
     "flexctrl.study.ledger": ("Ledger", "ledger"),
     "flexctrl.study.settings": ("Fidelity", "Setting", "sweep"),
     "flexctrl.study.work_precision": ("WorkPrecision", "work_precision"),

@@ -82,6 +82,12 @@ COMMANDS = {
         "flexctrl cost examples/ceiling_crane.toml --tolerance 0.01 --out results",
         ("tolerance",),
     ),
+    "ladder": Command(
+        "flexctrl.cli.ladder",
+        "the scene from rigid to refined: error and time of each rung of physics",
+        "flexctrl ladder examples/ceiling_crane.toml --out results",
+        ("tolerance",),
+    ),
     "report": Command(
         "flexctrl.cli.report",
         "one self-contained HTML page: machine, modes, loops, runs, ledger, cost, versions",

@@ -9,23 +9,24 @@ the run.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_plant import LinearPlant
-from flexctrl.dynamics.modal_equations import closed, opened
+from flexctrl.dynamics.modal_equations import ModalEquations, closed, opened
 from flexctrl.dynamics.propagator import NODES, Propagator
 from flexctrl.dynamics.quadratic import Turnover
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
-from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
+from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, Stepper, check_step
 from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 
-__all__ = ["Exact"]
+__all__ = ["Exact", "ExactStepper", "ModalPoint"]
 
 _SWEEPS = 30
 _SETTLED = 1e-13
@@ -74,17 +75,31 @@ class Exact:
     def pace(self) -> Fixed:
         return Fixed(self.step)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
+    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper[Any]:
         if model.large:
             raise StructureError(
                 "Exact: this model moves far (LargeRotation), its equations are not linear; give linearize(model), a "
                 "model without LargeRotation, or another method"
             )
-        return _Stepper(model, feed, tolerance)
+        from flexctrl.dynamics.march.leaps import LeapingStepper
+        from flexctrl.dynamics.march.marching import can_march
+
+        plain = ExactStepper(model, feed, tolerance)
+        marched: Any = LeapingStepper(plain)
+        return marched if can_march(model) and not feed.continuous else plain
+
+
+def _modal(model: Model) -> tuple[ModalEquations, Propagator]:
+    """The modal form of a model and its exponentials, worked out once."""
+    found = model.__dict__.get("_modal")
+    if found is None:
+        equations = opened(model)
+        found = model.__dict__["_modal"] = equations, Propagator(equations.first)
+    return found
 
 
 @dataclass(frozen=True)
-class _Point(Point):
+class ModalPoint(Point):
     """A point with its modal state, and the inputs over the step that led to it: powers of the share done."""
 
     modal: np.ndarray
@@ -92,7 +107,7 @@ class _Point(Point):
 
 
 @dataclass
-class _Stepper:
+class ExactStepper:
     """Steps of a modal form."""
 
     model: Model
@@ -105,55 +120,56 @@ class _Stepper:
 
     def __post_init__(self) -> None:
         self.yard = yardsticks(self.model)
-        self.equations, self.closed = opened(self.model), False
+        (self.equations, self.propagator), self.closed = _modal(self.model), False
         if isinstance(self.model, LinearPlant) and isinstance(self.feed.controller, LinearController):
             self.closed = self.feed.continuous
-            self.equations = closed(self.equations, self.model, self.feed) if self.closed else self.equations
-        self.propagator = Propagator(self.equations.first)
+            if self.closed:
+                self.equations = closed(self.equations, self.model, self.feed)
+                self.propagator = Propagator(self.equations.first)
         self.turnover = Turnover(self.model, self.equations)
 
     def recall(self, memory: None) -> None:
         """There is nothing to go on from but the point."""
         return
 
-    def start(self, state: State, supply: Supply, step: float) -> _Point:
+    def start(self, state: State, supply: Supply, step: float) -> ModalPoint:
         """Return the point of a state; what no mass holds goes where its forces balance."""
         e, n, z = self.equations, self.model.n, supply.x if self.closed else np.zeros(0)
-        known = np.append(state.q, state.v) - e.first.D @ self._inputs(supply.u) - e.first.C[:, e.modes :] @ z
+        known = np.append(state.q, state.v) - e.first.D @ self.forcing(supply.u) - e.first.C[:, e.modes :] @ z
         modal = np.linalg.lstsq(e.first.C[:, : e.modes], known, rcond=None)[0] if n else np.zeros(0)
-        return self._point(state, np.append(modal, z), supply, state.t)
+        return self.point(state, np.append(modal, z), supply, state.t)
 
-    def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
+    def renew(self, point: ModalPoint, supply: Supply, step: float) -> ModalPoint:
         """Return the point under other inputs."""
-        return self._point(point.state, point.modal, supply, point.state.t)
+        return self.point(point.state, point.modal, supply, point.state.t)
 
-    def step(self, point: _Point, h: float) -> _Point:
+    def step(self, point: ModalPoint, h: float) -> ModalPoint:
         """Return the point a step later."""
         t = point.state.t + h
         if self.feed.continuous and not self.closed:
             return self._collocated(point, h)
         course = np.zeros((4, len(self.equations.first.B[0])))
-        course[0] = self._inputs(point.supply.u)
-        return self._point(point.state, self._modal(point, course, h, h), point.supply, t, course)
+        course[0] = self.forcing(point.supply.u)
+        return self.point(point.state, self._modal(point, course, h, h), point.supply, t, course)
 
-    def _modal(self, point: _Point, course: np.ndarray, t: float, h: float) -> np.ndarray:
+    def _modal(self, point: ModalPoint, course: np.ndarray, t: float, h: float) -> np.ndarray:
         """The modal state a time t after a point, under inputs that are a polynomial over h."""
         transition, powers = self.propagator.over(t, h)
         return transition @ point.modal + np.einsum("kij,kj->i", powers, course)
 
-    def _inputs(self, u: np.ndarray) -> np.ndarray:
+    def forcing(self, u: np.ndarray) -> np.ndarray:
         return np.append(self.feed.base if self.closed else u, 1.0)
 
-    def _point(
+    def point(
         self, before: State, modal: np.ndarray, supply: Supply, t: float, course: np.ndarray | None = None
-    ) -> _Point:
+    ) -> ModalPoint:
         """The point of a modal state under inputs; in a closed loop these follow from it."""
-        e, w = self.equations, self._inputs(supply.u)
+        e, w = self.equations, self.forcing(supply.u)
         state = self._state(before, modal, w, e.gain @ modal + e.direct @ w, t)
         if self.closed:
             supply = replace(self.feed.evaluate(state, modal[e.modes :]), u=state.driven)
         rate = e.first.C[self.model.n :] @ (e.first.A @ modal + e.first.B @ w)
-        return _Point(state, rate, supply, modal, np.zeros((4, len(w))) if course is None else course)
+        return ModalPoint(state, rate, supply, modal, np.zeros((4, len(w))) if course is None else course)
 
     def _state(self, before: State, modal: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> State:
         n, first = self.model.n, self.equations.first
@@ -161,7 +177,7 @@ class _Stepper:
         state = self.model.advance(before, both[:n] - before.q, both[n:], t)
         return replace(state, driven=u) if isinstance(self.model, LinearPlant) else state
 
-    def _collocated(self, point: _Point, h: float) -> _Point:
+    def _collocated(self, point: ModalPoint, h: float) -> ModalPoint:
         """A step under a continuous controller: its commands at the nodes and the motion there are found together."""
         t, before, m = point.state.t, point.supply, len(point.supply.u)
         found = np.tile(np.append(before.u, before.rate), (3, 1))
@@ -180,7 +196,7 @@ class _Stepper:
         course, f, x = self._courses(before, h, found)
         self._check(point, h, course, f)
         supply = Supply(found[-1, :m], x[-1], found[-1, m:])
-        return self._point(point.state, self._modal(point, course, h, h), supply, t + h, course)
+        return self.point(point.state, self._modal(point, course, h, h), supply, t + h, course)
 
     def _courses(self, before: Supply, h: float, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Inputs over a step as a polynomial, rates and states of the controller at the nodes, from those found."""
@@ -189,13 +205,13 @@ class _Stepper:
         polynomial = _POLYNOMIAL @ np.column_stack([whole[:, :m], np.ones(4)])
         return polynomial, whole[:, m:], before.x + h * (_INTEGRALS @ whole[:, m:])
 
-    def _gap(self, point: _Point, h: float, found: np.ndarray) -> np.ndarray:
+    def _gap(self, point: ModalPoint, h: float, found: np.ndarray) -> np.ndarray:
         """Inputs and rates at the nodes less what the controller answers there."""
         course, _, x = self._courses(point.supply, h, found)
         answers = [self._answer(point, course, share, h, z) for share, z in zip(NODES[1:], x[1:], strict=True)]
         return found - np.array([np.append(answer.u, answer.rate) for answer in answers])
 
-    def _derivative(self, point: _Point, h: float, found: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    def _derivative(self, point: ModalPoint, h: float, found: np.ndarray, gap: np.ndarray) -> np.ndarray:
         """The slope of the gap over what is found, by differences."""
         columns = np.empty((found.size, found.size))
         for i in range(found.size):
@@ -209,17 +225,17 @@ class _Stepper:
     def _large(gap: np.ndarray) -> float:
         return float(np.abs(gap).max(initial=0.0))
 
-    def at(self, point: _Point, course: np.ndarray, share: float, h: float) -> State:
+    def at(self, point: ModalPoint, course: np.ndarray, share: float, h: float) -> State:
         """Return the state at a share of a step whose inputs are a polynomial."""
         modal, w = self._modal(point, course, share * h, h), share ** np.arange(4) @ course
         u = self.equations.gain @ modal + self.equations.direct @ w
         return self._state(point.state, modal, w, u, point.state.t + share * h)
 
-    def _answer(self, point: _Point, course: np.ndarray, share: float, h: float, z: np.ndarray) -> Supply:
+    def _answer(self, point: ModalPoint, course: np.ndarray, share: float, h: float, z: np.ndarray) -> Supply:
         """What the controller answers there."""
         return self.feed.evaluate(self.at(point, course, share, h), z)
 
-    def _check(self, point: _Point, h: float, course: np.ndarray, f: np.ndarray) -> None:
+    def _check(self, point: ModalPoint, h: float, course: np.ndarray, f: np.ndarray) -> None:
         """Refuse a step over which the commands are not the polynomial through the nodes."""
         powers = _HALF ** np.arange(1, 5) / np.arange(1, 5)
         z = point.supply.x + h * (powers @ (_POLYNOMIAL @ f))
@@ -230,11 +246,11 @@ class _Stepper:
         if not worst <= self.tolerance.absolute:
             raise StepError(0, f"commands change too fast for a step of {h:.3g} s at t = {point.state.t:.6g} s")
 
-    def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
+    def error(self, before: ModalPoint, after: ModalPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Steps are of one length; what is not exact is refused."""
         return 0.0
 
-    def curve(self, before: _Point, after: _Point) -> _Curve:
+    def curve(self, before: ModalPoint, after: ModalPoint) -> _Curve:
         """Return the motion over a step."""
         return _Curve(self, before, after)
 
@@ -243,9 +259,9 @@ class _Stepper:
 class _Curve:
     """The motion from a point."""
 
-    stepper: _Stepper
-    before: _Point
-    after: _Point
+    stepper: ExactStepper
+    before: ModalPoint
+    after: ModalPoint
 
     def at(self, t: float) -> State:
         """Return the state at a time of the step."""

@@ -34,6 +34,7 @@ class Propagator:
 
     def over(self, t: float, h: float) -> tuple[sp.csr_matrix, np.ndarray]:
         """Return the transition over a time t, and the responses to (s/h)^k, k = 0 … 3, shape (4, n, inputs)."""
+        t, h = float(f"{t:.12e}"), float(f"{h:.12e}")  # steps to samples differ by round-off
         found = self._kept.get((t, h))
         if found is None:
             if len(self._kept) > 64:

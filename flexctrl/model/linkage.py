@@ -79,7 +79,7 @@ class Linkage(OpenLinkage):
 
         arguments, pose = self._placing
         pose = ca.reshape(pose, 12, self.count)
-        square = [_orthonormal(attitude(pose[:, i])) for i in range(self.count)]
+        square = [self._squared(i, attitude(pose[:, i])) for i in range(self.count)]
         kept = ca.vertcat(*[ca.vertcat(pose[:3, i], ca.vec(R.T)) for i, R in enumerate(square)])
         return (
             _kernel("place", arguments, kept),
@@ -93,7 +93,7 @@ class Linkage(OpenLinkage):
         """Return a rotation freed of round-off drift; one that never changes has none."""
         import casadi as ca
 
-        return R if ca.is_equal(R, _rotation(self._pose[:, node]), 2) else _orthonormal(R)
+        return R if ca.is_equal(R, attitude(self._pose[:, node]), 2) else _orthonormal(R)
 
     @property
     def _placing(self) -> Terms:

@@ -194,7 +194,7 @@ class OpenLinkage:
         for node, axes in self.lines:
             moved[node] = ca.vertcat(moved[node][:3], old_R[node] @ axes @ moved[node][3:])
         x = [old[:3, i] + m[:3] for i, m in enumerate(moved)]
-        R = [rotation_of(m[3:]) @ r for m, r in zip(moved, old_R, strict=True)]
+        R = [r if m[3:].is_zero() else rotation_of(m[3:]) @ r for m, r in zip(moved, old_R, strict=True)]
         for f in self.follows:
             n, m = f.node, f.master
             if isinstance(f, Turn):

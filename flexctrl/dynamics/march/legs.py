@@ -166,7 +166,7 @@ class Legs:
     @cached_property
     def states(self) -> list[list[State]]:
         """The states after the steps of each leg."""
-        again = MarchingStepper(self.stepper.plain)
+        again = self.stepper.again()
         again.marcher.recall(self.memory.march)
         again.enter(self.start)
         marcher = again.marcher

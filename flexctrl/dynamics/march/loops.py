@@ -8,6 +8,7 @@ from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.closing import in_doubt, settled
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
+from flexctrl.dynamics.march.leaping import leap
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
     CORNER,
@@ -152,10 +153,11 @@ def fixed(m: March) -> int:
             return status
         m.jumping = 0
     while m.done < m.wanted and m.kept < m.shelf:
-        status = step(m)
+        status = leap(m) if m.leap.modes > 0 else step(m)
         if status != DONE:
             return status
-        judge(m)
+        if m.leap.modes == 0:
+            judge(m)
         place(m.flat)
         if m.watching == 1 and passes(m.corners, m.flat):
             return CORNER
@@ -294,9 +296,10 @@ def enter(m: March) -> None:
     m.gained += total(work)
     if m.losing == 1:
         drive(f)
-        energy(f)
-        m.lost += 0.5 * m.h * (m.power + f.books[2])
-        m.power = f.books[2]
+        if m.leap.modes == 0:
+            energy(f)
+            m.lost += 0.5 * m.h * (m.power + f.books[2])
+            m.power = f.books[2]
 
 
 def note(m: March) -> None:
@@ -352,6 +355,10 @@ def jump(m: March) -> int:
     load(f)
     clear(f.padded, f.step)
     copy(f.padded, m.v, f.v)
+    if m.leap.modes > 0:
+        pull(f)
+        copy(f.padded, f.force, m.pulled)
+        return DONE
     if m.mass_for != 1.0 or spent(m) or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
         status = massed(m)
         if status != DONE:

@@ -32,6 +32,7 @@ from flexctrl.dynamics.march.record import (
     WEIGHED,
     Factors,
     March,
+    no_leap,
 )
 from flexctrl.dynamics.scales import farthest
 from flexctrl.errors import KernelError
@@ -150,12 +151,17 @@ class Marcher:
     @classmethod
     def of(cls, model: Model, method: Method) -> Marcher:
         """Return a march that another run is done with, as good as new, or a new one."""
-        idle = _idle(model)
+        idle = cls._idle(model)
         while idle:
             found = idle.pop()
             if found.method.coefficients == method.coefficients and found.method.least == method.least:
                 return found
         return cls(model, method)
+
+    @classmethod
+    def _idle(cls, model: Model) -> list[Any]:
+        """Marches of a model that no run uses; not more than a few, and taken by one run at a time."""
+        return model.__dict__.setdefault(f"_idle_{cls.__name__}", [])
 
     def done(self) -> None:
         """Leave the march to another run."""
@@ -163,8 +169,8 @@ class Marcher:
         self._heeded = None
         self.flattened.flat.z[:] = 0.0
         self._kept = _NOTHING
-        if len(_idle(self.model)) < _SPARE:
-            _idle(self.model).append(self)
+        if len(self._idle(self.model)) < _SPARE:
+            self._idle(self.model).append(self)
 
     def remembered(self) -> Remembered:
         """Return what another march needs to go on with the same bits."""
@@ -387,11 +393,6 @@ def _state_width(F: Flattened) -> int:
     return 12 * f.nodes + 2 * f.padded + f.drives + F.gauges.turning + 1
 
 
-def _idle(model: Model) -> list[Marcher]:
-    """Marches of a model that no run uses; not more than a few, and taken by one run at a time."""
-    return model.__dict__.setdefault("_marchers", [])
-
-
 def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
@@ -403,6 +404,7 @@ def _march(F: Flattened, method: Method) -> March:
         corners=corners_of(F.model),
         closing=closing_of(F),
         law=no_law(),
+        leap=no_leap(),
         fronts=F.plan.fronts,
         axes=F.axes,
         tangent=_factors(F),

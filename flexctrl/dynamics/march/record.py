@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.corners import Corners
 from flexctrl.dynamics.march.law import Law
@@ -53,6 +55,44 @@ class Factors:
 
 
 @dataclass
+class Leap:
+    """Exact steps of linear equations.
+
+    Attributes
+    ----------
+    modes, size, wide : int
+        Modal states; these, inputs and 1; that filled up to a multiple of eight.
+    transition : Reals
+        Over a step, column by column.
+    state, after : Reals
+        Modal states, inputs, 1; states at the end of the step.
+    places, rates : Reals
+        What these add to degrees of freedom and their rates, column by column.
+    losses : Reals
+        The energy dissipated over a step as a quadratic form in them.
+    h : float
+        Step that the tables are for.
+    """
+
+    modes: int
+    size: int
+    wide: int
+    transition: Reals
+    state: Reals
+    after: Reals
+    places: Reals
+    rates: Reals
+    losses: Reals
+    h: float = -1.0
+
+
+def no_leap() -> Leap:
+    """Return the leaps of a model that is not linear."""
+    empty = np.zeros(0)
+    return Leap(0, 0, 0, empty, empty, empty, empty, empty, empty)
+
+
+@dataclass
 class March:
     """A march under way. Vectors of degrees of freedom stand in the order of elimination.
 
@@ -63,6 +103,7 @@ class March:
     corners : Corners
     closing : Closing
     law : Law
+    leap : Leap
     fronts : Fronts
     axes : Axes
     tangent, mass : Factors
@@ -125,6 +166,7 @@ class March:
     corners: Corners
     closing: Closing
     law: Law
+    leap: Leap
     fronts: Fronts
     axes: Axes
     tangent: Factors

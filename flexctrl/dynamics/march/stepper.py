@@ -59,6 +59,10 @@ class MarchingStepper:
             self.__dict__.pop("marcher").done()
             self._here = None
 
+    def again(self) -> MarchingStepper:
+        """Return another stepper of the same kind."""
+        return type(self)(self.plain)
+
     @property
     def memory(self) -> Memory:
         """The tangents in use."""

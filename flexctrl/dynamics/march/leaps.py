@@ -1,0 +1,130 @@
+"""Steps of the exact method by compiled loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
+from flexctrl.dynamics.dense import Curve
+from flexctrl.dynamics.exact import ExactStepper, ModalPoint
+from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.march.leaping import Tables, fill, leap_of
+from flexctrl.dynamics.march.marching import Marcher, Method
+from flexctrl.dynamics.march.record import DONE
+from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
+from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.steps import Point
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+
+__all__ = ["Leaper", "LeapingStepper"]
+
+
+class Leaper(Marcher):
+    """A linear model on a march of exact steps."""
+
+    def __init__(self, model: Model, method: Method) -> None:
+        super().__init__(model, method)
+        self._tables: dict[float, Tables] = {}
+        self._steps: ExactStepper | None = None
+
+    def taking(self, steps: ExactStepper) -> Leaper:
+        """Take such steps; return the march."""
+        self._steps = steps
+        self.leap = leap_of(self.flattened, steps.equations)
+        self._numbers = self.march.lend("leap", self.leap)
+        return self
+
+    @property
+    def modal(self) -> np.ndarray:
+        """The modal state."""
+        return self.leap.state[: self.leap.modes]
+
+    def _made(self, seeds: tuple[float, float, float], task: int) -> int:
+        h, steps = self.march.h, self._steps
+        assert steps is not None
+        key = float(f"{h:.9e}")
+        if key not in self._tables:
+            still = np.zeros(self.model.n)
+            none = np.zeros(len(self.model.inputs))
+            damping = -self.model.slope(self.model.rest, still, still, (0.0, 1.0, 0.0), none)
+            self._tables[key] = Tables.of(h, steps.equations, steps.propagator, damping)
+        fill(self.leap, self._tables[key])
+        self._numbers.h = h
+        return DONE
+
+
+@dataclass
+class LeapingStepper(MarchingStepper):
+    """A stepper of exact steps that are marched. For linear models that `can_march`, without a continuous controller.
+
+    Attributes
+    ----------
+    plain : ExactStepper
+    """
+
+    plain: Any
+
+    @cached_property
+    def marcher(self) -> Leaper:
+        """The model on a march."""
+        model = self.plain.model
+        method = Method(Coefficients.of(1.0), 0.0, 1.0 / yardsticks(model), np.zeros(model.n, dtype=bool))
+        found = Leaper.of(model, method)
+        assert isinstance(found, Leaper)
+        return found.taking(self.plain)
+
+    @property
+    def memory(self) -> Memory:
+        """Nothing but the point matters to later steps."""
+        return Memory(None, self.marcher.remembered())
+
+    def recall(self, memory: Memory) -> None:
+        """There is nothing to go on from but the point."""
+        self._here = None
+
+    def start(self, state: State, supply: Supply, step: float) -> Any:
+        """Return the point of a state."""
+        return self.plain.start(state, supply, step)
+
+    def renew(self, point: Any, supply: Supply, step: float) -> Any:
+        """Return the point under other inputs."""
+        return self.plain.renew(point, supply, step)
+
+    def step(self, point: Any, h: float) -> Any:
+        """Return the point a step later."""
+        return self.plain.step(point, h)
+
+    def error(self, before: Any, after: Any, moved: np.ndarray, tolerance: Any) -> float:
+        """Steps are of one length."""
+        return 0.0
+
+    def enter(self, point: Any) -> None:
+        """Put the march at a point, unless it is there."""
+        if point is not self._here:
+            zero = np.zeros(self.plain.model.n)
+            self.marcher.entered(AlphaPoint(point.state, zero, point.supply, zero, zero))
+            self.marcher.modal[:] = point.modal
+            self._here = point
+
+    def leave(self, supply: Supply) -> Any:
+        """Return where the march stands."""
+        m, marcher, first = self.marcher.march, self.marcher, self.plain.equations.first
+        state, w = marcher.flattened.state(m.v, m.t), self.plain.forcing(supply.u)
+        modal, course = marcher.modal.copy(), np.zeros((4, len(w)))
+        course[0] = w
+        rate = first.C[self.plain.model.n :] @ (first.A @ modal + first.B @ w)
+        self._here = point = ModalPoint(state, rate, supply, modal, course)  # type: ignore[assignment]
+        return point
+
+    def curve(self, before: Point, after: Point) -> Curve:
+        """Return the motion over a step, exact as the steps are."""
+        if not isinstance(before, ModalPoint):
+            before = self.plain.start(before.state, before.supply, 0.0)
+        if not isinstance(after, ModalPoint):
+            after = self.plain.step(before, after.state.t - before.state.t)
+        return self.plain.curve(before, after)

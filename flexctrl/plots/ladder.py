@@ -1,0 +1,63 @@
+"""Pictures of a fidelity ladder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from flexctrl.plots.style import FLEXIBLE, INK, PALE, tidy
+
+if TYPE_CHECKING:
+    from flexctrl.study.ladder import Ladder
+
+__all__ = ["ladder_figure", "rungs_chart"]
+
+_LEAST = 1e-6
+
+
+def ladder_figure(ladder: Ladder) -> Figure:
+    """Draw error against time, rung by rung.
+
+    Parameters
+    ----------
+    ladder : Ladder
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    rungs_chart(figure.subplots(), ladder)
+    return figure
+
+
+def rungs_chart(ax: Axes, ladder: Ladder) -> Axes:
+    """Draw the rungs in their order, named; below the grey band the reference knows no better.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    ladder : Ladder
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ran = [r for r in ladder.rungs if np.isfinite(r.error)]
+    times, errors = [r.time_ratio for r in ran], [max(r.error, _LEAST) for r in ran]
+    ax.plot(times, errors, color=PALE, linewidth=1.2, zorder=1)
+    ax.plot(times, errors, "o", color=FLEXIBLE, markersize=8, zorder=2)
+    for k, (rung, x, y) in enumerate(zip(ran, times, errors, strict=True)):
+        up = 9 if k % 2 == 0 else -17
+        ax.annotate(rung.name, (x, y), (0, up), textcoords="offset points", ha="center", fontsize=9, color=INK)
+    ax.axhspan(_LEAST / 10, max(ladder.reference.uncertainty, _LEAST), color="#e5e7eb", zorder=0)
+    ax.set(xscale="log", yscale="log", title=ladder.name)
+    ax.set_xlim(0.5 * min(times), 2.0 * max(times))
+    ax.set_ylim(0.3 * max(min(*errors, ladder.reference.uncertainty), _LEAST), 4.0 * max(errors))
+    ax.set(
+        xlabel="processor time over that of the calibration", ylabel="largest error of an output, over its magnitude"
+    )
+    return tidy(ax)
