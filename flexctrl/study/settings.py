@@ -14,7 +14,8 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Deforming, ShaftElasticity
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.structure.elements import Beam
+from flexctrl.structure.drives import Drive
+from flexctrl.structure.elements import Beam, Part
 from flexctrl.structure.refine import coarsen, refine
 from flexctrl.structure.structure import Structure
 from flexctrl.study.omissions import Subject
@@ -152,16 +153,24 @@ def sweep(
     found: list[Setting] = []
     parts = (*scene.structure.elements, *scene.structure.drives)
     seen: list[list[Effect]] = []
+    whole = [e for e in Fidelity.FULL.effects(scene.effects) if _acts(e, parts)]
     for fidelity in fidelities:
         effects = fidelity.effects(scene.effects)
-        acting = [e for e in effects if not isinstance(e, Deforming) or any(e.bends(p) for p in parts)]
-        if acting in seen:
+        acting = [e for e in effects if _acts(e, parts)]
+        if acting in seen or (acting == whole and fidelity is not Fidelity.FULL and Fidelity.FULL in fidelities):
             continue
         seen.append(acting)
         bends = any(e.bends(p) for e in effects for p in scene.structure.elements if isinstance(p, Beam))
         finer = meshes if bends else meshes[:1]
         found += [Setting(fidelity, mesh, method, tolerance) for mesh in finer for method, tolerance in chosen]
     return tuple(found)
+
+
+def _acts(effect: Effect, parts: Sequence[Part | Drive]) -> bool:
+    """Tell whether an effect that lets parts deform finds any that do."""
+    if isinstance(effect, ComponentModes):
+        return any(isinstance(p, Beam) and effect.modes(p) for p in parts)
+    return not isinstance(effect, Deforming) or any(effect.bends(p) for p in parts)
 
 
 def around(method: Integrator | None, tolerance: Tolerance) -> tuple[tuple[Integrator, Tolerance], ...]:
