@@ -273,5 +273,5 @@ class _Curve:
         course = self.after.course
         if course[1:].any() or (self.stepper.feed.continuous and not self.stepper.closed):
             return None
-        w = self.stepper._inputs(self.before.supply.u)
+        w = self.stepper.forcing(self.before.supply.u)
         return self.stepper.turnover.over(self.before.modal, w, self.after.state.t - self.before.state.t)

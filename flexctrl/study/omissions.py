@@ -11,8 +11,6 @@ from typing import Any, Protocol, TypeVar
 from flexctrl.design.controller import Controller
 from flexctrl.design.hardware import Sampled
 from flexctrl.design.wrapping import Wrapper
-from flexctrl.dynamics.alpha import AdaptiveAlpha
-from flexctrl.dynamics.exact import Exact
 from flexctrl.dynamics.run import Run
 from flexctrl.effects.damping import RayleighDamping
 from flexctrl.effects.effect import Effect
@@ -183,27 +181,13 @@ def _without_effect(kind: type[Effect], scene: Subject) -> Subject:
 
 def _small(scene: Subject) -> Subject:
     """Small motion about the loaded equilibrium."""
-    return _exactly(
-        scene.with_(effects=[GeometricStiffness() if isinstance(e, LargeRotation) else e for e in _flat(scene)])
-    )
+    return scene.with_(effects=[GeometricStiffness() if isinstance(e, LargeRotation) else e for e in _flat(scene)])
 
 
 def _unloaded(scene: Subject) -> Subject:
     """Small motion as if nothing were loaded."""
     kinds = (LargeRotation, GeometricStiffness)
-    return _exactly(scene.with_(effects=[e for e in _flat(scene) if not isinstance(e, kinds)]))
-
-
-def _exactly(scene: S) -> S:
-    """Let linear motion be integrated exactly, unless the scene asks for another method than the usual one."""
-    plan, law, model = scene.simulation, scene.law, scene.model
-    usual = plan is not None and plan.every is not None and isinstance(plan.method, AdaptiveAlpha | None)
-    bent = model.large or model.switches.names or model.kinks.names or model.motion.flows.size
-    if not usual or bent or (law is not None and not law.sample_time):
-        return scene
-    sample = law.sample_time if law is not None else plan.every
-    fits = abs(plan.every / sample - round(plan.every / sample)) < 1e-9
-    return scene.with_(simulation=replace(plan, method=Exact(sample))) if fits else scene
+    return scene.with_(effects=[e for e in _flat(scene) if not isinstance(e, kinds)])
 
 
 def _without_share(kind: type[Effect], share: str, scene: Subject) -> Subject:
