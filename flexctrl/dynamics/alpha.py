@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from flexctrl.dynamics import steps
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
@@ -177,9 +178,9 @@ class Stepper:
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
         step = h * now.v + h * h * ((0.5 - c.beta) * point.algorithmic + c.beta * algorithmic)
         v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
-        foreseen, last, contraction = step, np.inf, 0.0
+        foreseen, last, contraction, end = step, np.inf, 0.0, later(now.t, h)
         for iteration in range(_ITERATIONS):
-            state = self.model.advance(now, step, v, now.t + h)
+            state = self.model.advance(now, step, v, end)
             supply = self.feed.at(state, point.supply, h)
             force = self.model.balance(state, v, rate) + self.model.loads(state, supply.u)
             if fresh or contraction > _POOR or (iteration == 0 and self._stale(state, h)):
@@ -203,7 +204,7 @@ class Stepper:
     ) -> AlphaPoint:
         c = self.coefficients
         self.counts.worst = worst
-        state = self.model.advance(point.state, step, v, point.state.t + h)
+        state = self.model.advance(point.state, step, v, later(point.state.t, h))
         motion = self.model.motion
         if motion.dead_point(state) or motion.turned_back(point.state, point.rate, state, rate):
             raise StepError(

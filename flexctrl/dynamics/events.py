@@ -115,7 +115,8 @@ class Watch:
     names : tuple of str
         Of the switches.
     corners : callable
-        State → values whose signs tell the sides of corners in laws of force; steps end where one changes.
+        (state, state before) → values whose signs tell the sides of corners in laws of force; steps end where one
+        changes.
     corner_names, ends : tuple of str
         Of the corners; what to say where a run cannot go on beyond one, empty where it can.
     dust : numpy.ndarray
@@ -128,7 +129,7 @@ class Watch:
     events: tuple[Event, ...]
     switches: Callable[[State, np.ndarray], np.ndarray]
     names: tuple[str, ...]
-    corners: Callable[[State], np.ndarray]
+    corners: Callable[[State, State], np.ndarray]
     corner_names: tuple[str, ...]
     ends: tuple[str, ...]
     dust: np.ndarray
@@ -163,16 +164,17 @@ class Watch:
         """The sides that corners are on."""
         return self.sides[len(self.sides) - len(self.corner_names) :]
 
-    def corner_in(self, states: Sequence[State]) -> int:
+    def corner_in(self, before: State, states: Sequence[State]) -> int:
         """Return how many of some states come before the first one beyond a corner."""
         for i, state in enumerate(states):
-            if not self._calm(state):
+            if not self._calm(state, before):
                 return i
+            before = state
         return len(states)
 
-    def _calm(self, state: State) -> bool:
+    def _calm(self, state: State, before: State) -> bool:
         """Tell whether a state is on the same side of all corners."""
-        values = self.corners(state)
+        values = self.corners(state, before)
         return bool(((np.sign(values) == self.corner_sides) | (np.abs(values) <= self.dust)).all())
 
     def stops(self, gauge: int) -> bool:
@@ -192,14 +194,14 @@ class Watch:
         values = [*model.measure(state).tolist(), *np.asarray(u).tolist()]
         return dict(zip((*model.outputs, *model.inputs), values, strict=True))
 
-    def values(self, state: State, u: np.ndarray) -> np.ndarray:
-        """Return the gauges' values."""
+    def values(self, state: State, u: np.ndarray, before: State | None = None) -> np.ndarray:
+        """Return the gauges' values, of a state that came from one before."""
         found = []
         if self.events:
             signals = self.signals(state, u)
             found = [(signals[e.of] if isinstance(e.of, str) else float(e.of(signals))) - e.at for e in self.events]
         switches = self.switches(state, u) if self.names else np.zeros(0)
-        return np.concatenate([found, switches, self.corners(state)])
+        return np.concatenate([found, switches, self.corners(state, before or state)])
 
     def begin(self, point: Point) -> None:
         """Note the side that each gauge is on at the start."""
@@ -223,12 +225,12 @@ class Watch:
 
     def crossings(self, curve: Curve, before: Point, after: Point) -> list[Crossing]:
         """Return where gauges cross zero over a step, in order; sides stay as they are."""
-        if self.quiet and self._calm(after.state):
+        if self.quiet and self._calm(after.state, before.state):
             return []
         t, h = before.state.t, after.state.t - before.state.t
         value = _Along(self, curve, before, after)
         last = self.values(before.state, before.supply.u)
-        ends = [(t + 0.5 * h, value(t + 0.5 * h)), (t + h, self.values(after.state, after.supply.u))]
+        ends = [(t + 0.5 * h, value(t + 0.5 * h)), (t + h, self.values(after.state, after.supply.u, before.state))]
         self.sizes = np.maximum(self.sizes, np.abs([last, *(v for _, v in ends)]).max(axis=0))
         found = []
         for gauge in range(len(last)):
@@ -277,7 +279,7 @@ class Watch:
     def offset(self, curve: Curve, before: Point, after: Point, gauge: int) -> float:
         """Return how much later than at the end of a step a gauge is zero, by its slope there."""
         t, h = after.state.t, after.state.t - before.state.t
-        now = self.values(after.state, after.supply.u)[gauge]
+        now = self.values(after.state, after.supply.u, before.state)[gauge]
         slope = (now - _Along(self, curve, before, after)(t - _SLOPE * h)[gauge]) / (_SLOPE * h)
         return float(-now / slope) if abs(now) > _DUST * self.sizes[gauge] and slope != 0.0 else 0.0
 
@@ -315,7 +317,7 @@ class _Along:
 
     def __call__(self, t: float) -> np.ndarray:
         state = self.curve.at(t)
-        return self.watch.values(state, self.supply(state).u)
+        return self.watch.values(state, self.supply(state).u, self.before.state)
 
 
 def _one_of(value: Callable[[float], np.ndarray], gauge: int, t: float) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_plant import LinearPlant
+from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.modal_equations import ModalEquations, closed, opened
 from flexctrl.dynamics.propagator import NODES, Propagator
 from flexctrl.dynamics.quadratic import Turnover
@@ -145,7 +146,7 @@ class ExactStepper:
 
     def step(self, point: ModalPoint, h: float) -> ModalPoint:
         """Return the point a step later."""
-        t = point.state.t + h
+        t = later(point.state.t, h)
         if self.feed.continuous and not self.closed:
             return self._collocated(point, h)
         course = np.zeros((4, len(self.equations.first.B[0])))
@@ -196,7 +197,7 @@ class ExactStepper:
         course, f, x = self._courses(before, h, found)
         self._check(point, h, course, f)
         supply = Supply(found[-1, :m], x[-1], found[-1, m:])
-        return self.point(point.state, self._modal(point, course, h, h), supply, t + h, course)
+        return self.point(point.state, self._modal(point, course, h, h), supply, later(t, h), course)
 
     def _courses(self, before: Supply, h: float, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Inputs over a step as a polynomial, rates and states of the controller at the nodes, from those found."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.local import Local
+from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
@@ -167,7 +168,7 @@ class _Stepper:
             raise StepError(error.where, f"the masses do not move every freedom at t = {t:.6g} s") from error
         if not np.isfinite(K).all():
             raise StepError(0, f"the step of {h:.3g} s from t = {t:.6g} s is unstable")
-        return self._end(point, end, K, t + h)
+        return self._end(point, end, K, later(t, h))
 
     def _end(self, point: _Point, end: np.ndarray, K: np.ndarray, t: float) -> _Point:
         xi, v, x = self._split(end)

@@ -227,7 +227,7 @@ class Journey:
         before = self.point
         count = max(1, min(count, int(_BLOCK_BYTES / (100.0 * len(before.state.x) + 32.0 * before.state.q.size))))
         block = self.stepper.march(before, h, count)
-        if self.watch.corner_names and (clear := self.watch.corner_in(block.states)) < len(block.times):
+        if self.watch.corner_names and (clear := self.watch.corner_in(before.state, block.states)) < len(block.times):
             block = self.stepper.march(before, h, clear) if clear else replace(block, times=np.zeros(0))
         if not len(block.times):
             return 0

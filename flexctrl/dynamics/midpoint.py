@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import turning, yardsticks
@@ -202,7 +203,7 @@ class _Stepper:
     def _end(self, point: _Point, h: float, step: np.ndarray, momenta: np.ndarray) -> _Point:
         """The point at the end of a step, its rates from the momenta."""
         now, mean = point.state, step / h
-        state = self.model.advance(now, step, 2.0 * mean - now.v, now.t + h)
+        state = self.model.advance(now, step, 2.0 * mean - now.v, later(now.t, h))
         if self.model.motion.dead_point(state):
             raise StepError(
                 self.counts.worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part bend"

@@ -17,6 +17,7 @@ __all__ = ["Rows"]
 
 _FRAMES = 120
 _NEAR = 1e-9
+_ROUND_OFF = 1e-15
 
 
 @dataclass
@@ -53,40 +54,38 @@ class Rows:
     def within(self, before: Point, after: Point, to_jump: bool) -> None:
         """Write the rows within a step, and the one at its end unless inputs are about to jump there."""
         every, t, h = self.every, after.state.t, after.state.t - before.state.t
-        curve: Curve | None = None
-        while every is not None and (row := self.count * every) < t - _NEAR * h:
+        curve, near = None, _near(t, h)
+        while every is not None and (row := self.count * every) < t - near:
             curve = curve or self.curve(before, after)
             state = curve.at(row)
             share = ((row - before.state.t) / h, h)
             self._write(state, self.feed.between(before.supply, after.supply, share, state).u)
         if not to_jump:
-            self.here(after, _NEAR * h)
+            self.here(after, near)
 
     def among(self, before: Point, block: Block, to_jump: bool) -> None:
         """Write the rows within many steps."""
         times, states, u, h = block.times, block.states, before.supply.u, block.times[0] - before.state.t
-        kept = len(times) - to_jump
+        kept, near = len(times) - to_jump, _near(times[-1], h)
         if self.every is None:
             for i in range(kept):
                 self._write(states[i], u)
             return
-        while (row := self.count * self.every) <= times[-1] + _NEAR * h:
-            i = int(np.searchsorted(times, row - _NEAR * h))
+        while (row := self.count * self.every) <= times[-1] + near:
+            i = int(np.searchsorted(times, row - near))
             state = states[i]
-            if abs(times[i] - row) > _NEAR * h:
+            if abs(times[i] - row) > near:
                 start = replace(before, state=states[i - 1]) if i else before
                 state = self.curve(start, replace(block.last, state=state)).at(row)
             elif i >= kept:
                 return
             self._write(state, u)
 
-    def on_steps(self, pace: Pace, sample: float) -> bool:
-        """Tell whether rows are due at the ends of steps only."""
-        if self.every is None:
+    def on_steps(self, pace: Pace, sample: float, t: float) -> bool:
+        """Tell whether rows are due at the ends of steps only, as these are from a time on."""
+        if self.every is None or (sample > 0.0 and _whole(self.every / sample)):
             return True
-        if not isinstance(pace, Fixed):
-            return sample > 0.0 and abs(self.every / sample - round(self.every / sample)) < _NEAR
-        return all(abs(s - round(s)) < _NEAR for s in (self.every / pace.step, sample / pace.step))
+        return isinstance(pace, Fixed) and all(_whole(s / pace.step) for s in (self.every, sample, t))
 
     def due(self) -> tuple[float, float]:
         """Return when the next state for drawing is due, and their spacing."""
@@ -103,7 +102,7 @@ class Rows:
         self.frames += states
         chosen = table[:kept]
         if self.every is not None:
-            near = _NEAR * (times[0] - start.t)
+            near = _near(times[-1], times[0] - start.t)
             ahead = int((times[-1] + near) / self.every) + 1
             wanted = np.searchsorted(times, self.every * np.arange(self.count, ahead) - near)
             chosen = table[wanted[wanted < kept]]
@@ -148,3 +147,13 @@ class Rows:
         """Keep a state for drawing, if one is due."""
         if not self.frames or state.t >= self.frames[-1].t + self.until / _FRAMES * (1 - 1e-9):
             self.frames.append(state)
+
+
+def _near(t: float, h: float) -> float:
+    """Return by how much a row may be off the end of a step of length h at t."""
+    return _NEAR * h + _ROUND_OFF * t
+
+
+def _whole(ratio: float) -> bool:
+    """Tell whether a number is whole but for round-off."""
+    return abs(ratio - round(ratio)) < _NEAR * max(1.0, 1e-6 * ratio)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["Kinks"]
 
 _ROUND_OFF = 1e-12
+_BESIDE = 0.05
+_TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,17 @@ class Turn:
 
 
 @dataclass(frozen=True)
+class Line:
+    """A line between two nodes with a corner at a length; what to say if a run cannot go on beyond it."""
+
+    name: str
+    start: Node
+    end: Node
+    length: float
+    stop: str = ""
+
+
+@dataclass(frozen=True)
 class RailEnd:
     """An end of a trolley's rail: where sign·s + offset, positive on the rail, is zero."""
 
@@ -62,7 +75,7 @@ class RailEnd:
 
 @dataclass(frozen=True, eq=False)
 class Kinks:
-    """The corners of a model's laws of force: lengths of lines, turns of drives, then ends of rails.
+    """The corners of a model's laws of force: lengths of lines, those of winches last, turns of drives, ends of rails.
 
     Attributes
     ----------
@@ -72,12 +85,14 @@ class Kinks:
     model: Model
 
     @cached_property
-    def _lines(self) -> tuple[tuple[Rope | Spring, float], ...]:
-        """Ropes and springs with play, and the lengths at which they have corners."""
+    def _lines(self) -> tuple[Line, ...]:
+        """Ropes, springs with play, and what hangs on winches on its way to the sheave."""
         parts, gaps = self.model.structure.elements, gaps_of(self.model.effects)
-        ropes = [(p, p.length) for p in parts if isinstance(p, Rope) and self.model.bends(p)]
+        ropes = [Line(p.name, p.start, p.end, p.length) for p in parts if isinstance(p, Rope) and self.model.bends(p)]
         loose = [p for p in parts if isinstance(p, Spring) and p.name in self._loose]
-        return (*ropes, *((p, p.length + side * gaps[p.name]) for p in loose for side in (0.5, -0.5)))
+        gapped = [Line(p.name, p.start, p.end, p.length + s * gaps[p.name]) for p in loose for s in (0.5, -0.5)]
+        winches = [d for d in self.model.structure.drives if isinstance(d, Winch)]
+        return (*ropes, *gapped, *(Line(d.name, d.against, d.node, d.shortest, _down(d)) for d in winches))
 
     @cached_property
     def _turns(self) -> tuple[Turn, ...]:
@@ -86,18 +101,15 @@ class Kinks:
         for i, d in enumerate(self.model.structure.drives):
             if d.name in self._loose:
                 found += [Turn(i, d.effective_ratio, -1.0, side * gaps[d.name], _ROUND_OFF) for side in (0.5, -0.5)]
-            elif isinstance(d, Winch):
+            elif isinstance(d, Winch) and self.model.bends(d):
                 found += self._winch(i, d)
         return tuple(found)
 
     def _winch(self, i: int, d: Winch) -> list[Turn]:
-        """Where the rope goes slack, if it stretches, and where there is hardly any left."""
+        """Where a rope that stretches goes slack, and where there is hardly any left."""
         least, dust = d.shortest - d.length, _ROUND_OFF * d.length
-        message = f"the rope of {d.name} is down to its shortest, {d.shortest:.6g} m"
-        if not self.model.bends(d):
-            return [Turn(i, 1.0, 0.0, least, dust, message)]
         slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, dust)
-        return [slack, Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, message)]
+        return [slack, Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, _down(d))]
 
     @cached_property
     def _rails(self) -> tuple[RailEnd, ...]:
@@ -121,19 +133,28 @@ class Kinks:
         """The parts, in the order of `values`; one with play has two flanks."""
         drives = self.model.structure.drives
         turns = (drives[turn.drive].name for turn in self._turns)
-        return (*(p.name for p, _ in self._lines), *turns, *(end.trolley.name for end in self._rails))
+        return (*(line.name for line in self._lines), *turns, *(end.trolley.name for end in self._rails))
 
     @cached_property
     def ends(self) -> tuple[str, ...]:
         """What to say where a run cannot go on beyond a corner; empty where it can."""
-        return (*("" for _ in self._lines), *(turn.end for turn in self._turns), *(rail.end for rail in self._rails))
+        return (
+            *(line.stop for line in self._lines),
+            *(turn.end for turn in self._turns),
+            *(rail.end for rail in self._rails),
+        )
 
     @cached_property
     def lines(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodes at the ends of the lines, shape (lines, 2); the lengths at which they have corners [m]."""
         number = self.model.structure.number
-        ends = [(number(line.start), number(line.end)) for line, _ in self._lines]
-        return np.array(ends, dtype=int).reshape(-1, 2), np.array([length for _, length in self._lines])
+        ends = [(number(line.start), number(line.end)) for line in self._lines]
+        return np.array(ends, dtype=int).reshape(-1, 2), np.array([line.length for line in self._lines])
+
+    @cached_property
+    def sheaves(self) -> int:
+        """How many of the lines, the last ones, lead to the sheave of a winch."""
+        return sum(1 for line in self._lines if line.stop)
 
     @cached_property
     def shafts(self) -> tuple[np.ndarray, np.ndarray]:
@@ -154,12 +175,13 @@ class Kinks:
         longest = [_ROUND_OFF * track.places[-1] for track in self.model.structure.tracks for _ in range(2)]
         return np.concatenate([_ROUND_OFF * self.lines[1], [turn.dust for turn in self._turns], longest])
 
-    def values(self, state: State) -> np.ndarray:
+    def values(self, state: State, before: State) -> np.ndarray:
         """Return what changes its sign at the corners: stretch of ropes, strains from flanks, rope or rail left.
 
         Parameters
         ----------
-        state : State
+        state, before : State
+            What has come through a sheave since ``before`` has less than no rope left.
 
         Returns
         -------
@@ -168,11 +190,28 @@ class Kinks:
         """
         motion, (ends, lengths), (drives, rows) = self.model.motion, self.lines, self.shafts
         arms = state.x[ends[:, 1]] - state.x[ends[:, 0]]
-        strains = np.sqrt(np.einsum("ij,ij->i", arms, arms)) - lengths
+        strains = self._through(np.sqrt(np.einsum("ij,ij->i", arms, arms)), arms, before) - lengths
         own = np.append(state.q, 0.0)[motion.sources[drives]]
         turned = rows[:, 0] * state.driven[drives] + rows[:, 1] * own - rows[:, 2]
         travelling, ends = self.rails
         return np.concatenate([strains, turned, ends[:, 0] * state.x[travelling, 0] + ends[:, 1]])
+
+    def sheaved(self, state: State) -> np.ndarray:
+        """Return the arms from sheaves to what hangs on them, shape (sheaves, 3)."""
+        ends = self.lines[0][len(self._lines) - self.sheaves :]
+        return state.x[ends[:, 1]] - state.x[ends[:, 0]]
+
+    def _through(self, distances: np.ndarray, arms: np.ndarray, before: State) -> np.ndarray:
+        """Turn the sign of distances to sheaves where the straight way from before leads right through them."""
+        first = len(arms) - self.sheaves
+        now, was = arms[first:], self.sheaved(before)
+        away = np.einsum("ij,ij->i", now, was) < 0.0
+        if not away.any():
+            return distances
+        apart = np.linalg.norm(np.cross(was, now), axis=1) / np.maximum(np.linalg.norm(now - was, axis=1), _TINY)
+        nearest = np.minimum(np.linalg.norm(was, axis=1), distances[first:])
+        signs = np.where(away & (apart < _BESIDE * nearest + self.lines[1][first:]), -1.0, 1.0)
+        return np.append(distances[:first], signs * distances[first:])
 
     def standing(self, state: State, free: np.ndarray) -> tuple[str, ...]:
         """Say in words which parts stand exactly on a corner that a motion of the free coordinates would leave.
@@ -188,7 +227,7 @@ class Kinks:
         tuple of str
             Each part with what to do about it. Empty where all laws of force have a derivative.
         """
-        on = np.flatnonzero(np.abs(self.values(state)) <= self.dust)
+        on = np.flatnonzero(np.abs(self.values(state, state)) <= self.dust)
         moved = np.concatenate([self._leaving(state, free), np.ones(len(self._turns), dtype=bool), self._rolling(free)])
         return tuple(dict.fromkeys(self._words(i) for i in on.tolist() if moved[i]))
 
@@ -219,3 +258,8 @@ class Kinks:
         if name in self._loose:
             return f"{name} stands exactly on a flank of its gap; load it, or move it off the flank"
         return f"{name} is exactly at its natural length; prestress it, or hold it slack or taut"
+
+
+def _down(d: Winch) -> str:
+    """What to say where the rope of a winch ends."""
+    return f"the rope of {d.name} is down to its shortest, {d.shortest:.6g} m"

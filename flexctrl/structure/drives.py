@@ -160,7 +160,8 @@ class Winch:
     out: ℓ₀, their distance at rest, for a motor angle θ_d of zero; positive angles pay out. The motor torque acts on
     θ_d against r/R times the tension T (and T²/2EA, as the drum takes in rope without strain), so work and energy
     balance exactly. `RopeStretch` lets the rope stretch and go slack; without it d = ℓ and the motor's inertia is
-    reflected. A run stops, and says so, where the rope that is out comes down to ``shortest``.
+    reflected. A run stops, and says so, where the rope that is out, or the way from ``node`` to the sheave, comes down
+    to ``shortest``.
 
     Parameters
     ----------

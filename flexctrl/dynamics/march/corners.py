@@ -21,7 +21,8 @@ class Corners:
 
     Attributes
     ----------
-    lines, turns, rails : int
+    lines, turns, rails, sheaves : int
+        The last ones of the lines lead to sheaves of winches.
     ends : Wholes
         Slots of the nodes at the ends of each line.
     drives : Wholes
@@ -33,11 +34,14 @@ class Corners:
         Sign and offset of each end of a rail (2 each).
     dust, sides : Reals
         What is zero but for round-off; the sides the motion is on, 0: not yet known.
+    arms : Reals
+        Of the lines to sheaves, before the step (3 each).
     """
 
     lines: int
     turns: int
     rails: int
+    sheaves: int
     ends: Wholes
     drives: Wholes
     lengths: Reals
@@ -46,6 +50,7 @@ class Corners:
     spans: Reals
     dust: Reals
     sides: Reals
+    arms: Reals
 
 
 def corners_of(model: Model) -> Corners:
@@ -53,9 +58,9 @@ def corners_of(model: Model) -> Corners:
     kinks = model.kinks
     (ends, lengths), (drives, sums), (travels, spans) = kinks.lines, kinks.shafts, kinks.rails
     sides = np.zeros(len(kinks.names))
-    counts = len(lengths), len(drives), len(travels)
+    counts = len(lengths), len(drives), len(travels), kinks.sheaves
     places = NODE_SLOT * ends.ravel(), drives, lengths, sums.ravel(), NODE_SLOT * travels, spans.ravel()
-    return Corners(*counts, *places, kinks.dust, sides)
+    return Corners(*counts, *places, kinks.dust, sides, np.zeros(3 * kinks.sheaves))
 
 
 def passes(c: Corners, f: Flat) -> bool:
@@ -63,6 +68,9 @@ def passes(c: Corners, f: Flat) -> bool:
     for k in range(c.lines + c.turns):
         value = stretch(c, f, k) if k < c.lines else turn(c, f, k - c.lines)
         if not within(c, k, value):
+            return True
+    for k in range(c.lines - c.sheaves, c.lines):
+        if through(c, f, k):
             return True
     for k in range(c.rails):
         left = c.spans[2 * k] * f.z[c.travels[k]] + c.spans[2 * k + 1]
@@ -79,6 +87,19 @@ def stretch(c: Corners, f: Flat, k: int) -> float:
     for j in range(3):
         square += (end[j] - start[j]) * (end[j] - start[j])
     return math.sqrt(square) - c.lengths[k]
+
+
+def through(c: Corners, f: Flat, k: int) -> bool:
+    """Tell whether a line to a sheave may have come through it over the step."""
+    a = c.ends[2 * k]
+    b = c.ends[2 * k + 1]
+    arm = c.arms[3 * (k + c.sheaves - c.lines) :]
+    along = 0.0
+    for j in range(3):
+        now = f.z[b + j] - f.z[a + j]
+        along += arm[j] * now
+        arm[j] = now
+    return along < 0.0
 
 
 def turn(c: Corners, f: Flat, k: int) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import in_doubt, settled
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
@@ -260,7 +261,7 @@ def accept(m: March) -> None:
     m.reached = max(m.reached, largest(far))
     tighten(m, total(still), total(onward))
     lean(m, total(shared), total(square))
-    m.t += m.h
+    m.t = later(m.t, m.h)
     enter(m)
     note(m)
     m.done += 1

@@ -317,9 +317,10 @@ class Marcher:
         m = self.march
         m.keeping, m.due, m.spacing = int(all_states), due, spacing
 
-    def watch(self, sides: np.ndarray) -> None:
-        """End before steps that pass corners of laws of force; ``sides`` are those they are on (none: do not)."""
+    def watch(self, sides: np.ndarray, state: State) -> None:
+        """End before steps that pass corners of laws of force; ``sides`` are those a state is on (none: do not)."""
         m = self.march
+        m.corners.arms[:] = self.model.kinks.sheaved(state).ravel()
         m.corners.sides[:] = sides if sides.size else 0.0
         m.watching = int(sides.size > 0)
 

@@ -58,8 +58,10 @@ class _Ride:
         sums = j.books.sums
         self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved)
         self.marcher.open(j.books.first, sums.moved, j.books.dissipates)
-        self.marcher.watch(j.watch.corner_sides)
-        self.marcher.keep(not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time), *j.rows.due())
+        self.marcher.watch(j.watch.corner_sides, j.point.state)
+        self.marcher.keep(
+            not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time, j.point.state.t), *j.rows.due()
+        )
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
@@ -259,7 +261,7 @@ class _Ride:
         """Hand over to the journey; tell whether there were any steps."""
         j, m = self.journey, self.marcher.march
         self.stepper.count()
-        self.marcher.watch(np.zeros(0))
+        self.marcher.watch(np.zeros(0), j.point.state)
         j.mark.rejected += m.rejected - self.rejected
         if not self.legs.parts:
             return False
