@@ -26,6 +26,7 @@ from flexctrl.model.flows import flow_rates, flowing, without_flows
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
 from flexctrl.model.solve import Plan, Solve, factorise, plan
+from flexctrl.structure.freedoms import check_number, check_seconds
 
 _TURNED = 0.02
 _POOR = 0.25
@@ -340,8 +341,8 @@ class AdaptiveAlpha:
 
     def __post_init__(self) -> None:
         _check_rho(self.rho)
-        if not (self.first_step > 0.0 and self.largest_step > 0.0):
-            raise StructureError("AdaptiveAlpha: first_step and largest_step are seconds > 0")
+        check_seconds(self.first_step, "first_step", "AdaptiveAlpha")
+        check_seconds(self.largest_step, "largest_step", "AdaptiveAlpha", endless=True)
 
     @property
     def order(self) -> int:
@@ -365,7 +366,7 @@ class AdaptiveAlpha:
 
 
 def _check_rho(rho: float) -> None:
-    if not 0.0 <= rho <= 1.0:
+    if not 0.0 <= check_number(rho, "rho", "generalised alpha") <= 1.0:
         raise StructureError(f"generalised alpha: rho = {rho}; expected 0 … 1 (0.9 damps only the highest frequencies)")
 
 

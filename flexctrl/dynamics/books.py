@@ -187,6 +187,17 @@ class Books:
         return f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the books say against a motion that goes on: they miss a large share of what was turned over."""
+        s = self.sums
+        if not (self.lawful and self.residual > _ABSURD and (s.moved >= _VISIBLE * self.reach).any()):
+            return ()
+        return (
+            f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved; take "
+            "smaller steps",
+        )
+
+    @property
     def residual(self) -> float:
         """The largest gap over the largest energy turned over."""
         return self.sums.gap / self.sums.turnover if self.sums.turnover > 0.0 else 0.0

@@ -6,23 +6,28 @@ import hashlib
 import importlib
 import json
 import os
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
 from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.linear_plant import LinearPlant
+from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Mark, Point
 from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
+from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
 
-_FORMAT = 2
+_FORMAT = 3
 _HOUSE = "flexctrl."
+_UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +42,8 @@ class Checkpoint:
         Digest of the model it belongs to.
     method : str
         The method, as text.
+    tolerance : Tolerance
+        That of the run.
     base : numpy.ndarray, shape (inputs,)
         Constant inputs under the controller's.
     point : Point
@@ -60,6 +67,7 @@ class Checkpoint:
 
     machine: str
     method: str
+    tolerance: Tolerance
     base: np.ndarray
     point: Point
     memory: Any
@@ -118,7 +126,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
             if content["format"] != _FORMAT:
                 raise StructureError(f"{path} is a checkpoint of format {content['format']}; expected {_FORMAT}")
             found = _unpacked(content["checkpoint"], file)
-    except (KeyError, ValueError, TypeError, AttributeError, ImportError) as error:
+    except _UNREADABLE as error:
         raise StructureError(f"{path} is no checkpoint: {error}; give a file that Checkpoint.save wrote") from error
     if not isinstance(found, Checkpoint):
         raise StructureError(f"{path} holds a {type(found).__name__}; give a file that Checkpoint.save wrote")
@@ -138,15 +146,15 @@ class Autosave:
     Raises
     ------
     StructureError
-        If ``seconds`` is not positive.
+        If ``path`` names no file or ``seconds`` is not positive.
     """
 
     path: str | Path
     seconds: float = 60.0
 
     def __post_init__(self) -> None:
-        if not self.seconds > 0.0:
-            raise StructureError(f"Autosave: seconds = {self.seconds}; expected > 0")
+        check_path(self.path, "Autosave")
+        check_seconds(self.seconds, "seconds", "Autosave", endless=True)
 
 
 def machine_of(model: Model | LinearPlant) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -15,12 +16,17 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.steps import Point
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.motion import State
+from flexctrl.structure.freedoms import check_finite
 
-__all__ = ["Direction", "Event", "Occurrence", "Watch"]
+__all__ = ["Direction", "Event", "EventError", "Occurrence", "Watch"]
 
 _DUST = 1e-13
 _SLOPE = 1e-2
 _HALVINGS = 20
+
+
+class EventError(StructureError):
+    """The function of an event raises, or gives what is no finite number."""
 
 
 class Direction(Enum):
@@ -52,7 +58,7 @@ class Event:
     Raises
     ------
     StructureError
-        For a value that is no finite number.
+        For a value that is no finite number, and what is no direction, signal or function.
 
     Notes
     -----
@@ -67,8 +73,42 @@ class Event:
     terminal: bool = False
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.at):
-            raise StructureError(f"event {self.name!r}: at = {self.at}; expected a finite number")
+        owner = f"event {self.name!r}"
+        if not isinstance(self.name, str):
+            raise StructureError(f"{owner}: its name is no text")
+        if not isinstance(self.of, str) and not callable(self.of):
+            raise StructureError(f"{owner}: of = {self.of!r}; expected the name of a signal or a function of signals")
+        check_finite(self.at, "at", owner)
+        if not isinstance(self.direction, Direction):
+            choices = ", ".join(f"Direction.{d.name}" for d in Direction)
+            raise StructureError(f"{owner}: direction = {self.direction!r}; expected one of {choices}")
+
+    def value(self, signals: Mapping[str, float]) -> float:
+        """Return how far it is from happening.
+
+        Parameters
+        ----------
+        signals : mapping of str to float
+            All outputs and inputs.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        EventError
+            If its function raises, or gives no finite number.
+        """
+        if isinstance(self.of, str):
+            return signals[self.of] - self.at
+        try:
+            found = float(self.of(signals))
+        except Exception as error:
+            raise EventError(f"event {self.name!r}: its function raised {type(error).__name__}: {error}") from error
+        if not math.isfinite(found):
+            raise EventError(f"event {self.name!r}: its function gives {found}; expected a finite number at all times")
+        return found - self.at
 
 
 @dataclass(frozen=True)
@@ -199,7 +239,7 @@ class Watch:
         found = []
         if self.events:
             signals = self.signals(state, u)
-            found = [(signals[e.of] if isinstance(e.of, str) else float(e.of(signals))) - e.at for e in self.events]
+            found = [event.value(signals) for event in self.events]
         switches = self.switches(state, u) if self.names else np.zeros(0)
         return np.concatenate([found, switches, self.corners(state, before or state)])
 

@@ -18,10 +18,11 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
-from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Pace, Point, StepError
-from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
+from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Pace, Point, StepError, check_step
+from flexctrl.errors import MechanismError, SingularMatrixError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+from flexctrl.structure.freedoms import check_seconds
 
 __all__ = ["ExplicitRungeKutta"]
 
@@ -56,9 +57,10 @@ class ExplicitRungeKutta:
     largest_step: float = np.inf
 
     def __post_init__(self) -> None:
-        lengths = (self.first_step, self.largest_step, *(() if self.step is None else (self.step,)))
-        if not all(length > 0.0 for length in lengths):
-            raise StructureError(f"{self}: steps are seconds > 0")
+        if self.step is not None:
+            check_step(self.step, "ExplicitRungeKutta")
+        check_seconds(self.first_step, "first_step", "ExplicitRungeKutta")
+        check_seconds(self.largest_step, "largest_step", "ExplicitRungeKutta", endless=True)
 
     @property
     def order(self) -> int:
@@ -122,11 +124,16 @@ class _Stepper:
         try:
             rate = self.masses.accelerations(state, supply.u, np.zeros(self.model.n))
         except SingularMatrixError as error:
-            raise MechanismError(
-                f"ExplicitRungeKutta: no mass moves with {self.model.coordinates[error.where]}; give it mass, or use "
-                "an implicit method (AdaptiveAlpha)"
-            ) from None
+            raise MechanismError(self._refusal(error.where)) from None
         return _Point(state, rate, supply, np.zeros((0, 0)))
+
+    def _refusal(self, where: int) -> str:
+        name = self.model.coordinates[where]
+        if where in self.model.motion.flows:
+            why = f"{name} is no motion but a state of an effect (MotorLag, LuGreFriction); use"
+        else:
+            why = f"no mass moves with {name}; give it mass, or use"
+        return f"ExplicitRungeKutta: {why} an implicit method (AdaptiveAlpha)"
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs; the motion of the step before stays known."""

@@ -13,7 +13,7 @@ import numpy as np
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Curve, Track
-from flexctrl.dynamics.events import Crossing, Occurrence, Watch
+from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
 from flexctrl.dynamics.feed import CommandError, Feed
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride
@@ -116,7 +116,7 @@ class Journey:
             self.stepper.counts.worst = error.worst
             worst = self.plan.model.coordinates[error.worst]
             self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
-        except CommandError as error:
+        except (CommandError, EventError) as error:
             self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
             self.fault = error.__cause__
         self.books.close(self.point)
@@ -160,6 +160,7 @@ class Journey:
         return Checkpoint(
             machine_of(self.plan.model),
             repr(self.plan.method),
+            self.plan.tolerance,
             self.plan.feed.base,
             self.point,
             self._memory,

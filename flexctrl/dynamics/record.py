@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from io import TextIOBase
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from flexctrl.errors import StructureError
+from flexctrl.structure.freedoms import check_number, check_path, check_seconds
 
 __all__ = ["CsvStream", "InMemory", "Record", "Recorder"]
 
@@ -34,6 +35,7 @@ class Recorder(Protocol):
         """Let go of what is held open; nothing is written afterwards."""
 
 
+@runtime_checkable
 class Record(Protocol):
     """Where the curves of a run go, as a value."""
 
@@ -67,8 +69,7 @@ class InMemory:
     states: float = 32e6
 
     def __post_init__(self) -> None:
-        if not self.states >= 0.0:
-            raise StructureError(f"InMemory: states = {self.states}; expected bytes ≥ 0")
+        check_number(self.states, "bytes of states", "InMemory", least=0.0)
 
     @property
     def every(self) -> None:
@@ -95,15 +96,16 @@ class CsvStream:
     Raises
     ------
     StructureError
-        If ``every`` is not positive.
+        If ``path`` names no file or ``every`` is not positive.
     """
 
     path: str | Path
     every: float | None = None
 
     def __post_init__(self) -> None:
-        if self.every is not None and not self.every > 0.0:
-            raise StructureError(f"CsvStream: every = {self.every}; expected seconds > 0")
+        check_path(self.path, "CsvStream")
+        if self.every is not None:
+            check_seconds(self.every, "every", "CsvStream", endless=True)
 
     @property
     def states(self) -> float:

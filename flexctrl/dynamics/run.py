@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.motion import State
+from flexctrl.structure.freedoms import check_number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,18 +46,15 @@ class Tolerance:
     Raises
     ------
     StructureError
-        If neither is positive.
+        For a negative ``relative`` or an ``absolute`` that is not positive.
     """
 
     relative: float = 1e-4
     absolute: float = 1e-7
 
     def __post_init__(self) -> None:
-        if not (self.relative >= 0.0 and self.absolute > 0.0):
-            raise StructureError(
-                f"Tolerance: relative = {self.relative}, absolute = {self.absolute}; expected relative ≥ 0 and "
-                "absolute > 0"
-            )
+        check_number(self.relative, "relative", "Tolerance", least=0.0)
+        check_number(self.absolute, "absolute", "Tolerance", above=0.0)
 
     def of(self, moved: float) -> float:
         """Return the error allowed after a motion.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -11,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha
+from flexctrl.dynamics.asked import check_arguments, check_times, events_of
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track, curves_of
@@ -89,19 +89,18 @@ def simulate(
     Raises
     ------
     StructureError
-        For an end that is not positive, an unknown input, a start that the machine cannot be in (see `project`), or
-        a checkpoint of another run.
+        For an argument of another kind, an end that is not positive or before the checkpoint, an unknown input, a
+        start that the machine cannot be in (see `project`), or a checkpoint of another run.
     ControllerError
         If the controller's names are not the model's.
     MechanismError
         If a freedom has neither mass nor stiffness.
     """
-    if not (math.isfinite(until) and until > 0.0):
-        raise StructureError(f"simulate: until = {until}; expected seconds > 0")
+    given = {"start": start, "method": method, "tolerance": tolerance, "record": record, "autosave": autosave}
+    check_arguments({"model": model, "progress": progress, **given})
+    check_times(until, every, start)
     if until < SMALLEST:
         raise StructureError(f"simulate: until = {until} s; no step is shorter than {SMALLEST:g} s: give a longer time")
-    if every is not None and not every > 0.0:
-        raise StructureError(f"simulate: every = {every}; expected seconds > 0")
     record = record or InMemory()
     if isinstance(model, LinearModel):
         plant, method = _plant(model, method, every or until / _ROWS)
@@ -120,7 +119,7 @@ def simulate(
     try:
         rows = Rows(feed, spacing, until, recorder, curve)
         track = Track(feed, record.states, curve)
-        return _run(plan, stepper, start, tuple(events), rows, track)
+        return _run(plan, stepper, start, events_of(events), rows, track)
     finally:
         recorder.close()
         if isinstance(stepper, Reusable):
@@ -209,6 +208,7 @@ def _resumed(
     for what, now, before in (
         ("model", machine_of(plan.model), start.machine),
         ("method", repr(plan.method), start.method),
+        ("tolerance", plan.tolerance, start.tolerance),
         ("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x)),
         ("number of events", watch.count, len(start.sides)),
     ):
@@ -269,7 +269,7 @@ def _report(journey: Journey) -> Report:
         worst=model.coordinates[counts.worst] if model.n else "",
         closure_error=sums.closure,
         message=journey.message,
-        notes=model.notes,
+        notes=(*model.notes, *journey.books.doubts),
     )
 
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+from flexctrl.structure.freedoms import check_seconds
 
 __all__ = [
     "Block",
@@ -249,5 +249,4 @@ class Integrator(Protocol):
 
 def check_step(step: float, owner: str) -> None:
     """Raise StructureError for a step that is no number of seconds above zero."""
-    if not (np.isfinite(step) and step > 0.0):
-        raise StructureError(f"{owner}: step = {step}; expected seconds > 0")
+    check_seconds(step, "step", owner)

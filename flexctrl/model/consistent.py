@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.errors import StructureError
 from flexctrl.model.motion import Motion, State
+from flexctrl.structure.freedoms import HUGE
 from flexctrl.structure.relations import Copy, Turn
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ def check_state(model: Model, state: State, owner: str) -> None:
             )
         if not np.isfinite(getattr(state, name)).all():
             raise StructureError(f"{owner}: the state's {name} holds what is no finite number")
+        if (largest := np.abs(getattr(state, name)).max(initial=0.0)) >= HUGE:
+            raise StructureError(f"{owner}: the state's {name} holds {largest:.3g}; expected numbers below {HUGE:g}")
     worst = max(breaches(model, state), default=Breach(0.0, ""))
     if worst.gap > _ALLOWED:
         raise StructureError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
@@ -127,6 +128,20 @@ def check_finite(value: float, what: str, owner: str, *, least: float = -math.in
     if abs(number) >= HUGE:
         raise StructureError(f"{owner}: {what} = {value!r}; expected a finite number below {HUGE:g}")
     return number
+
+
+def check_seconds(value: float, what: str, owner: str, *, endless: bool = False) -> float:
+    """Return ``value`` as a float if it is a time above zero, which may be infinite if ``endless``."""
+    seconds = _number(value)
+    if not seconds > 0.0 or (math.isinf(seconds) and not endless):
+        raise StructureError(f"{owner}: {what} = {value!r}; expected seconds > 0")
+    return seconds
+
+
+def check_path(path: str | os.PathLike[str], owner: str) -> None:
+    """Raise unless ``path`` names a file."""
+    if not isinstance(path, str | os.PathLike) or not str(path):
+        raise StructureError(f"{owner}: path = {path!r}; expected the name of a file")
 
 
 def check_whole(value: int, what: str, owner: str, *, least: int, most: int = 2**31) -> int:

@@ -1,0 +1,102 @@
+"""What a run may be asked for: arguments of another kind are refused before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from flexctrl.dynamics.checkpoint import Autosave, Checkpoint
+from flexctrl.dynamics.events import Event
+from flexctrl.dynamics.record import Record
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.steps import Integrator
+from flexctrl.errors import StructureError
+from flexctrl.linear.model import LinearModel
+from flexctrl.model.equilibrium import Rest
+from flexctrl.model.model import Model
+from flexctrl.model.motion import State
+from flexctrl.structure.freedoms import check_seconds, listed
+
+__all__ = ["check_arguments", "check_times", "events_of"]
+
+_KINDS: dict[str, tuple[Any, str]] = {
+    "model": ((Model, LinearModel), "a Model (from assemble) or a LinearModel (from linearize)"),
+    "start": ((State, Rest, Checkpoint), "a State (model.rest, run.final), a Rest (from equilibrium) or a Checkpoint"),
+    "method": (Integrator, "a method with its parameters, as GeneralizedAlpha(1e-3) or AdaptiveAlpha()"),
+    "tolerance": (Tolerance, "a Tolerance, as Tolerance(relative=1e-5)"),
+    "record": (Record, "InMemory() or CsvStream('run.csv')"),
+    "autosave": (Autosave, "an Autosave, as Autosave('run.checkpoint')"),
+    "progress": (Callable, "a function of the share that is done"),
+}
+
+
+def check_arguments(given: Mapping[str, object]) -> None:
+    """Raise unless each argument of `simulate` that was given is of its kind.
+
+    Parameters
+    ----------
+    given : mapping of str to object
+        By name; None where nothing was given.
+
+    Raises
+    ------
+    StructureError
+        Names the argument, its value and what was expected.
+    """
+    for name, value in given.items():
+        kinds, expected = _KINDS[name]
+        if value is not None and (isinstance(value, type) or not isinstance(value, kinds)):
+            raise StructureError(f"simulate: {name} = {_short(value)}; expected {expected}")
+
+
+def check_times(until: float, every: float | None, start: object) -> None:
+    """Raise unless a run has an end that it can come to, and rows a spacing.
+
+    Parameters
+    ----------
+    until : float
+    every : float or None
+    start : State, Rest, Checkpoint or None
+
+    Raises
+    ------
+    StructureError
+        For what is no time above zero, or an end before the start.
+    """
+    check_seconds(until, "until", "simulate")
+    if every is not None:
+        check_seconds(every, "every", "simulate", endless=True)
+    if isinstance(start, Checkpoint) and until < start.t * (1.0 - 1e-9):
+        raise StructureError(
+            f"simulate: until = {until} s is before the checkpoint, which is at {start.t:.9g} s; give a later end"
+        )
+
+
+def events_of(given: Sequence[Event]) -> tuple[Event, ...]:
+    """Return a list of events.
+
+    Parameters
+    ----------
+    given : sequence of Event
+
+    Returns
+    -------
+    tuple of Event
+
+    Raises
+    ------
+    StructureError
+        For what is no list of them.
+    """
+    if isinstance(given, Event):
+        raise StructureError(f"simulate: events = {given}; expected a list: events=[Event(…)]")
+    found = listed(given, "simulate: events")
+    for event in found:
+        if not isinstance(event, Event):
+            raise StructureError(f"simulate: events holds {_short(event)}; expected Event('name', 'signal', at=…)")
+    return tuple(found)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}…"

@@ -1,0 +1,149 @@
+"""What a run cannot be asked: the message names the argument, its value and what was expected."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.errors import MechanismError, StructureError
+
+
+@pytest.fixture(scope="module")
+def model() -> fc.Model:
+    bob = fc.RigidBody("bob", (0, 0, -1), 1.0, (1e-3,) * 3, points={"top": (0, 0, 0)})
+    structure = fc.Structure(
+        [bob],
+        [fc.Support(bob.point("top"), "u v w rx rz")],
+        inputs=[fc.Force("push", bob.node, "x")],
+        outputs=[fc.Rotation("swing", bob.node, "y")],
+    )
+    return fc.assemble(structure, [fc.Gravity(), fc.LargeRotation()], fc.CasadiVM())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"until": "x"}, "until = 'x'; expected seconds > 0"),
+        ({"until": True}, "until = True; expected seconds > 0"),
+        ({"every": "a"}, "every = 'a'; expected seconds > 0"),
+        ({"start": "a"}, "start = 'a'; expected a State"),
+        ({"start": np.zeros(3)}, "start = array([0., 0., 0.]); expected a State"),
+        ({"method": "x"}, "method = 'x'; expected a method with its parameters, as GeneralizedAlpha(1e-3)"),
+        ({"method": fc.GeneralizedAlpha}, "GeneralizedAlpha'>; expected a method with its parameters"),
+        ({"tolerance": 1e-4}, "tolerance = 0.0001; expected a Tolerance, as Tolerance(relative=1e-5)"),
+        ({"events": fc.Event("top", "swing")}, "expected a list: events=[Event(…)]"),
+        ({"events": 3}, "events = 3; expected a list"),
+        ({"events": "a"}, "events holds 'a'; expected Event("),
+        ({"record": "x.csv"}, "record = 'x.csv'; expected InMemory() or CsvStream('run.csv')"),
+        ({"autosave": "x"}, "autosave = 'x'; expected an Autosave, as Autosave('run.checkpoint')"),
+        ({"progress": 1}, "progress = 1; expected a function"),
+        ({"events": [fc.Event("top", lambda signals: np.nan)]}, "event 'top': its function gives nan"),
+        ({"events": [fc.Event("top", lambda signals: signals["x"])]}, "event 'top': its function raised KeyError: 'x'"),
+    ],
+    ids=lambda v: next(iter(v)) if isinstance(v, dict) else "",
+)
+def test_arguments_of_another_kind_are_refused(model, wrong, message):
+    with pytest.raises(StructureError, match=re.escape(message)):
+        fc.simulate(model, **{"until": 0.01, **wrong})
+
+
+def test_what_is_no_model_is_refused():
+    with pytest.raises(StructureError, match="model = 'crane'; expected a Model"):
+        fc.simulate("crane", until=1.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: fc.GeneralizedAlpha("1e-3"), "GeneralizedAlpha: step = '1e-3'; expected seconds > 0"),
+        (lambda: fc.GeneralizedAlpha(1e-3, "high"), "generalised alpha: rho = 'high'; expected a number"),
+        (lambda: fc.AdaptiveAlpha(first_step="a"), "AdaptiveAlpha: first_step = 'a'; expected seconds > 0"),
+        (lambda: fc.ExplicitRungeKutta("a"), "ExplicitRungeKutta: step = 'a'; expected seconds > 0"),
+        (lambda: fc.ExplicitRungeKutta(largest_step=0), "ExplicitRungeKutta: largest_step = 0; expected seconds > 0"),
+        (lambda: fc.Tolerance("a"), "Tolerance: relative = 'a'; expected a number ≥ 0"),
+        (lambda: fc.Tolerance(absolute=0.0), "Tolerance: absolute = 0.0; expected a number > 0"),
+        (lambda: fc.InMemory("a"), "InMemory: bytes of states = 'a'; expected a number ≥ 0"),
+        (lambda: fc.CsvStream(3), "CsvStream: path = 3; expected the name of a file"),
+        (lambda: fc.Autosave("x", "a"), "Autosave: seconds = 'a'; expected seconds > 0"),
+        (lambda: fc.Autosave(None), "Autosave: path = None; expected the name of a file"),
+        (lambda: fc.Event("top", 3), "event 'top': of = 3; expected the name of a signal or a function"),
+        (lambda: fc.Event("top", "swing", direction="up"), "direction = 'up'; expected one of Direction.RISING"),
+        (lambda: fc.Event(3, "swing"), "event 3: its name is no text"),
+    ],
+)
+def test_values_that_cannot_be_are_refused_where_they_are_made(make, message):
+    with pytest.raises(StructureError, match=re.escape(message)):
+        make()
+
+
+def test_an_event_that_is_no_number_later_ends_the_run(model):
+    """What was computed until then is kept."""
+    start = model.rest.with_(v=np.array([1.0]))
+    event = fc.Event("deep", lambda signals: np.sqrt(0.1 - signals["swing"]) if signals["swing"] < 0.1 else np.nan)
+    run = fc.simulate(model, until=1.0, start=start, events=[event], method=fc.GeneralizedAlpha(1e-2))
+    assert run.status is fc.Status.FAILED
+    assert "event 'deep': its function gives nan" in run.report.message
+    assert 0.05 < run.t[-1] < 0.12
+
+
+BROKEN = {"empty": b"", "text": b"hello", "zip": b"PK\x03\x04" + 100 * b"x", "half": None}
+
+
+@pytest.mark.parametrize("content", BROKEN.values(), ids=BROKEN)
+def test_files_that_are_no_checkpoints(model, tmp_path: Path, content):
+    path = tmp_path / "run.checkpoint"
+    fc.simulate(model, until=0.01).checkpoint.save(path)
+    path.write_bytes(path.read_bytes()[:3000] if content is None else content)
+    with pytest.raises(StructureError, match=r"is no checkpoint: .*give a file that Checkpoint.save wrote"):
+        fc.load_checkpoint(path)
+
+
+def test_a_run_goes_on_as_it_was_asked_for_and_not_backwards(model):
+    stopped = fc.simulate(model, until=0.1).checkpoint
+    with pytest.raises(StructureError, match=rf"until = .* s is before the checkpoint, which is at {stopped.t:.9g} s"):
+        fc.simulate(model, until=0.5 * stopped.t, start=stopped)
+    with pytest.raises(StructureError, match="the checkpoint is of another tolerance"):
+        fc.simulate(model, until=0.2, start=stopped, tolerance=fc.Tolerance(1e-6))
+    assert fc.simulate(model, until=0.2, start=stopped).status is fc.Status.FINISHED
+
+
+@pytest.mark.parametrize("speed", [1e200, -1e60])
+def test_a_start_beyond_all_numbers_is_blamed(model, speed):
+    with pytest.raises(StructureError, match=r"the state's v holds .*; expected numbers below 1e\+50"):
+        fc.simulate(model, until=1.0, start=model.rest.with_(v=np.array([speed])))
+
+
+def test_steps_longer_than_the_motion_are_noted(model):
+    """A pendulum of 2 s in steps of 10 s finishes, and says that it is none; in steps of 1 ms there is no word."""
+    start = model.rest.with_(v=np.array([2.0]))
+    coarse, fine = (
+        fc.simulate(model, until=until, start=start, method=fc.GeneralizedAlpha(step))
+        for step, until in ((10.0, 100.0), (1e-2, 1.0))
+    )
+    assert coarse.report.energy_residual > 0.5
+    assert "the motion is not resolved" in coarse.report.notes[-1]
+    assert "the motion is not resolved" in str(coarse.report)
+    assert fine.report.notes == model.notes
+
+
+def test_states_of_effects_are_not_asked_for_mass():
+    wheel = fc.RigidBody("wheel", (0, 0, 0), 1.0, (0.1, 0.1, 0.1))
+    drive = fc.RotaryDrive("drive", wheel.node, axis="z", stiffness=5.0, ratio=3.0, inertia=0.02)
+    structure = fc.Structure(
+        [wheel], [fc.Support(wheel.node, "u v w rx ry")], [drive], [fc.MotorTorque("torque", drive)]
+    )
+    lagging = fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity(), fc.MotorLag({"drive": 0.05})])
+    with pytest.raises(MechanismError, match=r"drive_lag is no motion but a state of an effect .* implicit method"):
+        fc.simulate(lagging, until=0.1, method=fc.ExplicitRungeKutta())
+
+
+def test_a_checkpoint_knows_its_tolerance(model, tmp_path: Path):
+    tolerance = fc.Tolerance(1e-6, 1e-9)
+    stopped = fc.simulate(model, until=0.01, tolerance=tolerance).checkpoint
+    stopped.save(tmp_path / "run.checkpoint")
+    read = fc.load_checkpoint(tmp_path / "run.checkpoint")
+    assert read.tolerance == tolerance
