@@ -29,6 +29,7 @@ from scipy.interpolate import CubicSpline
 
 import flexctrl as fc
 from flexctrl.cranes import ceiling_crane
+from flexctrl.model.flattening import flatten
 
 EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation())
 TARGETS = (1e-3, 1e-4, 1e-5)
@@ -214,15 +215,31 @@ def growth(quick: bool) -> dict[str, object]:
     """Exponent of our time per step between 100 and 10,000 elements, from the difference of long and short runs."""
     found = {}
     for name, angle in SWINGS.items():
-        times = {}
+        times, newton = {}, {}
         for n in (100, 1000) if quick else (100, 1000, LARGEST):
             short, long = (100, 200) if n > 1000 else (200, 600)
-            spans = [[our_chain(n, angle, steps)[1] for steps in (short, long)] for _ in range(3)]
-            times[n] = (min(s[1] for s in spans) - min(s[0] for s in spans)) / (long - short)
+            tries = [[our_chain(n, angle, steps)[1:] for steps in (short, long)] for _ in range(3)]
+            first, both = (min(two[k][0] for two in tries) for k in (0, 1))
+            times[n] = (both - first) / (long - short)
+            newton[n] = (tries[0][1][1] - tries[0][0][1]) / (long - short)
         exponent = float(np.polyfit(np.log(list(times)), np.log(list(times.values())), 1)[0])
-        found[name] = {"times": {str(n): t for n, t in times.items()}, "exponent": exponent}
-        print(f"growth, {name}: exponent {exponent:.3f}", times, flush=True)
+        found[name] = {
+            "exponent": exponent,
+            "elements": list(times),
+            "times": list(times.values()),
+            "newton": list(newton.values()),
+            "bytes": bytes_an_element(1000),
+        }
+        print(f"growth, {name}: exponent {exponent:.3f}", found[name], flush=True)
     return found
+
+
+def bytes_an_element(elements: int) -> float:
+    """What an iteration reads or writes for each element: workspace, factors, tables of the forces."""
+    F = flatten(chain_model(elements, SWINGS["easy"]))
+    f, fronts = F.flat, F.plan.fronts
+    tables = sum(a.nbytes for run in f.forces for a in (run.tables.gather, run.tables.scatter, run.blocks))
+    return (tables + 8 * (f.size + f.padded + fronts.below + fronts.right)) / elements
 
 
 def full_swing(quick: bool) -> dict[str, object]:
@@ -274,33 +291,36 @@ _FIRST = """
 import time
 start = time.perf_counter()
 import numpy, casadi
-libraries = time.perf_counter()
+libraries, before = time.perf_counter(), time.process_time()
 import flexctrl as fc
 imported = time.perf_counter()
+import scipy.sparse, scipy.linalg, scipy.sparse.linalg, scipy.sparse.csgraph, llvmlite.binding
+others = time.process_time() - before
 model = fc.assemble(fc.cranes.ceiling_crane(), [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
 run = fc.simulate(model, until=0.05, inputs={"push": 500.0}, method=fc.GeneralizedAlpha(1e-4))
 float(run["x1_minus_x4"][-1])
-print(imported - libraries, time.process_time())
+print(imported - libraries, time.process_time(), before, others)
 """
 
 
 def cold_race(quick: bool) -> dict[str, object]:
     """CPU seconds of a process from its start to the first result of the crane, without and with kept code."""
-    empty, kept, imports = [], [], []
+    empty, kept, told = [], [], []
     with tempfile.TemporaryDirectory() as bytecode:
         for round_ in range(2 if quick else 6):
             with tempfile.TemporaryDirectory() as cache_home:
                 for spans in (empty, kept):
                     environment = {**os.environ, "XDG_CACHE_HOME": cache_home, "PYTHONPYCACHEPREFIX": bytecode}
                     environment.pop("PYTHONDONTWRITEBYTECODE", None)
-                    told = subprocess.run(
+                    run = subprocess.run(
                         [sys.executable, "-c", _FIRST], env=environment, capture_output=True, text=True, check=True
                     )
-                    imported, cpu = map(float, told.stdout.split())
+                    times = [float(word) for word in run.stdout.split()]
                     if round_:  # the first one writes bytecode, as an installation does
-                        spans.append(cpu)
-                        imports.append(imported)
-    found = {"empty": min(empty), "kept": min(kept), "import": min(imports)}
+                        spans.append(times[1])
+                        told.append(times)
+    imported, _, libraries, others = (min(times) for times in zip(*told, strict=True))
+    found = {"empty": min(empty), "kept": min(kept), "import": imported, "libraries": libraries, "others": others}
     print("cold process:", found, flush=True)
     return found
 
