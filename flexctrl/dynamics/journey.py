@@ -99,6 +99,7 @@ class Journey:
     status: Status = Status.FINISHED
     message: str = ""
     fault: BaseException | None = None
+    notes: tuple[str, ...] = ()
     saved: Checkpoint | None = None
     _memory: Any = None
     _told: float = 0.0

@@ -21,6 +21,7 @@ from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.record import InMemory, Record
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
+from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
@@ -196,6 +197,8 @@ def _begun(
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method.order)
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
+    if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
+        journey.notes = (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
     rows.here(point, 0.0)
     return journey
 
@@ -269,7 +272,7 @@ def _report(journey: Journey) -> Report:
         worst=model.coordinates[counts.worst] if model.n else "",
         closure_error=sums.closure,
         message=journey.message,
-        notes=(*model.notes, *journey.books.doubts),
+        notes=(*model.notes, *journey.notes, *journey.books.doubts),
     )
 
 

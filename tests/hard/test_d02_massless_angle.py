@@ -146,6 +146,7 @@ def test_a_massless_motor_under_torques_that_jump(record, name):
     )
     lost = 5 * 0.5**2 / 2 / 10 + 4 * 0.5**2 / 2 / 10
     assert run.report.energy.dissipated == pytest.approx(lost, rel=1e-6)
+    assert any("motor_source" in note and "without mass" in note for note in run.report.notes)
 
 
 def test_a_massless_motor_with_a_damped_shaft_creeps_to_its_twist():
