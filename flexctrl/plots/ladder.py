@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.plots.style import FLEXIBLE, INK, PALE, tidy
+from flexctrl.plots.style import CYCLE, PALE, tidy
 
 if TYPE_CHECKING:
     from flexctrl.study.ladder import Ladder
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["ladder_figure", "rungs_chart"]
 
 _LEAST = 1e-6
+_MARKS = "osD^v*P"
 
 
 def ladder_figure(ladder: Ladder) -> Figure:
@@ -35,7 +36,7 @@ def ladder_figure(ladder: Ladder) -> Figure:
 
 
 def rungs_chart(ax: Axes, ladder: Ladder) -> Axes:
-    """Draw the rungs in their order, named; below the grey band the reference knows no better.
+    """Draw the rungs in their order; within the grey band the reference knows no better.
 
     Parameters
     ----------
@@ -49,10 +50,9 @@ def rungs_chart(ax: Axes, ladder: Ladder) -> Axes:
     ran = [r for r in ladder.rungs if np.isfinite(r.error)]
     times, errors = [r.time_ratio for r in ran], [max(r.error, _LEAST) for r in ran]
     ax.plot(times, errors, color=PALE, linewidth=1.2, zorder=1)
-    ax.plot(times, errors, "o", color=FLEXIBLE, markersize=8, zorder=2)
-    for k, (rung, x, y) in enumerate(zip(ran, times, errors, strict=True)):
-        up = 9 if k % 2 == 0 else -17
-        ax.annotate(rung.name, (x, y), (0, up), textcoords="offset points", ha="center", fontsize=9, color=INK)
+    for rung, mark, colour, x, y in zip(ran, _MARKS, CYCLE, times, errors, strict=False):
+        ax.plot(x, y, mark, color=colour, markersize=9, alpha=0.85, label=rung.name, zorder=2)
+    ax.legend(fontsize="small", frameon=False)
     ax.axhspan(_LEAST / 10, max(ladder.reference.uncertainty, _LEAST), color="#e5e7eb", zorder=0)
     ax.set(xscale="log", yscale="log", title=ladder.name)
     ax.set_xlim(0.5 * min(times), 2.0 * max(times))

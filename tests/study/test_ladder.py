@@ -67,7 +67,7 @@ def test_more_physics_is_nearer_to_the_truth(climbed):
 def test_its_words_and_picture(climbed):
     assert "next takes" in str(climbed)
     figure = climbed.plot()
-    assert [t.get_text() for t in figure.axes[0].texts] == [r.name for r in climbed.rungs]
+    assert [t.get_text() for t in figure.axes[0].get_legend().get_texts()] == [r.name for r in climbed.rungs]
 
 
 def test_wrong_questions_are_answered(scene, climbed):
