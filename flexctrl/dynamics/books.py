@@ -190,7 +190,8 @@ class Books:
     def doubts(self) -> tuple[str, ...]:
         """What the books say against a motion that goes on: they miss a large share of what was turned over."""
         s = self.sums
-        if not (self.lawful and self.residual > _ABSURD and (s.moved >= _VISIBLE * self.reach).any()):
+        visible = (s.moved >= _VISIBLE * self.reach).any() and s.gap >= _ROUND_OFF * abs(s.start)
+        if not (self.lawful and self.residual > _ABSURD and visible):
             return ()
         return (
             f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved; take "
