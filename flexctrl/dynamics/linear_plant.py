@@ -129,7 +129,7 @@ class _Straight:
         """Nothing."""
         return np.zeros(0)
 
-    def values(self, state: State) -> np.ndarray:
+    def values(self, state: State, before: State) -> np.ndarray:
         """Return nothing."""
         return np.zeros(0)
 

@@ -45,16 +45,26 @@ class Turnover:
         h : float
             Its length [s].
         """
+        z = np.append(x, w)
+        work, lost = (float(z @ G @ z) for G in self.forms(h))
+        return work, lost
+
+    def forms(self, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return work and losses over a step as quadratic forms of (x, w) at its start.
+
+        Parameters
+        ----------
+        h : float
+            Its length [s].
+        """
         found = self._kept.get(h)
         if found is None:
             if len(self._kept) >= _KEPT:
                 self._kept.clear()
             found = self._kept[h] = self._doubled(h)
-        z = np.append(x, w)
-        work, lost = (float(z @ G @ z) for G in found)
-        return work, lost
+        return found
 
-    def _forms(self) -> tuple[np.ndarray, np.ndarray]:
+    def _powers(self) -> tuple[np.ndarray, np.ndarray]:
         """Powers of the inputs and of what dampens, as forms of (x, w)."""
         model, e, n = self.model, self.equations, self.model.n
         still, none = np.zeros(n), np.zeros(len(model.inputs))
@@ -68,7 +78,7 @@ class Turnover:
         first = self.equations.first
         fastest = max((float(np.abs(np.linalg.eigvals(first.A[b, b])).max()) for b in first.blocks), default=0.0)
         doublings = max(0, math.ceil(math.log2(max(h * fastest / _RESOLVED, 1.0))))
-        tau, forms = h / 2**doublings, self._forms()
+        tau, forms = h / 2**doublings, self._powers()
         sums = [np.zeros_like(form) for form in forms]
         for share, weight in zip(*np.polynomial.legendre.leggauss(6), strict=True):
             step = self._transition(0.5 * (1.0 + share) * tau)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from flexctrl.dynamics.march.record import DONE, WANTS_TANGENT, Leap, March
 from flexctrl.dynamics.modal_equations import ModalEquations
 from flexctrl.dynamics.propagator import Propagator
+from flexctrl.dynamics.quadratic import Turnover
 from flexctrl.kernels.eights import Eight, eight, put, total
 from flexctrl.kernels.native import Reals
 from flexctrl.model.layout import Flattened
@@ -19,9 +19,6 @@ __all__ = ["Tables", "fill", "leap", "leap_of"]
 _ALIKE = 1e-9
 _NOTHING = 1e-150
 """Below this a modal state is zero: processors are slow with the smallest numbers there are."""
-
-_LOBATTO = ((0.0, 1.0 / 20.0), (0.5 - (3.0 / 28.0) ** 0.5, 49.0 / 180.0), (0.5, 64.0 / 180.0))
-"""Points of a step up to its middle, and their weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,20 +40,9 @@ class Tables:
     losses: np.ndarray
 
     @classmethod
-    def of(cls, h: float, equations: ModalEquations, propagator: Propagator, damping: sp.spmatrix) -> Tables:
+    def of(cls, h: float, propagator: Propagator, turnover: Turnover) -> Tables:
         """Work them out."""
-        first, n = equations.first, damping.shape[0]
-        size = sum(first.B.shape)
-        speed = np.hstack([first.C[n:], first.D[n:]])
-        power = speed.T @ (damping @ speed)
-        losses = np.zeros((size, size))
-        mirrored = [(1.0 - share, weight) for share, weight in _LOBATTO[:2]]
-        for share, weight in (*_LOBATTO, *mirrored) if power.any() else ():
-            through = np.eye(size)
-            if share:
-                through[: len(first.A)] = _over(propagator, share * h, h)
-            losses += h * weight * through.T @ power @ through
-        return cls(h, _over(propagator, h, h), losses)
+        return cls(h, _over(propagator, h, h), turnover.forms(h)[1])
 
 
 def _over(propagator: Propagator, t: float, h: float) -> np.ndarray:

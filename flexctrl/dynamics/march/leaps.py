@@ -49,10 +49,7 @@ class Leaper(Marcher):
         assert steps is not None
         key = float(f"{h:.9e}")
         if key not in self._tables:
-            still = np.zeros(self.model.n)
-            none = np.zeros(len(self.model.inputs))
-            damping = -self.model.slope(self.model.rest, still, still, (0.0, 1.0, 0.0), none)
-            self._tables[key] = Tables.of(h, steps.equations, steps.propagator, damping)
+            self._tables[key] = Tables.of(h, steps.propagator, steps.turnover)
         fill(self.leap, self._tables[key])
         self._numbers.h = h
         return DONE
