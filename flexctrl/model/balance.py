@@ -11,14 +11,19 @@ import scipy.sparse as sp
 
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.rotating_frame import RotatingFrame
+from flexctrl.errors import SingularMatrixError
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
+from flexctrl.model.pivots import holds, negative_pivots
+from flexctrl.model.rounding import force_rounding, slope_terms
+from flexctrl.model.solve import factorise
 from flexctrl.model.tangents import TURNS
 
 __all__ = ["Balance"]
 
-_LASTING = ("free", "fixed", "still", "turning", "lever", "unit", "inertia", "heaviest")
+_LASTING = ("free", "fixed", "still", "turning", "lever", "unit", "inertia", "heaviest", "_weights")
+_STILL, _UNFELT = 1e-12, 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,25 +122,76 @@ class Balance:
         return float(max(loads, weights, np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0), 1e-300))
 
     def pull(self, state: State) -> float:
-        """Return the ω² at which the machine would swing as a whole under the forces at work [(rad/s)²]."""
-        mass = float(self.inertia[~self.turning].sum()) or self.heaviest
-        return self.scale(state) / (mass * self.size)
+        """Return the ω² at which the machine would swing as a whole under the forces at work [(rad/s)²].
 
-    def noise(self, state: State) -> float:
-        """Return the relative residual that round-off of the positions alone makes: |K| times their last digits."""
-        return float((self._round_off(state) / self.lever[self.free]).max(initial=0.0)) / self.scale(state)
+        Weights count whether the machine can give way to them or not.
+        """
+        mass = float(self.inertia[~self.turning].sum()) or self.heaviest
+        return max(self.scale(state), self._weights) / (mass * self.size)
+
+    @cached_property
+    def _weights(self) -> float:
+        """All forces on the nodes of the machine as drawn [N]."""
+        model = self.model
+        nodes = model.forces.raw(model.rest, self.still, self.still)[: model.motion.source_base].reshape(-1, 2, 3)
+        return float(np.abs(nodes[:, 0]).sum() + np.abs(nodes[:, 1]).sum() / self.size)
 
     def idle(self, state: State) -> bool:
-        """Tell whether nothing is at work: no loads, no weights, and every force is round-off where it acts."""
-        loaded = self.u.any() or any(isinstance(e, Gravity | RotatingFrame) for e in self.model.effects)
-        if loaded or self.astray(state):
+        """Tell whether nothing is left to do: every force is round-off where it acts, and no load is at work beside.
+
+        Under loads the round-off of stiff pieces may hide them, so that nothing may give way to it either.
+        """
+        force = self.force(state)
+        if self.astray(state) or (np.abs(force) > self._round_off(state)).any():
             return False
-        return not (np.abs(self.force(state)) > self._round_off(state)).any()
+        return not self._loaded or self._way(state, force) <= _STILL
+
+    @property
+    def _loaded(self) -> bool:
+        """Whether loads or weights are at work."""
+        return bool(self.u.any()) or any(isinstance(e, Gravity | RotatingFrame) for e in self.model.effects)
 
     def _round_off(self, state: State) -> np.ndarray:
-        """Forces on the free coordinates that the last digits of the places make."""
-        reach = np.where(self.turning, 1.0, max(self.size, float(np.abs(state.x).max(initial=0.0))))
-        return 4.0 * (abs(self.slope(state)) @ (reach * np.finfo(float).eps))[self.free]
+        """The largest forces on the free coordinates that may be rounding alone."""
+        return force_rounding(self.model, state, self.u)[self.free]
+
+    def holds(self, state: State, K: sp.csr_matrix) -> bool:
+        """Tell whether a stiffness K of all coordinates resists every displacement of the free ones."""
+        return holds(self.among_free(K), self._terms(state, K))
+
+    def unstable(self, state: State) -> int:
+        """Return in how many directions the free coordinates leave the state by themselves."""
+        K = self.slope(state)
+        return negative_pivots(self.among_free(K), self._terms(state, K))
+
+    def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+        return self.among_free(slope_terms(self.model, state, self.u, K))
+
+    def settled(self, state: State, tolerance: float) -> bool:
+        """Tell whether a state is an equilibrium, as far as round-off lets that be told.
+
+        The last digits of the places make forces in stiff pieces that may be far from nothing. What of them is left
+        to the motions that are no stiffer than the forces at work is nothing at all.
+        """
+        force = self.force(state)
+        scale = self.scale(state)
+        if self.relative(force, scale) <= tolerance:
+            return True
+        if self.relative(self._beyond(state, force), scale) > tolerance:
+            return False
+        return not self._loaded or self._way(state, force) <= max(tolerance, _UNFELT)
+
+    def _beyond(self, state: State, force: np.ndarray) -> np.ndarray:
+        return np.asarray(force - np.clip(force, *np.outer((-1.0, 1.0), self._round_off(state))))
+
+    def _way(self, state: State, force: np.ndarray) -> float:
+        """How far forces move the machine were all masses held by what is at work: in radians or sizes of it."""
+        ground = sp.diags(self.pull(state) * self.inertia[self.free])
+        try:
+            step = factorise((self.among_free(self.slope(state)) + ground).tocsr())(force)
+        except SingularMatrixError:
+            return np.inf
+        return float(np.abs(step / self.unit[self.free]).max(initial=0.0))
 
     def relative(self, force: np.ndarray, scale: float) -> float:
         """Return the largest of some forces on the free coordinates over the forces at work; infinite for NaN."""
@@ -146,9 +202,9 @@ class Balance:
         """Return the largest unbalanced force over the forces at work."""
         return self.relative(self.force(state), self.scale(state))
 
-    def beyond_noise(self, state: State, residual: float) -> float:
-        """Return a relative residual, 0 where it is lost in the round-off of the positions."""
-        return residual if residual > self.noise(state) else 0.0
+    def beyond_noise(self, state: State) -> float:
+        """Return the largest unbalanced force that is no round-off where it acts, over the forces at work."""
+        return self.relative(self._beyond(state, self.force(state)), self.scale(state))
 
     def worst(self, state: State) -> str:
         """Return the coordinate that is pushed most."""

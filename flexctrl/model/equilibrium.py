@@ -14,7 +14,6 @@ from flexctrl.model.certify import whole_body
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
 from flexctrl.model.motion import State
-from flexctrl.model.pivots import holds, negative_pivots
 from flexctrl.model.search import Found, Newton, follow
 
 if TYPE_CHECKING:
@@ -139,8 +138,8 @@ def rest_of(balance: Balance, found: Found) -> Rest:
     model = balance.model
     outputs = dict(zip(model.outputs, model.measure(found.state).tolist(), strict=True))
     held = tuple(model.coordinates[i] for i in balance.held)
-    unstable = negative_pivots(balance.among_free(balance.slope(found.state)))
-    residual = balance.beyond_noise(found.state, found.residual)
+    unstable = balance.unstable(found.state)
+    residual = min(found.residual, balance.beyond_noise(found.state))
     return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held, unstable)
 
 
@@ -150,7 +149,7 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
         raise EquilibriumError("no equilibrium found: the start's own forces are not finite; start from another shape")
     if balance.idle(start):
         return Found(start, balance.residual(start), 0, True, True, True)
-    if holds(balance.among_free(balance.slope(start))):
+    if balance.holds(start, balance.slope(start)):
         straight = Newton(balance, tolerance).run(start, 60, watch=True)
         if straight.done and straight.steady:
             return straight

@@ -17,6 +17,22 @@ from flexctrl.model.mixed import Excess, Mixed
 from flexctrl.model.motion import DENSE_UP_TO, Motion, State
 
 
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Sizes of what is added up over the pieces.
+
+    Attributes
+    ----------
+    forces : numpy.ndarray, shape (raw,)
+        A piece's force on a node counts in every direction, and as a moment over the length of the piece.
+    slopes : scipy.sparse.csr_matrix, shape (raw, raw)
+        Of the tangents at rest.
+    """
+
+    forces: np.ndarray
+    slopes: sp.csr_matrix
+
+
 @dataclass(frozen=True)
 class Forces:
     """The sum of all families.
@@ -184,6 +200,30 @@ class Forces:
             total -= np.einsum("eik,eji,ejl->kl", own, blocks, own)
         return total.astype(float)
 
+    def terms(self, state: State) -> Terms:
+        """Return how large the forces and tangents of single pieces are at rest: rounding comes of them."""
+        still, motion = np.zeros(self.motion.n), self.motion
+        z = self.slots(state, still, still)
+        slopes = self._raw_matrix(np.abs(self._blocks(z, (1.0, 0.0, 0.0))))
+        total = np.zeros(motion.raw)
+        for f, run in zip(self.families, self._apart, strict=True):
+            cells = f.scatter(motion.source_base)
+            own = np.zeros(cells.size)
+            run(z, own)
+            size = _in_every_direction(f, np.abs(own.reshape(cells.shape)), state.x)
+            total += np.bincount(cells.ravel(), weights=size.ravel(), minlength=motion.raw)
+        return Terms(total, slopes)
+
+    @cached_property
+    def _apart(self) -> tuple[Run, ...]:
+        """The forces of each family, piece by piece."""
+        base = self.drive_base
+        tables = [np.arange(f.count * f.kernels.kind.width).reshape(f.count, -1) for f in self.families]
+        return tuple(
+            self.backend.bind(f.kernels.force, f.gather(base), f.parameters, table)
+            for f, table in zip(self.families, tables, strict=True)
+        )
+
     def inertias(self, state: State) -> np.ndarray:
         """Return the largest inertia about any axis at each raw freedom: of its node's three displacements or turns.
 
@@ -277,6 +317,19 @@ class Forces:
         """Where each entry of the tangent blocks goes in the assembled matrix (CSR): the join table at work."""
         rows, columns = (self.motion.cells[cells] for cells in self.pattern)
         return _table_of(rows, columns, self.motion.n)
+
+
+def _in_every_direction(family: Family, size: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Forces of pieces, shape (pieces, width), as they may point, and as moments over the length of each piece."""
+    kind = family.kernels.kind
+    if kind.nodes:
+        nodes = size[:, : kind.nodes * kind.freedoms].reshape(len(size), kind.nodes, -1, 3)
+        nodes[:] = np.linalg.norm(nodes, axis=3, keepdims=True)
+        ends = x[family.nodes]
+        span = np.linalg.norm(ends - ends[:, :1], axis=2).max(axis=1)
+        nodes[:, :, 1:] += (span * nodes[:, :, 0].max(axis=(1, 2)))[:, None, None, None]
+        size[:, : kind.nodes * kind.freedoms] = nodes.reshape(len(size), -1)
+    return size
 
 
 def _table_of(rows: np.ndarray, columns: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -53,7 +53,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
         If something moves that has neither mass nor stiffness.
     LinearizationError
         If the state is not an equilibrium (says by how much and where), another point of the
-        certificate fails, or nothing in the machine can move.
+        certificate fails, or nothing in the machine can move or is left free to.
     EquilibriumError
         If none was given and none is found.
     """
@@ -68,6 +68,11 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     check_state(model, state, "linearize: at")
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
     free = _free(model, rest)
+    if not free.size:
+        raise LinearizationError(
+            f"linearize: every coordinate is held ({', '.join(model.coordinates)}), so there is nothing to linearise; "
+            "linearise about an equilibrium that leaves one free"
+        )
     held = set(range(model.n)) - set(free.tolist())
     balance = Balance(model, u, {i: float(state.q[i]) for i in sorted(held)})
     residual = _check_balance(balance, state)
@@ -153,16 +158,15 @@ def _free(model: Model, rest: Rest | State) -> np.ndarray:
 def _check_balance(balance: Balance, state: State) -> float:
     if np.abs(state.v).max(initial=0.0) > 0.0:
         raise LinearizationError("linearize: the state moves; give one at rest, e.g. from equilibrium(model)")
-    force, scale = balance.force(state), balance.scale(state)
-    residual = balance.relative(force, scale)
-    if residual > _BALANCED + balance.noise(state):
+    if not balance.settled(state, _BALANCED):
+        force, scale = balance.force(state), balance.scale(state)
         worst = int(np.argmax(np.abs(force)))
         name = balance.model.coordinates[balance.free[worst]]
         raise LinearizationError(
             f"linearize: not an equilibrium: {name} is pushed by {force[worst]:.4g} (forces at work: {scale:.3g}); "
             "linearise about equilibrium(model), or name the inputs that balance it"
         )
-    return balance.beyond_noise(state, residual)
+    return balance.beyond_noise(state)
 
 
 def _refuse_corners(model: Model, state: State, free: np.ndarray) -> None:

@@ -7,27 +7,29 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from flexctrl.linear.pencil import stiffness_noise
-
 ZERO_PIVOT = 1e-13
 """Pivots of a matrix scaled to a unit diagonal that count as zero."""
-
 
 SKEW = 1e-9
 """A matrix is symmetric that differs from its transpose by a smaller share of its largest entry."""
 
-CLEAR_PIVOT = 1e-9
-"""Positive pivots below it are looked at more closely: rounding may have made them."""
+ROUNDING = 4.0 * float(np.finfo(float).eps)
+"""Share of the terms of an entry that is its rounding."""
 
 
-def pivots(A: sp.spmatrix) -> np.ndarray:
-    """Return the pivots of the symmetric part of a matrix, scaled to a diagonal of ones.
+def pivots(A: sp.spmatrix, terms: sp.spmatrix | None, side: float) -> np.ndarray:
+    """Return the pivots of the symmetric part of a matrix, scaled to a diagonal of about ones.
 
-    Their signs are those of the eigenvalues (Sylvester's law of inertia).
+    Their signs are those of the eigenvalues (Sylvester's law of inertia). Whatever the rounding of the entries, at
+    most a share of their terms, the matrix lies between those with ``side`` −1 and +1: the row sums of a symmetric
+    matrix of one sign, on the diagonal, exceed it (Gershgorin).
 
     Parameters
     ----------
     A : scipy.sparse matrix, shape (n, n)
+    terms : scipy.sparse matrix, shape (n, n), or None
+        Sizes of what the entries are sums of; None: their own.
+    side : float
 
     Returns
     -------
@@ -36,26 +38,35 @@ def pivots(A: sp.spmatrix) -> np.ndarray:
     """
     if not A.shape[0] or not np.isfinite(A.data).all():
         return np.full(A.shape[0], np.nan)
-    scaled = _scaled(A) + 0.1 * ZERO_PIVOT * sp.identity(A.shape[0])
+    sizes = abs(A) if terms is None else terms
+    size = np.sqrt(np.abs(sizes.diagonal()))
+    scale = sp.diags(1.0 / np.where(size > 0.0, size, 1.0))
+    unsure = sp.diags(np.asarray((scale @ (0.5 * (sizes + sizes.T)) @ scale).sum(axis=1)).ravel())
+    nothing = 0.1 * ZERO_PIVOT if side > 0.0 else 0.0
+    scaled = scale @ (0.5 * (A + A.T)) @ scale + side * ROUNDING * unsure + nothing * sp.identity(A.shape[0])
     try:
-        lu = splu(scaled.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        lu = splu(
+            sp.csc_matrix(scaled), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
     except RuntimeError:
         return np.full(A.shape[0], np.nan)
     return np.asarray(lu.U.diagonal())
 
 
-def negative_pivots(A: sp.spmatrix) -> int:
-    """Return in how many independent directions the quadratic form of a matrix is negative.
+def negative_pivots(A: sp.spmatrix, terms: sp.spmatrix | None = None) -> int:
+    """Return in how many independent directions the quadratic form of a matrix is negative, rounding or not.
 
     Parameters
     ----------
     A : scipy.sparse matrix, shape (n, n)
+    terms : scipy.sparse matrix, shape (n, n), optional
+        Sizes of what the entries are sums of; default: their own.
 
     Returns
     -------
     int
     """
-    found = pivots(A)
+    found = pivots(A, terms, 1.0)
     if np.isnan(found).any():
         values = np.linalg.eigvalsh((0.5 * (A + A.T)).toarray())
         return int((values < -1e-12 * np.abs(values).max()).sum())
@@ -94,34 +105,17 @@ def _exchanges(order: np.ndarray) -> int:
     return n - int(cycles)
 
 
-def holds(A: sp.spmatrix) -> bool:
+def holds(A: sp.spmatrix, terms: sp.spmatrix | None = None) -> bool:
     """Tell whether a stiffness matrix resists every displacement, by more than the rounding of its entries.
 
     Parameters
     ----------
     A : scipy.sparse matrix, shape (n, n)
+    terms : scipy.sparse matrix, shape (n, n), optional
+        Sizes of what the entries are sums of; default: their own.
 
     Returns
     -------
     bool
     """
-    found = pivots(A)
-    if not (found > ZERO_PIVOT).all():
-        return False
-    return bool(found.size == 0 or found.min() > CLEAR_PIVOT or _resists(_scaled(A)))
-
-
-def _resists(A: sp.csc_matrix) -> bool:
-    """Whether the softest displacement of a positive matrix is stiffer than rounding alone could make it."""
-    solve, x = splu(A).solve, np.cos(np.arange(A.shape[0]))
-    for _ in range(4):
-        x = solve(x)
-        x /= np.linalg.norm(x)
-    return float(x @ (A @ x)) > 30.0 * float(stiffness_noise(A, x[:, None])[0])
-
-
-def _scaled(A: sp.spmatrix) -> sp.csc_matrix:
-    """The symmetric part of a matrix, scaled to a diagonal of ones."""
-    size = np.sqrt(np.abs(A.diagonal()))
-    scale = sp.diags(1.0 / np.where(size > 0.0, size, 1.0))
-    return sp.csc_matrix(scale @ (0.5 * (A + A.T)) @ scale)
+    return bool((pivots(A, terms, -1.0) > 0.0).all())

@@ -11,7 +11,6 @@ from flexctrl.errors import SingularMatrixError
 from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import State
-from flexctrl.model.pivots import holds
 from flexctrl.model.solve import Plan, factorise, plan
 
 _TARGET, _SETTLED = 1e-12, 1e-9
@@ -83,7 +82,7 @@ class Newton:
         while not small and iteration < most:
             iteration += 1
             K = balance.slope(here.state, here.excess)
-            if watch and not holds(balance.among_free(K)):
+            if watch and not balance.holds(here.state, K):
                 steady = False
                 break
             try:
@@ -111,9 +110,13 @@ class Newton:
             if true < least or share < 1.0 or iteration == 1:
                 best, least = here.state, true
             small = share == 1.0 and (true <= _TARGET or (size <= _SETTLED and shift <= floor))
-            if stalled > 8 and size < 1e-6 and least <= max(self.tolerance, balance.noise(best)):
+            if stalled > 8 and size < 1e-6 and balance.settled(best, self.tolerance):
                 break
-        done = balance.astray(best) <= 1e-12 and least <= self.tolerance + balance.noise(best)
+        done = balance.astray(best) <= 1e-12 and balance.settled(best, self.tolerance)
+        if not done and here.state is not best and balance.astray(here.state) <= 1e-12:
+            # round-off in stiff pieces may hide how much nearer the last state is
+            done = balance.settled(here.state, self.tolerance)
+            best, least = (here.state, balance.residual(here.state)) if done else (best, least)
         return Found(best, least, iteration, done, steady, contracting)
 
     def _step(self, K: sp.csr_matrix, here: _Iterate, shift: float) -> np.ndarray:
@@ -178,5 +181,5 @@ def follow(balance: Balance, start: State, tolerance: float, strict: bool) -> tu
         else:
             part *= 0.4
     residual = balance.residual(state)
-    ended = done >= 1.0 and residual <= tolerance + balance.noise(state)
+    ended = done >= 1.0 and balance.settled(state, tolerance)
     return Found(state, residual, total, ended, strict, strict), done
