@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,8 +30,8 @@ class Sums:
 
     Attributes
     ----------
-    start : float
-        Energy at the start [J].
+    start, moving : float
+        Energy at the start, and what of it was kinetic [J].
     work, lost : float
         Work of the inputs and energy dissipated so far [J].
     kinetic, stored : float
@@ -50,6 +51,7 @@ class Sums:
     """
 
     start: float = 0.0
+    moving: float = 0.0
     work: float = 0.0
     lost: float = 0.0
     kinetic: float = 0.0
@@ -75,7 +77,9 @@ class Books:
         changing = bool(self.model.switches.names or self.model.kinks.names)  # what is loose now may damp later
         self.dissipates = changing or self.model.energy(state.with_(v=probe))[2] != 0.0
         kinetic, stored, power = self.model.energy(state)
-        self.sums = Sums(kinetic + stored, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n))
+        self.sums = Sums(
+            kinetic + stored, kinetic, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n)
+        )
 
     def enter(self, before: Point, after: Point, curve: Curve) -> None:
         """Enter a step."""
@@ -172,9 +176,20 @@ class Books:
         s = self.sums
         s.kinetic, s.stored, _ = self.model.energy(point.state)
         gap = s.kinetic + s.stored - s.start - s.work + s.lost
-        s.turnover = max(s.turnover, s.kinetic, abs(s.work), s.lost, abs(s.stored + s.kinetic - s.start))
+        s.turnover = max(s.turnover, abs(s.work), s.lost, abs(s.stored + s.kinetic - s.start))
+        self._exchanged(s.kinetic, s.stored)
         s.gap, s.made = max(s.gap, abs(gap)), gap
         s.closure = max(s.closure, self.model.motion.closure_error(point.state))
+
+    def glance(self, states: Sequence[State]) -> None:
+        """Note what has been turned over in some states on the way."""
+        for state in states:
+            self._exchanged(*self.model.energy(state)[:2])
+
+    def _exchanged(self, kinetic: float, stored: float) -> None:
+        """Note what has gone between kinetic and stored energy since the start."""
+        s = self.sums
+        s.turnover = max(s.turnover, kinetic, abs(kinetic - s.moving), abs(stored - (s.start - s.moving)))
 
     @property
     def nonsense(self) -> str:

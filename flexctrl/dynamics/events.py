@@ -300,7 +300,7 @@ class Watch:
             rising = fb > 0.0
             if side != 0.0 and direction is not (Direction.FALLING if rising else Direction.RISING):
                 own = partial(_one_of, value, gauge)
-                at = _root(own, a, b, fb) if fa * fb < 0.0 else _return(own, a, b, fb, dust)
+                at = _root(own, (a, fa), (b, fb)) if fa * fb < 0.0 else _return(own, a, b, fb, dust)
                 found.append(Crossing(at, gauge, rising))
             side = np.sign(fb)
         return found
@@ -373,7 +373,7 @@ def _return(f: Callable[[float], float], a: float, b: float, fb: float, dust: fl
     for _ in range(_HALVINGS):
         t = 0.5 * (low + b)
         if (ft := f(t)) * fb < 0.0 and abs(ft) > dust:
-            return _root(f, t, b, fb)
+            return _root(f, (t, ft), (b, fb))
         if ft * fb > 0.0:
             b, fb = t, ft
         else:
@@ -381,8 +381,10 @@ def _return(f: Callable[[float], float], a: float, b: float, fb: float, dust: fl
     return a
 
 
-def _root(f: Callable[[float], float], a: float, b: float, fb: float) -> float:
-    """Return a root in [a, b] to round-off of time."""
+def _root(f: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]) -> float:
+    """Return a root between two times to round-off; the values there hold: a curve meets them but for round-off."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda t: fb if t == b else f(t), a, b, xtol=4e-16 * max(abs(a), abs(b)) + 1e-300, rtol=1e-15))
+    known, (a, _), (b, _) = dict((first, last)), first, last
+    smallest = 4e-16 * max(abs(a), abs(b)) + 1e-300
+    return float(brentq(lambda t: known[t] if t in known else f(t), a, b, xtol=smallest, rtol=1e-15))

@@ -141,7 +141,9 @@ class Journey:
                 step(stop, self.plan.until)
             self._memory = self.stepper.memory
             if nonsense := self.books.nonsense:
-                where = f"at t = {self.point.state.t:.6g} s; take smaller steps, or AdaptiveAlpha"
+                fixed = isinstance(self.plan.method.pace, Fixed)
+                remedy = "take smaller steps, or AdaptiveAlpha" if fixed else "give a smaller Tolerance"
+                where = f"at t = {self.point.state.t:.6g} s; {remedy}"
                 raise StepError(self.stepper.counts.worst, f"{nonsense} {where}")
             interruption.check()
             if (now := time.perf_counter()) - self._told > 0.1:

@@ -65,7 +65,7 @@ class _Ride:
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
-        self.steps, self.mute = j.mark.steps, False
+        self.steps, self.mute, self.frames = j.mark.steps, False, len(j.rows.frames)
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
@@ -266,6 +266,7 @@ class _Ride:
         if not self.legs.parts:
             return False
         self.legs.end = j.point = self.stepper.leave(self.supply)
+        j.books.glance(j.rows.frames[self.frames :])
         j.books.enter_ride(j.mark.steps - self.steps, self.marcher.books(), j.point)
         j.track.remember(self.legs)
         if not j.watch.idle:
