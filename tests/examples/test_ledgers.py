@@ -1,0 +1,53 @@
+"""Ledger and ladder of every shipped scene, over a short stretch of time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.study.answers import outputs_apart
+from flexctrl.study.ladder import rungs
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+STRETCH = {"bridge_crane": 1.2, "ceiling_crane": 0.01, "flexible_arm": 0.2}
+
+
+def short(name: str) -> fc.Scene:
+    scene = fc.load_scene(str(EXAMPLES / f"{name}.toml"))
+    plan = replace(scene.simulation, until=STRETCH[name], rigid_twin=False)
+    return scene.with_(controller=scene.law, simulation=plan)
+
+
+def test_every_scene_is_here():
+    assert {path.stem for path in EXAMPLES.glob("*.toml")} == set(STRETCH)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bridge_crane", "ceiling_crane"])  # the arm's takes a minute
+def test_the_ledger_keeps_what_matters(name):
+    """What alone is worth more than the tolerance is kept; the minimal set holds, run against the full one."""
+    scene = short(name)
+    found = fc.ledger(scene, 0.01)
+    for entry in found.entries:
+        if entry.change is None or entry.change.outputs_worst > 0.01:
+            assert entry.keep, entry.name
+    again = outputs_apart(scene.run(), found.scene.run())
+    assert max(again.values()) <= 0.01
+    assert found.minimal_size.states <= found.size.states
+    assert found.minimal_size.work <= 1.05 * found.size.work
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STRETCH)
+def test_every_rung_of_every_scene_runs(name):
+    """To its end; what bends is nearer to the truth than what does not."""
+    scene = short(name)
+    runs = {rung: setting.of(scene).run() for rung, setting in rungs(scene)}
+    assert {run.status for run in runs.values()} == {fc.Status.FINISHED}
+    apart = {rung: max(outputs_apart(runs["refined"], run).values()) for rung, run in runs.items() if rung != "refined"}
+    assert apart["full"] < 0.5 * apart["rigid"]
+    assert np.isfinite(list(apart.values())).all()
