@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,10 @@ class ZeroOrderHold:
 class FirstOrderHold:
     """The input runs straight from sample to sample (exact for ramps; needs the next sample at delay 0).
 
+    Without a delay of a sample or more the next sample acts on the state at once, so the states are z = x − H u: a run
+    from z = 0 starts at x = H u₀, at rest only if the input begins at 0. From rest with another u₀ it starts at
+    z = −H u₀, where at delay 0 (A − 1) H = B − Γ, Γ being the B of a `ZeroOrderHold` of the same dt.
+
     Attributes
     ----------
     delay : float
@@ -45,6 +50,9 @@ class FirstOrderHold:
 
     delay: float = 0.0
 
+
+MOST_PAST = 5000
+"""Past samples that a model may keep as states."""
 
 Hold = ZeroOrderHold | FirstOrderHold
 
@@ -77,10 +85,17 @@ def discretize(linear: LinearModel, dt: float, hold: Hold | None = None) -> cont
     import control
 
     kind = ZeroOrderHold() if hold is None else hold
-    if not 0.0 < dt < np.inf:
-        raise StructureError(f"sampling time dt = {dt} s: give a positive number")
-    if not 0.0 <= kind.delay < np.inf:
-        raise StructureError(f"delay = {kind.delay} s: give zero or a positive number")
+    if not isinstance(kind, ZeroOrderHold | FirstOrderHold):
+        raise StructureError(f"hold = {hold!r}; expected ZeroOrderHold(delay) or FirstOrderHold(delay)")
+    if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
+        raise StructureError(f"sampling time dt = {dt!r} s: give a positive number")
+    if not isinstance(kind.delay, Real) or not 0.0 <= kind.delay < np.inf:
+        raise StructureError(f"delay = {kind.delay!r} s: give zero or a positive number")
+    if kind.delay * max(len(linear.inputs), 1) > MOST_PAST * dt:
+        raise StructureError(
+            f"delay = {kind.delay} s is {kind.delay / dt:.3g} samples, each a state for every input; "
+            f"expected {MOST_PAST} at most: sample less often"
+        )
     first = modal_first_order(linear)
     steps, part = _split_delay(kind.delay, dt)
     transition, moved, seen = _sampled(first, dt, kind, steps, part)

@@ -66,6 +66,8 @@ def save_mat(linear: LinearModel, path: str | Path, units: Units = SI) -> None:
     """
     from scipy.io import savemat
 
+    if not isinstance(units, Units):
+        raise LinearizationError(f"save_mat: units = {units!r}; expected Units, e.g. Units('mm', 't', 's', 'N')")
     names = list(linear.parts)
     content: dict[str, Any] = {
         "format": FORMAT,

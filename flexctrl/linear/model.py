@@ -120,6 +120,12 @@ class LinearModel:
     place: Place | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
+        for kind in ("coordinates", "inputs", "outputs"):
+            names = getattr(self, kind)
+            if twice := sorted({name for name in names if names.count(name) > 1}):
+                raise LinearizationError(
+                    f"{kind} name {', '.join(map(repr, twice))} more than once; give each its own name"
+                )
         n, m, p = len(self.coordinates), len(self.inputs), len(self.outputs)
         shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "B": (n, m), "Cq": (p, n), "Cv": (p, n), "D": (p, m)}
         for name, shape in shapes.items():
@@ -352,6 +358,8 @@ def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, 
     if value.shape != shape:
         raise LinearizationError(f"{name} has shape {value.shape}; the names ask for {shape}")
     data = value.data if sp.issparse(value) else value
+    if np.iscomplexobj(data):
+        raise LinearizationError(f"{name} is complex; expected real numbers")
     if not np.isfinite(data).all():
         raise LinearizationError(f"{name} holds a value that is not finite; check the parameters it came from")
 

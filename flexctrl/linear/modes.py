@@ -17,6 +17,7 @@ from flexctrl.linear.massless import STIFFNESS_RANK, null_split
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.linear.parts import energies_by_part
 from flexctrl.linear.pattern import with_entries
+from flexctrl.structure.freedoms import check_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -314,8 +315,8 @@ def refuse_unsymmetric(base: Scaled, limit: float = 1e-9) -> None:
 
 
 def _check_count(count: int | None) -> None:
-    if count is not None and count < 1:
-        raise StructureError(f"count = {count}: ask for at least one mode")
+    if count is not None:
+        check_whole(count, "count", "modes", least=1)
 
 
 def _grounded(base: Scaled) -> sp.csc_matrix:

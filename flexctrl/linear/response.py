@@ -14,6 +14,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE
 from flexctrl.linear.poles import second_order_roots
 from flexctrl.linear.transfer import routed, transfer
+from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
     import control
@@ -128,7 +129,7 @@ def frequency_response(
         For frequencies that are negative or not finite, or a span that is empty or starts at 0.
     """
     if omega is not None:
-        points = _checked(np.atleast_1d(np.asarray(omega, dtype=float)))
+        points = _checked(np.atleast_1d(np.asarray(omega)))
         top = float(points.max(initial=0.0)) or 1.0
         values = transfer(linear, top)(1j * points)
     else:
@@ -177,16 +178,20 @@ def _is_complete(linear: LinearModel) -> bool:
 
 
 def _checked(omega: np.ndarray) -> np.ndarray:
-    if omega.ndim != 1 or not np.isfinite(omega).all() or (omega < 0).any():
-        raise StructureError("omega must be a list of finite angular frequencies in rad/s, none negative")
-    return np.sort(omega)
+    real = omega.dtype.kind in "iuf" or not omega.size
+    if not real or omega.ndim != 1 or not np.isfinite(omega).all() or (omega < 0).any():
+        raise StructureError(
+            f"frequency_response: omega = {np.array2string(omega, threshold=8)}; expected a list of finite real "
+            "angular frequencies in rad/s, none negative (the response is at s = iω)"
+        )
+    return np.sort(omega.astype(float))
 
 
 def _checked_span(span: tuple[float, float]) -> tuple[float, float]:
-    low, high = float(span[0]), float(span[1])
-    if not (0.0 < low < high < np.inf):
-        raise StructureError(f"span = {span}: give 0 < lowest < highest angular frequency, rad/s")
-    return low, high
+    limits = numbers(span)
+    if len(limits) != 2 or not 0.0 < limits[0] < limits[1] < np.inf:
+        raise StructureError(f"span = {span!r}: give two limits, 0 < lowest < highest angular frequency, rad/s")
+    return limits[0], limits[1]
 
 
 def _index(name: str, known: tuple[str, ...]) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from flexctrl.errors import LinearizationError
+from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.linear.condense import condense
 from flexctrl.linear.modal import ModalSystem, modal_system, proper
 from flexctrl.linear.model import LinearModel
@@ -89,6 +89,8 @@ def to_ss(linear: LinearModel, form: Form | None = None, modes: Modes | None = N
     """
     import control
 
+    if form is not None and not isinstance(form, ModalForm | PhysicalForm):
+        raise StructureError(f"to_ss: form = {form!r}; expected ModalForm() or PhysicalForm()")
     first = _physical(linear, modes) if isinstance(form, PhysicalForm) else modal_first_order(linear, modes)
     return control.ss(
         first.A,

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.wind import Wind
-from flexctrl.errors import LinearizationError, MechanismError
+from flexctrl.errors import LinearizationError, MechanismError, StructureError
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
@@ -57,6 +57,10 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     EquilibriumError
         If none was given and none is found.
     """
+    if not isinstance(model, Model):
+        raise StructureError(f"linearize: {model!r} is no Model; give what flexctrl.assemble returns")
+    if at is not None and not isinstance(at, Rest | State):
+        raise LinearizationError(f"linearize: at = {at!r}; expected a Rest (from equilibrium) or a State")
     if not model.n:
         raise LinearizationError(
             "linearize: the machine has no degrees of freedom, so there is nothing to linearise: its supports hold all "

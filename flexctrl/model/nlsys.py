@@ -141,6 +141,8 @@ def equations_of(model: Model, at: Rest | State | None = None) -> Equations:
     Equations
         With ``states``, ``rate(t, x, u)``, ``output(t, x, u)`` and ``state(x)``, the machine's `State`.
     """
+    if at is not None and not isinstance(at, Rest | State):
+        raise StructureError(f"to_nlsys: at = {at!r}; expected a Rest (from equilibrium) or a State")
     reference = model.rest if at is None else at.state if isinstance(at, Rest) else at
     held = {model.coordinate(name) for name in at.held} if isinstance(at, Rest) else set()
     chart = chart_of(model, reference)

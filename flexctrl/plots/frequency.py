@@ -14,7 +14,7 @@ from flexctrl.errors import StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.response import FrequencyResponse
 from flexctrl.plots.modes import modes_picture
-from flexctrl.plots.style import CYCLE, INK, new_figure, tidy
+from flexctrl.plots.style import CYCLE, INK, by_label, new_figure, tidy
 
 if TYPE_CHECKING:
     import control
@@ -25,7 +25,9 @@ HZ = 2.0 * np.pi
 
 
 def plot_bode(
-    responses: Mapping[str, FrequencyResponse | control.FrequencyResponseData],
+    responses: FrequencyResponse
+    | control.FrequencyResponseData
+    | Mapping[str, FrequencyResponse | control.FrequencyResponseData],
     axes: Sequence[Axes] | None = None,
     *,
     channel: tuple[str, str] | None = None,
@@ -35,7 +37,7 @@ def plot_bode(
 
     Parameters
     ----------
-    responses : mapping of str to FrequencyResponse or control.FrequencyResponseData
+    responses : FrequencyResponse or control.FrequencyResponseData, or mapping of str to one
         Label → response, e.g. the rigid twin and the flexible machine.
     axes : sequence of two matplotlib.axes.Axes, optional
         Magnitude and phase; a new figure if left out.
@@ -49,7 +51,8 @@ def plot_bode(
     numpy.ndarray of matplotlib.axes.Axes, shape (2,)
     """
     gain, phase = new_figure(7.5, 5.6).subplots(2, 1, sharex=True) if axes is None else axes
-    for number, (label, response) in enumerate(responses.items()):
+    shown = by_label(responses, "response")
+    for number, (label, response) in enumerate(shown.items()):
         values = channel_values(response, channel)
         hertz, style = np.asarray(response.omega) / HZ, line_style(number)
         gain.plot(hertz, 20 * np.log10(abs(values)) if decibel else abs(values), label=label, **style)
@@ -61,7 +64,7 @@ def plot_bode(
     gain.set_ylabel("magnitude (dB)" if decibel else "magnitude")
     phase.set(xlabel="frequency (Hz)", ylabel="phase (°)")
     phase.yaxis.set_major_locator(_phase_ticks(phase))
-    if len(responses) > 1:
+    if len(shown) > 1:
         gain.legend(frameon=False)
     return np.array([gain, phase])
 

@@ -11,7 +11,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
 
 from flexctrl.plots.frequency import HZ, degrees, line_style, plot_bode
-from flexctrl.plots.style import INK, PALE, new_figure, tidy
+from flexctrl.plots.style import INK, PALE, by_label, new_figure, tidy
 from flexctrl.study.frequency import Margins, loop_grid
 from flexctrl.study.frequency import margins as margins_of
 from flexctrl.study.loop import Loop
@@ -63,13 +63,13 @@ def mark_margins(axes: Sequence[Axes] | np.ndarray, margins: Margins) -> np.ndar
 
 
 def plot_nyquist(
-    loops: Mapping[str, Loop], ax: Axes | None = None, *, margins: Margins | None = None, radius: float = 3.0
+    loops: Mapping[str, Loop] | Loop, ax: Axes | None = None, *, margins: Margins | None = None, radius: float = 3.0
 ) -> Axes:
     """Draw L(iω), ω > 0, around the point −1.
 
     Parameters
     ----------
-    loops : mapping of str to Loop
+    loops : Loop, or mapping of str to Loop
         Label → open loop.
     ax : matplotlib.axes.Axes, optional
         Drawn into; a new figure if left out.
@@ -86,25 +86,26 @@ def plot_nyquist(
     ax.add_patch(Circle((0, 0), 1.0, fill=False, color=PALE, linewidth=1.0))
     if margins is not None:
         ax.add_patch(Circle((-1, 0), margins.modulus.value, fill=False, color=INK, linewidth=0.9, linestyle="--"))
-    for number, (label, loop) in enumerate(loops.items()):
+    shown = by_label(loops, "loop")
+    for number, (label, loop) in enumerate(shown.items()):
         values = loop_grid(loop)[1]
         ax.plot(values.real, values.imag, label=label, **line_style(number))
     ax.plot(-1.0, 0.0, "+", color=INK, markersize=10, markeredgewidth=1.6)
     tidy(ax).set(xlabel="real part of L", ylabel="imaginary part of L", aspect="equal")
     ax.set(xlim=(-radius, radius), ylim=(-radius, radius))
-    if len(loops) > 1:
+    if len(shown) > 1:
         ax.legend(frameon=False)
     return ax
 
 
 def plot_nichols(
-    loops: Mapping[str, Loop], ax: Axes | None = None, *, gain: tuple[float, float] = (-40.0, 40.0)
+    loops: Mapping[str, Loop] | Loop, ax: Axes | None = None, *, gain: tuple[float, float] = (-40.0, 40.0)
 ) -> Axes:
     """Draw loops as gain over phase, with curves of constant |L/(1 + L)| around the critical points.
 
     Parameters
     ----------
-    loops : mapping of str to Loop
+    loops : Loop, or mapping of str to Loop
         Label → open loop.
     ax : matplotlib.axes.Axes, optional
         Drawn into; a new figure if left out.
@@ -117,7 +118,8 @@ def plot_nichols(
     """
     ax = new_figure(6.4, 5.6).subplots() if ax is None else ax
     seen = [np.array([-180.0])]
-    for number, (label, loop) in enumerate(loops.items()):
+    shown = by_label(loops, "loop")
+    for number, (label, loop) in enumerate(shown.items()):
         values = loop_grid(loop)[1]
         size, angle = _decibel(values), degrees(values)
         ax.plot(angle, size, label=label, **line_style(number))
@@ -131,7 +133,7 @@ def plot_nichols(
     ax.xaxis.set_major_locator(
         MultipleLocator(90.0 if high - low <= 540.0 else 180.0 if high - low <= 1260.0 else 360.0)
     )
-    if len(loops) > 1:
+    if len(shown) > 1:
         ax.legend(frameon=False)
     return ax
 
@@ -148,12 +150,14 @@ def _closed_loop_grid(ax: Axes, phase: tuple[float, float], gain: tuple[float, f
         text.set_visible(not near)
 
 
-def plot_sensitivities(loops: Mapping[str, Loop], ax: Axes | None = None, *, margins: Margins | None = None) -> Axes:
+def plot_sensitivities(
+    loops: Mapping[str, Loop] | Loop, ax: Axes | None = None, *, margins: Margins | None = None
+) -> Axes:
     """Draw |S| = 1/|1 + L| as lines and |T| = |L/(1 + L)| dashed, over frequency in Hz.
 
     Parameters
     ----------
-    loops : mapping of str to Loop
+    loops : Loop, or mapping of str to Loop
         Label → open loop.
     ax : matplotlib.axes.Axes, optional
         Drawn into; a new figure if left out.
@@ -165,9 +169,10 @@ def plot_sensitivities(loops: Mapping[str, Loop], ax: Axes | None = None, *, mar
     matplotlib.axes.Axes
     """
     ax = new_figure(6.4, 4.0).subplots() if ax is None else ax
-    for number, (label, loop) in enumerate(loops.items()):
+    shown = by_label(loops, "loop")
+    for number, (label, loop) in enumerate(shown.items()):
         omega, L = loop_grid(loop)
-        prefix = f"{label}: " if len(loops) > 1 else ""
+        prefix = f"{label}: " if len(shown) > 1 else ""
         ax.plot(omega / HZ, _decibel(1 / (1 + L)), label=f"{prefix}|S|", **line_style(number))
         dashed = line_style(number) | {"linestyle": "--"}
         ax.plot(omega / HZ, _decibel(L / (1 + L)), label=f"{prefix}|T|", **dashed)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.plots.style import CYCLE, INK, new_figure, tidy
+from flexctrl.plots.style import CYCLE, INK, by_label, new_figure, tidy
 from flexctrl.study.root_locus import CriticalGain, RootLocus
 from flexctrl.study.zeros import Zeros
 
@@ -18,7 +18,7 @@ _CANCELLED = 0.02
 
 
 def plot_root_locus(
-    loci: Mapping[str, RootLocus],
+    loci: Mapping[str, RootLocus] | RootLocus,
     ax: Axes | None = None,
     *,
     critical: Sequence[CriticalGain] = (),
@@ -30,7 +30,7 @@ def plot_root_locus(
 
     Parameters
     ----------
-    loci : mapping of str to RootLocus
+    loci : RootLocus, or mapping of str to RootLocus
         Label → locus, e.g. of the rigid twin and of the flexible machine.
     ax : matplotlib.axes.Axes, optional
         Drawn into; a new figure if left out.
@@ -44,7 +44,8 @@ def plot_root_locus(
     matplotlib.axes.Axes
     """
     ax = new_figure(7.0, 5.6).subplots() if ax is None else ax
-    shown = {label: locus.in_s() for label, locus in loci.items()}
+    several = by_label(loci, "locus")
+    shown = {label: locus.in_s() for label, locus in several.items()}
     for number, (label, locus) in enumerate(shown.items()):
         color = CYCLE[number % len(CYCLE)]
         ax.plot(locus.loci.real, locus.loci.imag, color=color, linewidth=1.3, zorder=2 + 0.1 * number)
@@ -54,7 +55,7 @@ def plot_root_locus(
         ax.plot(zeros.real, zeros.imag, "o", color=color, markerfacecolor="white", markersize=6, zorder=3)
     width, height = _window(shown, _top(shown) if top is None else top)
     ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1)
-    plane = ", of s = ln(z)/T" if any(locus.dt for locus in loci.values()) else ""
+    plane = ", of s = ln(z)/T" if any(locus.dt for locus in several.values()) else ""
     tidy(ax).set(xlabel=f"real part{plane} (1/s)", ylabel=f"imaginary part{plane} (rad/s)")
     ax.set(xlim=width, ylim=(-height, height))
     for crossing in [c for c in critical if c.omega <= height]:
@@ -63,7 +64,7 @@ def plot_root_locus(
             note = f"k = {crossing.gain:.3g}"
             room = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
             ax.annotate(note, (0.0, crossing.omega), (9, 7), textcoords="offset points", fontsize=9, bbox=room)
-    if len(loci) > 1:
+    if len(several) > 1:
         ax.legend(frameon=False, loc="upper left")
     return ax
 

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TypeVar
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from flexctrl.errors import StructureError
+
+T = TypeVar("T")
 
 INK = "#1f2937"
 PALE = "#b6bec9"
@@ -15,6 +22,32 @@ GROUND = "#3f7d58"
 
 CYCLE = ("#1d4ed8", "#d9480f", "#3f7d58", "#7048a8", "#d4a106", "#22a7a0", "#d6336c", "#8d6e63")
 """Line colours in order."""
+
+
+def by_label(given: Mapping[str, T] | T, kind: str) -> Mapping[str, T]:
+    """Return what is to be drawn by label; one alone bears its own name, or that of its kind.
+
+    Parameters
+    ----------
+    given : mapping of str to object, or object
+    kind : str
+
+    Returns
+    -------
+    mapping of str to object
+
+    Raises
+    ------
+    StructureError
+        For a list, or nothing at all.
+    """
+    if isinstance(given, Mapping) and given:
+        return given
+    if isinstance(given, Mapping | list | tuple) or given is None:
+        raise StructureError(
+            f"nothing to draw by label in {given!r}; expected one {kind}, or a mapping of label to {kind}"
+        )
+    return {getattr(given, "name", "") or kind: given}
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -56,4 +89,4 @@ def tidy(ax: Axes) -> Axes:
     return ax
 
 
-__all__ = ["CYCLE", "DRIVE", "FLEXIBLE", "GROUND", "INK", "PALE", "RIGID", "ROPE", "new_figure", "tidy"]
+__all__ = ["CYCLE", "DRIVE", "FLEXIBLE", "GROUND", "INK", "PALE", "RIGID", "ROPE", "by_label", "new_figure", "tidy"]

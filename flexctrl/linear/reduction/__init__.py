@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.balanced import BalancedTruncation, hankel_singular_values
 from flexctrl.linear.reduction.craig_bampton import CraigBampton
@@ -64,5 +65,13 @@ def reduce(
         ``ReducedModel`` (second order, with ``.linear``) or ``ReducedStates``; both have ``to_ss()``,
         ``frequency_response()``, ``damped_poles()`` and the measured ``error``.
     """
-    full = linear.condense()
-    return smallest(full, to, using) if isinstance(to, RelativeError) else to.apply(full)
+    if isinstance(to, RelativeError):
+        if not callable(using):
+            raise ReductionError(
+                f"reduce: using = {using!r}; expected a method as a function of its order, e.g. BalancedTruncation "
+                "itself, or lambda order: MomentMatching((0.0, 30j), order)"
+            )
+        return smallest(linear.condense(), to, using)
+    if isinstance(to, type) or not hasattr(to, "apply"):
+        raise ReductionError(f"reduce: {to!r} is no method; expected e.g. ModalTruncation(8) or RelativeError(0.01)")
+    return to.apply(linear.condense())

@@ -46,6 +46,13 @@ class CraigBampton:
     modes: int | BelowFrequency = 10
     static_correction: bool = False
 
+    def __post_init__(self) -> None:
+        whole = isinstance(self.modes, int) and self.modes >= 0
+        if not whole and not isinstance(self.modes, BelowFrequency):
+            raise ReductionError(
+                f"CraigBampton: modes = {self.modes!r}; expected a number of modes from 0 on, or BelowFrequency(hz)"
+            )
+
     def apply(self, full: LinearModel) -> ReducedModel:
         """Reduce a model.
 

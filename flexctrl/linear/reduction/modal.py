@@ -44,6 +44,13 @@ class ModalTruncation:
     keep: int | Selection
     static_correction: bool = False
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.keep, int) and not hasattr(self.keep, "choose"):
+            raise ReductionError(
+                f"ModalTruncation: keep = {self.keep!r}; expected a whole number of modes, or a selection such as "
+                "BelowFrequency(hz)"
+            )
+
     def apply(self, full: LinearModel) -> ReducedModel:
         """Reduce a model.
 

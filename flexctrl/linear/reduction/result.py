@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import low_frequency, undamped
 from flexctrl.linear.transfer import Transfer, transfer
@@ -130,6 +131,8 @@ class Reduced(ABC):
         """
         from flexctrl.linear.reduction.error import error_report
 
+        if not hz > 0.0:
+            raise ReductionError(f"error_up_to: hz = {hz!r}; expected a frequency above 0")
         return error_report(self, 2 * np.pi * hz)
 
 
