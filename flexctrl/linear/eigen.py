@@ -252,8 +252,22 @@ def _orthonormal(M: np.ndarray | sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
         if gap > 8.0 * EPS:
             root, info = lapack.dpotrf(gram, lower=1)
             if info:
-                raise LinearizationError("the mass matrix is not positive definite on the freedoms kept")
+                return _one_by_one(M, phi)
             phi = lapack.dtrtrs(root, phi.T, lower=1)[0].T
         if gap < NEARLY:
             break
     return phi
+
+
+def _one_by_one(M: np.ndarray | sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
+    """The same by Gram–Schmidt: right for columns so alike that their products do not tell them apart."""
+    known = np.zeros((len(phi), 0))
+    for column in phi.T:
+        for _ in range(3):
+            column = column - known @ (known.T @ (M @ column))
+            mass = float(column @ (M @ column))
+            if not mass > 0.0:
+                raise LinearizationError("the mass matrix is not positive definite on the freedoms kept")
+            column = column / np.sqrt(mass)
+        known = np.column_stack([known, column])
+    return known

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from fixtures import structures as s
 
 from flexctrl.errors import LinearizationError, MechanismError, StructureError
+from flexctrl.linear import eigen
 from flexctrl.linear.krylov import _orthonormal
 from flexctrl.linear.model import LinearModel, PartMatrices
 
@@ -365,3 +366,14 @@ def test_nearly_parallel_columns_come_out_orthogonal():
     assert N.shape[1] == 9
     np.testing.assert_allclose(N.T @ image, np.eye(9), atol=1e-11)
     np.testing.assert_allclose(N @ R, Z, atol=1e-11)
+
+
+def test_columns_that_are_all_but_parallel_are_made_orthonormal():
+    """As inverse iteration near a rigid-body mode leaves them: their products are too alike for Cholesky's method."""
+    rng = np.random.default_rng(3)
+    M = np.diag(rng.uniform(0.5, 2.0, 40))
+    nested = rng.standard_normal((40, 1)) + 1e-10 * rng.standard_normal((40, 5))
+    phi = eigen._orthonormal(M, nested.copy())
+    assert np.abs(phi.T @ M @ phi - np.eye(5)).max() < 1e-14
+    left = nested - phi @ (phi.T @ (M @ nested))
+    assert np.abs(left).max() < 1e-14
