@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -190,6 +191,12 @@ class Books:
         """Note what has gone between kinetic and stored energy since the start."""
         s = self.sums
         s.turnover = max(s.turnover, kinetic, abs(kinetic - s.moving), abs(stored - (s.start - s.moving)))
+
+    @property
+    def overflown(self) -> bool:
+        """Whether energies are larger than all numbers."""
+        s = self.sums
+        return not math.isfinite(s.work + s.lost + s.made)
 
     @property
     def nonsense(self) -> str:

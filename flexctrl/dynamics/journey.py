@@ -14,7 +14,7 @@ from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Curve, Track
 from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
-from flexctrl.dynamics.feed import CommandError, Feed
+from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.march.stepper import MarchingStepper
@@ -22,6 +22,7 @@ from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
+from flexctrl.errors import ControllerError
 from flexctrl.model.model import Model
 
 __all__ = ["SMALLEST", "Journey", "Plan"]
@@ -117,7 +118,7 @@ class Journey:
             self.stepper.counts.worst = error.worst
             worst = self.plan.model.coordinates[error.worst]
             self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
-        except (CommandError, EventError) as error:
+        except (ControllerError, EventError) as error:
             self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
             self.fault = error.__cause__
         self.books.close(self.point)
@@ -140,6 +141,9 @@ class Journey:
             if not ride(self):
                 step(stop, self.plan.until)
             self._memory = self.stepper.memory
+            if self.books.overflown:
+                where = f"at t = {self.point.state.t:.6g} s; look at the commands and at the start"
+                raise StepError(self.stepper.counts.worst, f"energies are beyond all numbers {where}")
             if nonsense := self.books.nonsense:
                 fixed = isinstance(self.plan.method.pace, Fixed)
                 remedy = "take smaller steps, or AdaptiveAlpha" if fixed else "give a smaller Tolerance"

@@ -72,3 +72,35 @@ def test_a_controller_that_raises_at_once_is_told_with_its_cause():
 def test_an_end_before_the_shortest_step_is_refused(until, method):
     with pytest.raises(StructureError, match="no step is shorter than 1e-12"):
         fc.simulate(swing(), until=until, method=method)
+
+
+class Odd(Faulty):
+    """A controller whose commands are odd after a while."""
+
+    def __init__(self, sample_time: float, late: object) -> None:
+        super().__init__(sample_time, 0.45)
+        self.late = late
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> object:
+        return np.zeros(1) if t < self.after else self.late
+
+
+@pytest.mark.parametrize("sample_time", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("late", "said"), [(np.zeros(2), "has 2 values"), ("up", "could not convert"), (None, "commands nan")]
+)
+def test_a_command_of_another_kind_ends_the_run_and_nothing_is_lost(late, said, sample_time):
+    model = swing()
+    run = fc.simulate(model, Odd(sample_time, late), until=1.0, start=model.displace([0.3]), every=0.01)
+    assert run.status is fc.Status.FAILED
+    assert said in run.report.message
+    assert 0.35 < run.t[-1] <= 0.5
+    assert run["x"] == pytest.approx(1.0 + 0.3 * np.cos(10.0 * run.t), abs=5e-3)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(1e-2)], ids=str)
+def test_a_command_beyond_all_numbers_fails_the_run(method):
+    run = fc.simulate(swing(), Odd(0.1, np.array([1e300])), until=1.0, method=method)
+    assert run.status is fc.Status.FAILED
+    assert run.t[-1] >= 0.45

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.feed import CommandError, Supply
+from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.law import Sampling
 from flexctrl.dynamics.march.legs import Held, Leg, Legs, Told, same
 from flexctrl.dynamics.march.marching import Pacing
@@ -20,6 +20,7 @@ from flexctrl.dynamics.march.record import DONE, SILENT
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed
+from flexctrl.errors import ControllerError
 from flexctrl.kernels.native import Packed
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ class _Ride:
         j = self.journey = journey
         self.stepper, self.marcher, self.supply = stepper, stepper.marcher, j.point.supply
         self.tick, self.until = 1e-12 * j.plan.until, j.plan.until
-        self.faults: list[CommandError | KeyboardInterrupt] = []
+        self.faults: list[ControllerError | KeyboardInterrupt] = []
         stepper.enter(j.point)
         sums = j.books.sums
         self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved)
@@ -190,7 +191,7 @@ class _Ride:
             before = u
             try:
                 u, x = told(stop, x, y[done - 1].take(reads))
-            except (CommandError, KeyboardInterrupt) as fault:
+            except (ControllerError, KeyboardInterrupt) as fault:
                 self.faults.append(fault)
                 break
             if u != before:
@@ -248,7 +249,7 @@ class _Ride:
         feed, before = j.plan.feed, self.supply
         try:
             self.supply = feed.sampled(stop, y[feed.reads], before)
-        except (CommandError, KeyboardInterrupt) as fault:
+        except (ControllerError, KeyboardInterrupt) as fault:
             self.faults.append(fault)
             return False
         u = self.supply.u
