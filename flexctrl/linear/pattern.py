@@ -10,7 +10,7 @@ import scipy.sparse as sp
 __all__ = ["aligned", "asymmetry", "congruent", "mirror", "symmetric", "with_entries"]
 
 SMALL = 200
-ROUNDED = 1e-3
+UNMISTAKABLE = 1e-6
 
 
 def aligned(*matrices: sp.spmatrix) -> tuple[sp.csc_matrix, ...]:
@@ -114,9 +114,10 @@ def symmetric(A: sp.csc_matrix, across: np.ndarray | None = None) -> tuple[sp.cs
 
 
 def asymmetry(A: sp.csc_matrix, even: sp.csc_matrix) -> float:
-    """Largest entry of A − Aᵀ, each relative to the diagonal entries in its row and column.
+    """Largest entry of A − Aᵀ relative to A's largest, or to the diagonal entries in its row and column.
 
-    Stiff members that are light must not hide that soft and heavy ones are loaded by forces without a potential.
+    Stiff members that are light must not hide that soft and heavy ones are loaded by forces without a potential; the
+    latter counts where it is more than what is left of sums that cancel.
 
     Parameters
     ----------
@@ -127,12 +128,12 @@ def asymmetry(A: sp.csc_matrix, even: sp.csc_matrix) -> float:
     -------
     float
     """
-    odd = sp.coo_matrix(A - A.T)
-    own = np.abs(even.diagonal())
-    size = np.where(own > 0.0, own, abs(even).max(axis=1).toarray().ravel())
-    one, other = size[odd.row], size[odd.col]
-    between = np.maximum(np.sqrt(one * other), ROUNDED * np.maximum(one, other))
-    return float((np.abs(odd.data) / np.maximum(between, np.finfo(float).tiny)).max(initial=0.0))
+    odd, tiny = sp.coo_matrix(A - A.T), np.finfo(float).tiny
+    size, own = np.abs(odd.data), np.abs(even.diagonal())
+    own = np.where(own > 0.0, own, abs(even).max(axis=1).toarray().ravel())
+    near = float((size / np.maximum(np.sqrt(own[odd.row] * own[odd.col]), tiny)).max(initial=0.0))
+    far = float(size.max(initial=0.0)) / max(float(np.abs(even.data).max(initial=0.0)), tiny)
+    return near if near > UNMISTAKABLE else far
 
 
 def _columns(A: sp.spmatrix) -> sp.csc_matrix:
