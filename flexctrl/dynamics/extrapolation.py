@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.dynamics.alpha import AlphaPoint
 from flexctrl.dynamics.dense import Curve, curves_of
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.settling import quasistatic
@@ -135,6 +137,12 @@ class _Stepper:
         state = self.moved_on(coarse.state, fine.state, gap)
         return replace(point, state=state, supply=self._supply(state, coarse, fine), gap=gap)
 
+    def join(self, point: _Point, supply: Supply, step: float) -> _Point:
+        """Return the point with both runs in its state: apart, they would meet a corner of a law of force apart."""
+        coarse = _from(self.coarse, point.coarse, (point.state, replace(supply, x=point.coarse.supply.x), step))
+        fine = _from(self.fine, point.fine, (point.state, replace(supply, x=point.fine.supply.x), 0.5 * step))
+        return replace(point, rate=fine.rate, supply=supply, coarse=coarse, fine=fine, gap=np.zeros(self.model.n))
+
     def _switched(self, run: Any, state: State) -> Any:
         """A run whose dry contacts stick or slide as those of a state do."""
         return replace(run, state=self.model.switches.like(run.state, state))
@@ -177,6 +185,15 @@ class _Stepper:
     def curve(self, before: _Point, after: _Point) -> Curve:
         """Return the motion over a step."""
         return _Curve(self, before, after)
+
+
+def _from(stepper: Stepper[Any], run: Point, start: tuple[State, Supply, float]) -> Point:
+    """Start a run anew; the method's own accelerations keep their lead on the true ones."""
+    plain = stepper.plain if isinstance(stepper, MarchingStepper) else stepper
+    fresh = plain.start(*start)
+    if isinstance(fresh, AlphaPoint) and isinstance(run, AlphaPoint):
+        return replace(fresh, algorithmic=fresh.rate + run.algorithmic - run.rate)
+    return fresh
 
 
 @dataclass(frozen=True, eq=False)

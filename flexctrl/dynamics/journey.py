@@ -20,7 +20,7 @@ from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
-from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Marching, Mark, Point, StepError, Stepper
+from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Joining, Marching, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
 from flexctrl.model.model import Model
@@ -373,7 +373,8 @@ class Journey:
             span *= 4.0
         stepper: Stepper[Any] = self.stepper.plain if isinstance(self.stepper, MarchingStepper) else self.stepper
         supply = self.plan.feed.restart(state, at.supply)
-        point = stepper.renew(replace(at, state=state), supply, self.mark.size)
+        anew = stepper.join if isinstance(stepper, Joining) else stepper.renew
+        point = anew(replace(at, state=state), supply, self.mark.size)
         self.books.turn(point)
         return point
 

@@ -25,6 +25,7 @@ __all__ = [
     "Counts",
     "Fixed",
     "Integrator",
+    "Joining",
     "Marching",
     "Mark",
     "Pace",
@@ -193,6 +194,14 @@ class Marching(Stepper[P], Protocol[P]):
 
     def march(self, point: P, h: float, count: int) -> Block:
         """Return up to ``count`` steps of length h under the inputs of ``point``, which stay as they are."""
+
+
+@runtime_checkable
+class Joining(Stepper[P], Protocol[P]):
+    """A stepper with several runs side by side."""
+
+    def join(self, point: P, supply: Supply, step: float) -> P:
+        """Return the point with all runs in its state, under other inputs; ``step`` is about to be taken."""
 
 
 @runtime_checkable

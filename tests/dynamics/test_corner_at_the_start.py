@@ -1,4 +1,4 @@
-"""Runs that begin exactly on a corner of a law of force go on."""
+"""Corners of laws of force: runs that begin on one go on; extrapolated runs meet them together."""
 
 from __future__ import annotations
 
@@ -20,3 +20,18 @@ def test_a_rope_that_starts_at_its_natural_length(inner):
     assert run.status is fc.Status.FINISHED
     sag = 9.81 / 1e4 * (1.0 - np.cos(100.0 * run.t))
     assert np.abs(run["z"] + 1.0 + sag).max() <= 1e-6
+
+
+def test_extrapolation_gains_where_damped_corners_are_met():
+    """A mass against a spring with play and a damper: extrapolated, steps have a fraction of their error."""
+    spring, mass = fc.Spring("s", (0, 0, 0), (1, 0, 0), stiffness=400.0, damping=8.0), fc.PointMass("m", (1, 0, 0), 1.0)
+    held = [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")]
+    structure = fc.Structure([spring, mass], held, outputs=[fc.Velocity("v", mass.node, "x")])
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.Flexible(), fc.Backlash({"s": 0.1})])
+    start = model.rest.with_(v=np.array([1.0]))
+    inner = fc.GeneralizedAlpha(2e-3, rho=1.0)
+    once, twice = (fc.simulate(model, until=0.1, start=start, method=how) for how in (inner, fc.Richardson(inner)))
+    t, w = 0.1 - 0.05, (400.0 - 16.0) ** 0.5
+    exact = np.exp(-4.0 * t) * (np.cos(w * t) - 4.0 / w * np.sin(w * t))
+    assert abs(twice["v"][-1] - exact) <= 1e-5
+    assert abs(twice["v"][-1] - exact) <= 0.2 * abs(once["v"][-1] - exact)
