@@ -53,10 +53,10 @@ _HOMES = {
     "flexctrl.kernels.kernel": ("CasadiVM", "Compiled"),
     "flexctrl.model.assemble": ("assemble", "rigid"),
     "flexctrl.model.model": ("Model",),
-    "flexctrl.model.motion": ("State",),
+    "flexctrl.model.state": ("State",),
     "flexctrl.model.project": ("Projection", "project"),
     "flexctrl.model.equilibrium": ("Rest", "equilibrium"),
-    "flexctrl.model.path": (
+    "flexctrl.model.paths.path": (
         "BranchPoint",
         "EquilibriumPath",
         "LimitPoint",

@@ -24,8 +24,8 @@ from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.flows import flow_rates, flowing, without_flows
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
 from flexctrl.model.solve import Plan, Solve, factorise, plan
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_number, check_seconds
 
 _TURNED = 0.02

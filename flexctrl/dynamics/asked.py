@@ -14,7 +14,7 @@ from flexctrl.errors import StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds, listed
 
 __all__ = ["check_arguments", "check_times", "events_of"]

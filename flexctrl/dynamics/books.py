@@ -13,7 +13,7 @@ from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Block, Point
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Books", "Sums"]
 

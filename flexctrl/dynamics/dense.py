@@ -14,7 +14,7 @@ from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.local import Local
 from flexctrl.dynamics.steps import Point, Stepper
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Booked", "Curve", "Dense", "Hermite", "Track", "curves_of"]
 

@@ -15,7 +15,7 @@ from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.steps import Point
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite
 
 __all__ = ["Direction", "Event", "EventError", "Occurrence", "Watch"]

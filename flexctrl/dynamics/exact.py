@@ -25,7 +25,7 @@ from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, Stepper, check_step
 from flexctrl.errors import StructureError
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Exact", "ExactStepper", "ModalPoint"]
 

@@ -21,7 +21,7 @@ from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Pace, Point, StepError, check_step
 from flexctrl.errors import MechanismError, SingularMatrixError
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
 
 __all__ = ["ExplicitRungeKutta"]

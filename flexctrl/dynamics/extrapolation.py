@@ -24,8 +24,8 @@ from flexctrl.dynamics.steps import Counts, Integrator, Pace, Point, Stepper
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
 from flexctrl.model.solve import factorise
+from flexctrl.model.state import State
 
 __all__ = ["Richardson"]
 

@@ -15,7 +15,7 @@ from flexctrl.design.controller import Controller, as_controller
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import FLOAT, Compiled
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     from flexctrl.design.lowering import Lowered

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.linear.model import LinearModel
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite
 
 __all__ = ["LinearPlant"]

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from flexctrl.mechanics.rotation import logarithm
-from flexctrl.model.chart import Chart
-from flexctrl.model.charting import chart_of
+from flexctrl.model.linkages.chart import Chart
+from flexctrl.model.linkages.charting import chart_of
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Local"]
 
@@ -20,8 +20,8 @@ __all__ = ["Local"]
 class Local:
     """Displacements, rotation vectors and turns since a start, and their rates from quasi-velocities.
 
-    As in `flexctrl.model.chart.Chart`, whose reference moves on from step to step: rotations are the exponential
-    of their coordinates, and a rotation that wanders about a held axis has a coordinate more.
+    As in `flexctrl.model.linkages.chart.Chart`, whose reference moves on from step to step: rotations are the
+    exponential of their coordinates, and a rotation that wanders about a held axis has a coordinate more.
 
     Attributes
     ----------

@@ -10,8 +10,8 @@ import numpy as np
 from flexctrl.dynamics.steps import Counts
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
 from flexctrl.model.solve import Plan, Solve, factorise, plan
+from flexctrl.model.state import State
 
 __all__ = ["Masses"]
 

@@ -26,8 +26,8 @@ from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.momenta import Momenta
-from flexctrl.model.motion import State
 from flexctrl.model.solve import Plan, Solve, factorise, plan
+from flexctrl.model.state import State
 
 __all__ = ["ConservingMidpoint"]
 

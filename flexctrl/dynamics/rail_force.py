@@ -11,7 +11,7 @@ from flexctrl.dynamics.feed import feed_of
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.consistent import check_state
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.trolleys import Trolley
 
 __all__ = ["rail_force"]

@@ -11,7 +11,7 @@ from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.record import Recorder
 from flexctrl.dynamics.steps import Block, Fixed, Pace, Point
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Rows"]
 

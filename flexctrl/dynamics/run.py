@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_number
 
 if TYPE_CHECKING:

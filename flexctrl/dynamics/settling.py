@@ -13,8 +13,8 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.scales import once, yardsticks
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
 from flexctrl.model.solve import factorise
+from flexctrl.model.state import State
 
 __all__ = ["quasistatic", "settled"]
 

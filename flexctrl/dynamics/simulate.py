@@ -29,7 +29,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 _ROWS = 1000
 

@@ -16,7 +16,7 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
 
 __all__ = [

@@ -19,9 +19,9 @@ from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equations import Small
 from flexctrl.model.equilibrium import equilibrium
-from flexctrl.model.frictions import inner_freedoms
+from flexctrl.model.laws.frictions import inner_freedoms
 from flexctrl.model.linearize import linearize
-from flexctrl.model.mobility import motion_of
+from flexctrl.model.linkages.mobility import motion_of
 from flexctrl.model.model import Model
 from flexctrl.structure.cut import cut_ropes
 from flexctrl.structure.elements import Beam, Rope

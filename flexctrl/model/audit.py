@@ -9,7 +9,7 @@ from flexctrl.linear.condense import audit as audit_linear
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.model.tangents import tangents
 
 __all__ = ["Audit", "Freedom", "audit"]

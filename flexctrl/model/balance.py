@@ -14,10 +14,10 @@ from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
-from flexctrl.model.pivots import holds, negative_pivots
+from flexctrl.model.paths.pivots import holds, negative_pivots
 from flexctrl.model.rounding import force_rounding, slope_terms
 from flexctrl.model.solve import factorise
+from flexctrl.model.state import State
 from flexctrl.model.tangents import TURNS
 
 __all__ = ["Balance"]

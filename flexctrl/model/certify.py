@@ -15,7 +15,8 @@ from flexctrl.linear.eigen import RIGID_NOISE, stiffness_noise
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import EXTENDED_EPS, UNSEEN, UNSURE, Modes
 from flexctrl.linear.pencil import EPS
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.motion import Motion
+from flexctrl.model.state import State
 
 _ASYMMETRY = 1e-6
 _SLOPE = 1.9

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from flexctrl.errors import StructureError
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.motion import Motion
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import HUGE
 from flexctrl.structure.relations import Copy, Turn
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.mixed import Excess
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     from flexctrl.model.model import Model

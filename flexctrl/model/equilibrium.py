@@ -13,8 +13,8 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.certify import whole_body
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
 from flexctrl.model.search import Found, Newton, follow
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

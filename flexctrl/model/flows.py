@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["flow_rates", "flowing", "without_flows"]
 

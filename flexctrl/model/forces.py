@@ -11,10 +11,11 @@ import scipy.sparse as sp
 from flexctrl.kernels.extended import EXTENDED, evaluate
 from flexctrl.kernels.kernel import Backend, Run
 from flexctrl.linear.parts import Parts, parts_of
-from flexctrl.model.families import Family
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.mixed import Excess, Mixed
-from flexctrl.model.motion import DENSE_UP_TO, Motion, State
+from flexctrl.model.motion import DENSE_UP_TO, Motion
+from flexctrl.model.state import State
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS
-from flexctrl.model.families import winch_parameters
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, rope_pull, spring_pull
-from flexctrl.model.loose_kinds import loose_spring
+from flexctrl.model.laws.families import winch_parameters
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, rope_pull, spring_pull
+from flexctrl.model.laws.loose_kinds import loose_spring
 from flexctrl.model.model import Model
 from flexctrl.model.signals import winch_tension
 from flexctrl.structure.drives import Winch

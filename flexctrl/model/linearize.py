@@ -18,7 +18,7 @@ from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.model.tangents import TURNS, tangents
 from flexctrl.structure.elements import Beam
 from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque

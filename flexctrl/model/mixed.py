@@ -19,15 +19,15 @@ from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.mechanics import beam, pieces
 from flexctrl.mechanics.beam_tangent import beam_slope
-from flexctrl.model import kinds
-from flexctrl.model.kinds import Kind
-from flexctrl.model.motion import State
+from flexctrl.model.laws import kinds
+from flexctrl.model.laws.kinds import Kind
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     import casadi as ca
 
-    from flexctrl.model.families import Family
     from flexctrl.model.forces import Forces
+    from flexctrl.model.laws.families import Family
 
 _FEW = 64
 """Pieces up to which the virtual machine runs a kernel sooner than it could be compiled."""

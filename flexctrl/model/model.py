@@ -17,16 +17,17 @@ from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.kernels.kernel import Backend
 from flexctrl.model.assembly import assembled, mass_blocks, modal_blocks, stiffness_blocks
 from flexctrl.model.equations import Equations, LargeMotion, Small, SmallMotion
-from flexctrl.model.families import families_of
 from flexctrl.model.forces import Forces
-from flexctrl.model.frictions import friction_families, lag_blocks
-from flexctrl.model.kinks import Kinks
-from flexctrl.model.loose_kinds import loose_families, loose_names
+from flexctrl.model.laws.families import families_of
+from flexctrl.model.laws.frictions import friction_families, lag_blocks
+from flexctrl.model.laws.kinks import Kinks
+from flexctrl.model.laws.loose_kinds import loose_families, loose_names
+from flexctrl.model.laws.switches import Switches
+from flexctrl.model.laws.wind_kinds import wind_families
 from flexctrl.model.mixed import Excess
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.motion import Motion
 from flexctrl.model.signals import Signals, signals_of
-from flexctrl.model.switches import Switches
-from flexctrl.model.wind_kinds import wind_families
+from flexctrl.model.state import State
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part, Spring
 from flexctrl.structure.freedoms import check_finite

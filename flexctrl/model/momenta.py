@@ -18,8 +18,8 @@ from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.beam import PARAMETERS, NodeMotion, reach
 from flexctrl.mechanics.pieces import named
-from flexctrl.model.families import Family
-from flexctrl.model.kinds import (
+from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.kinds import (
     BEAM,
     DRIVE_SLOT,
     HEAVY_ROPE,
@@ -33,7 +33,7 @@ from flexctrl.model.kinds import (
 )
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     import casadi as ca

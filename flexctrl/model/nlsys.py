@@ -9,12 +9,12 @@ import numpy as np
 
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.model.audit import Freedom, audit
-from flexctrl.model.chart import Chart
-from flexctrl.model.charting import chart_of
 from flexctrl.model.equilibrium import Rest
+from flexctrl.model.linkages.chart import Chart
+from flexctrl.model.linkages.charting import chart_of
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
 from flexctrl.model.solve import factorise
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     import control

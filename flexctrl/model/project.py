@@ -13,7 +13,7 @@ from scipy.sparse.linalg import lsmr
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.consistent import extent
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import parse_point
 

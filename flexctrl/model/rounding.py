@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.model.tangents import TURNS
 
 __all__ = ["DIGITS", "force_rounding", "slope_terms"]

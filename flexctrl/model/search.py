@@ -10,8 +10,8 @@ import scipy.sparse as sp
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
-from flexctrl.model.motion import State
 from flexctrl.model.solve import Plan, factorise, plan
+from flexctrl.model.state import State
 
 _TARGET, _SETTLED = 1e-12, 1e-9
 _REACH = 1.0

@@ -15,11 +15,12 @@ from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS, paid_out
-from flexctrl.model.families import winch_parameters
-from flexctrl.model.frictions import lag_compliance
-from flexctrl.model.kinds import rope_pull, spring_pull
-from flexctrl.model.loose_kinds import loose_spring
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.laws.families import winch_parameters
+from flexctrl.model.laws.frictions import lag_compliance
+from flexctrl.model.laws.kinds import rope_pull, spring_pull
+from flexctrl.model.laws.loose_kinds import loose_spring
+from flexctrl.model.motion import Motion
+from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.elements import Rope, Spring
 from flexctrl.structure.signals import (

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from flexctrl.linear.dust import clean_mass, clean_stiffness
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["TURNS", "tangents"]
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.model.path import EquilibriumPath
+from flexctrl.model.paths.path import EquilibriumPath
 from flexctrl.plots.style import DRIVE, FLEXIBLE, INK, RIGID, new_figure, tidy
 
 __all__ = ["path_figure", "plot_path"]

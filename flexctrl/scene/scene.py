@@ -25,7 +25,7 @@ from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
 from flexctrl.structure.naming import node_of
 from flexctrl.structure.structure import Structure

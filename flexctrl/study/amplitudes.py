@@ -12,7 +12,7 @@ import numpy as np
 from flexctrl.errors import StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Amplitude", "Case", "ConstantLoad", "InitialDisplacement", "InitialMode", "InitialSpeed", "Unit"]
 

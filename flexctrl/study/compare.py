@@ -17,7 +17,7 @@ from flexctrl.errors import StructureError
 from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,7 +14,7 @@ from flexctrl.dynamics.simulate import simulate
 from flexctrl.errors import StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.study.critical_mode import CriticalMode, critical_mode
 from flexctrl.study.gain_family import Crossing, gain_family
 from flexctrl.study.spillover import Spillover

@@ -13,7 +13,7 @@ from flexctrl.errors import StructureError
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.study.amplitudes import (
     Amplitude,
     Case,

@@ -7,7 +7,7 @@ import numpy as np
 from flexctrl.errors import EquilibriumError, LinearizationError
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
-from flexctrl.model.path import equilibrium_path
+from flexctrl.model.paths.path import equilibrium_path
 from flexctrl.structure.signals import FollowerForce, FollowerTorque
 from flexctrl.study.amplitudes import Case
 

@@ -15,7 +15,7 @@ from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 from flexctrl.study.broken_loop import linear_law
 from flexctrl.study.critical_mode import CriticalMode, critical_mode
 from flexctrl.study.gain_family import Crossing, GainFamily, first_crossing, gain_family

@@ -29,7 +29,7 @@ from scipy.interpolate import CubicSpline
 
 import flexctrl as fc
 from flexctrl.cranes import ceiling_crane
-from flexctrl.model.flattening import flatten
+from flexctrl.model.flat.flattening import flatten
 
 EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation())
 TARGETS = (1e-3, 1e-4, 1e-5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.model.flattening import can_be_flat
+from flexctrl.model.flat.flattening import can_be_flat
 
 TUBE = fc.Section.tube(fc.STEEL, radius=0.04, thickness=0.004)
 GRAVITY, DAMPED, LARGE = fc.Gravity(), fc.RayleighDamping(0.05, 1e-4), fc.LargeRotation()

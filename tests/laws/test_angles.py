@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 import flexctrl as fc
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 E = fc.Section(EA=1e6, EI_y=1e4, EI_z=1e4, GJ=1e4, rhoA=2.0, rhoJ=1e-2)
 METHODS = [fc.GeneralizedAlpha(0.01, 1.0), fc.ConservingMidpoint(0.01), fc.ExplicitRungeKutta(0.01)]

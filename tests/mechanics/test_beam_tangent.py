@@ -11,7 +11,7 @@ from test_beam import ENDS, parameters
 
 import flexctrl as fc
 from flexctrl.effects.effect import Effect
-from flexctrl.model.kinds import BEAM, Kernels
+from flexctrl.model.laws.kinds import BEAM, Kernels
 
 
 class Field(fc.RotatingFrame):

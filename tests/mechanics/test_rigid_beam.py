@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
-from flexctrl.model import kinds
-from flexctrl.model.families import _beams, _rigid_beams
+from flexctrl.model.laws import kinds
+from flexctrl.model.laws.families import _beams, _rigid_beams
 
 EFFECTS = (fc.Gravity((0.3, -9.0, 2.0)), fc.RayleighDamping(0.3, 0.0), fc.RotatingFrame((0.2, 0.1, 0.7)))
 SECTIONS = {

@@ -11,8 +11,8 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.kernels.native import Packed, Reals
-from flexctrl.model.flat import Flat, drive, energy, keep, load, place, pull, push, tangent
-from flexctrl.model.flattening import Flattened, can_be_flat, flatten
+from flexctrl.model.flat.flat import Flat, drive, energy, keep, load, place, pull, push, tangent
+from flexctrl.model.flat.flattening import Flattened, can_be_flat, flatten
 from flexctrl.model.gauges import Gauges, read
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))

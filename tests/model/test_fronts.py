@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from flexctrl.kernels.native import Packed, Reals
-from flexctrl.model.fronts import Fronts, Plan, factor, plan_of, solve
+from flexctrl.model.flat.fronts import Fronts, Plan, factor, plan_of, solve
 
 pytest.importorskip("llvmlite")
 

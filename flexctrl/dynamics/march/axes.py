@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from flexctrl.dynamics.march.record import Factors
 from flexctrl.kernels.native import Reals, Wholes
-from flexctrl.model.axes import Axes
-from flexctrl.model.flat import Flat
-from flexctrl.model.fronts import Fronts, solve
-from flexctrl.model.kinds import NODE_SLOT
+from flexctrl.model.flat.axes import Axes
+from flexctrl.model.flat.flat import Flat
+from flexctrl.model.flat.fronts import Fronts, solve
+from flexctrl.model.laws.kinds import NODE_SLOT
 
 __all__ = ["mark", "solved", "turned_too_far"]
 

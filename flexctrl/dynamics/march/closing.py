@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.kernels.native import Reals, Runs, Wholes
-from flexctrl.model.flat import Flat, clear, drive
-from flexctrl.model.kinds import NODE_SLOT
-from flexctrl.model.layout import Flattened
+from flexctrl.model.flat.flat import Flat, clear, drive
+from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.laws.kinds import NODE_SLOT
 
 __all__ = ["Closing", "closing_of", "in_doubt", "settled"]
 

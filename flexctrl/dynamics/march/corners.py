@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.kernels.native import Reals, Wholes
-from flexctrl.model.flat import Flat
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.flat.flat import Flat
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.model import Model
 
 __all__ = ["Corners", "corners_of", "passes"]

@@ -11,7 +11,7 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Reals, Runs, Wholes
-from flexctrl.model.flat import clear
+from flexctrl.model.flat.flat import clear
 
 if TYPE_CHECKING:
     from flexctrl.design.lowering import Lowered

@@ -12,7 +12,7 @@ from flexctrl.dynamics.propagator import Propagator
 from flexctrl.dynamics.quadratic import Turnover
 from flexctrl.kernels.eights import Eight, eight, put, total
 from flexctrl.kernels.native import Reals
-from flexctrl.model.layout import Flattened
+from flexctrl.model.flat.layout import Flattened
 
 __all__ = ["Tables", "fill", "leap", "leap_of"]
 

@@ -19,7 +19,7 @@ from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Point
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Leaper", "LeapingStepper"]
 

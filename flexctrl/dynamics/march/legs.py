@@ -15,7 +15,7 @@ from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.steps import Point
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Leg", "Legs", "Span", "Told", "same"]
 

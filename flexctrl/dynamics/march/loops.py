@@ -33,8 +33,8 @@ from flexctrl.dynamics.march.record import (
 from flexctrl.dynamics.march.step import blended, refactored, step, to_rate, to_v
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals
-from flexctrl.model.flat import clear, drive, energy, keep, load, place, pull, push, tangent
-from flexctrl.model.fronts import factor
+from flexctrl.model.flat.flat import clear, drive, energy, keep, load, place, pull, push, tangent
+from flexctrl.model.flat.fronts import factor
 from flexctrl.model.gauges import read
 
 __all__ = ["run"]

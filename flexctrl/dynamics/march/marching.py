@@ -38,10 +38,10 @@ from flexctrl.dynamics.scales import farthest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
-from flexctrl.model.flattening import Flattened, can_be_flat, flatten
-from flexctrl.model.kinds import NODE_SLOT
+from flexctrl.model.flat.flattening import Flattened, can_be_flat, flatten
+from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 

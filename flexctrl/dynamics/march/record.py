@@ -11,9 +11,9 @@ from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.corners import Corners
 from flexctrl.dynamics.march.law import Law
 from flexctrl.kernels.native import Reals
-from flexctrl.model.axes import Axes
-from flexctrl.model.flat import Flat
-from flexctrl.model.fronts import Fronts
+from flexctrl.model.flat.axes import Axes
+from flexctrl.model.flat.flat import Flat
+from flexctrl.model.flat.fronts import Fronts
 from flexctrl.model.gauges import Gauges
 
 DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT, CORNER, SILENT = 0, 1, 2, 3, 4, 5, 6, 7

@@ -11,8 +11,8 @@ import math
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
-from flexctrl.model.flat import drive, place, push, tangent
-from flexctrl.model.fronts import factor
+from flexctrl.model.flat.flat import drive, place, push, tangent
+from flexctrl.model.flat.fronts import factor
 
 __all__ = ["blended", "refactored", "step", "to_rate", "to_v"]
 

@@ -14,7 +14,7 @@ from flexctrl.dynamics.march.marching import Marcher, Method, Remembered
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["MarchingStepper", "Memory"]
 

@@ -12,9 +12,9 @@ from flexctrl.effects.lugre_friction import LuGre, LuGreFriction
 from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.effects.viscous_friction import ViscousFriction
 from flexctrl.model.assembly import Block
-from flexctrl.model.families import Family
-from flexctrl.model.friction_kinds import LAG, SLIPS, friction_kind
-from flexctrl.model.kinds import Kind, kernels_of
+from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.friction_kinds import LAG, SLIPS, friction_kind
+from flexctrl.model.laws.kinds import Kind, kernels_of
 from flexctrl.model.motion import Motion
 from flexctrl.structure.contacts import Contact, MotorSide, contact_of
 from flexctrl.structure.drives import Drive

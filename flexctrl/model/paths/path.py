@@ -12,10 +12,10 @@ from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.balance import Balance
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
-from flexctrl.model.path_course import Course, Direction, Station
-from flexctrl.model.path_critical import across, softest
-from flexctrl.model.path_walk import PathEnd, Walk
+from flexctrl.model.paths.course import Course, Direction, Station
+from flexctrl.model.paths.critical import across, softest
+from flexctrl.model.paths.walk import PathEnd, Walk
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite, check_whole
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from flexctrl.model.path_course import Course, Station
-from flexctrl.model.path_critical import Gauge, branching_between, limit_between, reached
+from flexctrl.model.paths.course import Course, Station
+from flexctrl.model.paths.critical import Gauge, branching_between, limit_between, reached
 
 __all__ = ["PathEnd", "Walk", "Walked"]
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.sparse.linalg import splu
 
 from flexctrl.errors import SingularMatrixError
-from flexctrl.model.path_course import Course, Direction, Station
+from flexctrl.model.paths.course import Course, Direction, Station
 from flexctrl.model.solve import factorise
 
 __all__ = ["Gauge", "across", "branching_between", "limit_between", "reached", "softest"]

@@ -1,6 +1,6 @@
 """Followers and drives as casadi expressions: how nodes ride on their masters, loops of rigid parts left open.
 
-Only places and rates are written down; all else follows by differentiation (`flexctrl.model.linkage`).
+Only places and rates are written down; all else follows by differentiation (`flexctrl.model.linkages.linkage`).
 """
 
 from __future__ import annotations

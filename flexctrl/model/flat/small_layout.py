@@ -14,9 +14,9 @@ import scipy.sparse as sp
 
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.rotation import turned_rows
-from flexctrl.model.axes import Axes
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
-from flexctrl.model.layout import Layout
+from flexctrl.model.flat.axes import Axes
+from flexctrl.model.flat.layout import Layout
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = ["SmallLayout"]
 

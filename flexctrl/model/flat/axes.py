@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.kernels.native import Wholes
-from flexctrl.model.fronts import Plan
+from flexctrl.model.flat.fronts import Plan
 from flexctrl.model.model import Model
 
 __all__ = ["Axes", "axes_of"]

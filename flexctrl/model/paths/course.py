@@ -16,9 +16,9 @@ import scipy.sparse as sp
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
-from flexctrl.model.motion import State
-from flexctrl.model.pivots import negative_pivots, turned
+from flexctrl.model.paths.pivots import negative_pivots, turned
 from flexctrl.model.solve import factorise
+from flexctrl.model.state import State
 
 __all__ = ["Course", "Direction", "Station"]
 

@@ -9,9 +9,9 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.wind import Wind
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.model.families import Family
-from flexctrl.model.frictions import pieces
-from flexctrl.model.kinds import Kind, Shares, seen_outside
+from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.frictions import pieces
+from flexctrl.model.laws.kinds import Kind, Shares, seen_outside
 from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:

@@ -22,7 +22,8 @@ import numpy as np
 from flexctrl.errors import ChartError
 from flexctrl.mechanics.rotation import cross, logarithm
 from flexctrl.model.model import Model
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.motion import Motion
+from flexctrl.model.state import State
 
 __all__ = ["Chart", "Follower", "LeaningRope", "TurningNode", "inverse_tangents"]
 

@@ -11,14 +11,14 @@ import scipy.sparse as sp
 
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.rotation import turn_kernel
-from flexctrl.model.axes import Axes, axes_of
-from flexctrl.model.entries import entry, entry_energy, entry_slope
-from flexctrl.model.flat import Flat
-from flexctrl.model.fronts import Plan, plan_of
+from flexctrl.model.flat.axes import Axes, axes_of
+from flexctrl.model.flat.entries import entry, entry_energy, entry_slope
+from flexctrl.model.flat.flat import Flat
+from flexctrl.model.flat.fronts import Plan, plan_of
 from flexctrl.model.gauges import Gauges, gauges_of
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.model import Model
-from flexctrl.model.motion import State
+from flexctrl.model.state import State
 
 __all__ = ["Flattened", "Layout"]
 

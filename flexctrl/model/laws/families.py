@@ -11,8 +11,8 @@ from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch
 from flexctrl.mechanics.matrices import beam_mass, bending, coupling, plane_masses
-from flexctrl.model import kinds
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
+from flexctrl.model.laws import kinds
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, PointMass, RigidBody, Rope, Spring
 from flexctrl.structure.structure import Structure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from flexctrl.effects.effect import Effect
 from flexctrl.mechanics import friction
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.model.kinds import DRIVE_SLOT, Kind, Shares
+from flexctrl.model.laws.kinds import DRIVE_SLOT, Kind, Shares
 from flexctrl.structure.contacts import MotorSide, Sliding, Spinning, Turning
 
 if TYPE_CHECKING:

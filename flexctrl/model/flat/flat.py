@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Runs, Wholes
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = ["Flat", "clear", "drive", "energy", "keep", "load", "place", "pull", "push", "tangent"]
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexctrl.model.chart import Chart, Follower, LeaningRope, TurningNode
+from flexctrl.model.linkages.chart import Chart, Follower, LeaningRope, TurningNode
 from flexctrl.model.model import Model
-from flexctrl.model.motion import Motion, State
+from flexctrl.model.motion import Motion
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import IDENTIFIERS, ROTATIONS
 from flexctrl.structure.ties import Ride, Turn
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.model.families import Family
 from flexctrl.model.forces import Forces
-from flexctrl.model.friction_kinds import slip_of
-from flexctrl.model.kinds import DRIVE_SLOT, NODE_SLOT, Kind, moved, symbols_of
-from flexctrl.model.motion import State
+from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.friction_kinds import slip_of
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kind, moved, symbols_of
+from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.effects.backlash import gaps_of
-from flexctrl.model.loose_kinds import loose_names
-from flexctrl.model.motion import State
+from flexctrl.model.laws.loose_kinds import loose_names
+from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.elements import Node, Rope, Spring
 from flexctrl.structure.trolleys import Trolley

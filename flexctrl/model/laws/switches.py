@@ -18,10 +18,10 @@ import scipy.sparse as sp
 
 from flexctrl.effects.coulomb_friction import CoulombFriction
 from flexctrl.errors import StructureError
-from flexctrl.model.friction_kinds import STUCK
-from flexctrl.model.motion import Dry, State
-from flexctrl.model.slips import Slips
+from flexctrl.model.laws.friction_kinds import STUCK
+from flexctrl.model.laws.slips import Slips
 from flexctrl.model.solve import factorise
+from flexctrl.model.state import Dry, State
 
 if TYPE_CHECKING:
     from flexctrl.model.model import Model

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flexctrl.model.layout import Flattened, Layout
+from flexctrl.model.flat.layout import Flattened, Layout
+from flexctrl.model.flat.small_layout import SmallLayout
 from flexctrl.model.model import Model
-from flexctrl.model.small_layout import SmallLayout
 
 __all__ = ["Flattened", "can_be_flat", "flatten"]
 

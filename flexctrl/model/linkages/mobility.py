@@ -12,10 +12,11 @@ from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
 from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import cross
-from flexctrl.model.linkage import Linkage
-from flexctrl.model.motion import Dry, Motion, State
-from flexctrl.model.open_linkage import Link, Loop, renumbered
-from flexctrl.model.twists import Twists
+from flexctrl.model.linkages.linkage import Linkage
+from flexctrl.model.linkages.open_linkage import Link, Loop, renumbered
+from flexctrl.model.linkages.twists import Twists
+from flexctrl.model.motion import Motion
+from flexctrl.model.state import Dry, State
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, TRAVEL, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.kernels.kernel import Kernel
-from flexctrl.model.open_linkage import OpenLinkage, attitude
+from flexctrl.model.linkages.open_linkage import OpenLinkage, attitude
 
 if TYPE_CHECKING:
     import casadi as ca

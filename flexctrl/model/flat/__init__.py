@@ -1,0 +1,1 @@
+"""Models on flat vectors, for compiled loops."""

@@ -1,0 +1,1 @@
+"""Laws of force, as kernels and where they switch."""

@@ -1,0 +1,1 @@
+"""Nodes that follow others; loops of rigid parts."""
