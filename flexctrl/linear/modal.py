@@ -12,7 +12,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled
 from flexctrl.linear.massless import solved
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, ROUND_OFF, Modes, modes_of, refuse_unsymmetric
+from flexctrl.linear.modes import COMPLETE, ROUND_OFF, Modes, refuse_unsymmetric
 from flexctrl.linear.pattern import aligned, symmetric
 
 __all__ = ["ModalSystem", "Relaxation", "modal_damping", "modal_system", "proper", "rayleigh"]
@@ -100,7 +100,7 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
         linear = condense(linear)
     even = _with_even_stiffness(linear)
     base = scaled(even)
-    chosen = modes_of(even, base, None) if modes is None else modes
+    chosen = even._every_mode if modes is None else modes
     direct = _static_response(base)
     feedthrough, jump = base.model.D + base.model.Cq @ direct, base.model.Cv @ direct
     fit = rayleigh(base.model)

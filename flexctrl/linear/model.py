@@ -340,6 +340,31 @@ class LinearModel:
         return scaled_any(self)
 
     @cached_property
+    def _every_mode(self) -> Modes:
+        from flexctrl.linear.condense import scaled
+        from flexctrl.linear.modes import modes_of
+
+        return modes_of(self, scaled(self), None)
+
+    def certified(self, certificate: Certificate) -> LinearModel:
+        """Return the model with a certificate; scales and modes that have been worked out are kept.
+
+        Parameters
+        ----------
+        certificate : Certificate
+
+        Returns
+        -------
+        LinearModel
+        """
+        known: dict[str, Any] = {
+            name: self.__dict__[name] for name in ("_scaled", "_every_mode") if name in self.__dict__
+        }
+        result = replace(self, certificate=certificate)
+        result.__dict__.update(known)
+        return result
+
+    @cached_property
     def _modal(self) -> ModalSystem:
         from flexctrl.linear.modal import modal_system
 

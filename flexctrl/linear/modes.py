@@ -85,6 +85,34 @@ class Modes:
     def __len__(self) -> int:
         return self.omega_squared.size
 
+    def lowest(self, count: int) -> Modes:
+        """Return the first of them.
+
+        Parameters
+        ----------
+        count : int
+
+        Returns
+        -------
+        Modes
+        """
+        if count >= len(self):
+            return self
+        first = slice(count)
+        return replace(
+            self,
+            omega_squared=self.omega_squared[first],
+            shapes=self.shapes[:, first],
+            rigid=min(max(count - self.unstable, 0), self.rigid),
+            unstable=min(count, self.unstable),
+            decay=self.decay[first],
+            input_gain=self.input_gain[first],
+            output_gain=self.output_gain[:, first],
+            output_rate_gain=self.output_rate_gain[:, first],
+            strain_shares={part: shares[first] for part, shares in self.strain_shares.items()},
+            kinetic_shares={part: shares[first] for part, shares in self.kinetic_shares.items()},
+        )
+
     @property
     def omega(self) -> np.ndarray:
         """Undamped angular frequency, rad/s; 0 for rigid-body and unstable modes. Shape (k,)."""
@@ -238,7 +266,10 @@ def modes(linear: LinearModel, count: int | None = None) -> Modes:
     base = scaled(linear)
     if linear.certificate is not None and linear.certificate.loads:
         refuse_unsymmetric(base, ROUND_OFF)
-    return modes_of(linear, base, count)
+    if len(linear.coordinates) > DENSE:
+        return modes_of(linear, base, count)
+    _check_count(count)
+    return linear._every_mode if count is None else linear._every_mode.lowest(count)
 
 
 def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:

@@ -14,6 +14,7 @@ from flexctrl.linear.certificate import Certificate
 from flexctrl.linear.eigen import RIGID_NOISE, stiffness_noise
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import EXTENDED_EPS, UNSEEN, UNSURE, Modes
+from flexctrl.linear.pattern import symmetric
 from flexctrl.linear.pencil import EPS
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
@@ -96,7 +97,8 @@ def certify(
             f"linearize: the forces have no derivative here (Taylor slope {slope:.2f}, 2 expected): on one side of "
             "this place they are others than on the other. Linearise beside it"
         )
-    linear = replace(linear, K=(0.5 * (linear.K + linear.K.T)).tocsc())
+    even, gap = symmetric(linear.K)
+    linear = linear if gap == 0.0 else replace(linear, K=even)
     modes = linear.modes(min(linear.M.shape[0], _LOWEST))
     return Certificate(
         residual,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -85,7 +84,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     linear, asymmetry = _derivative(model, state, u, free, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
     pull = 0.0 if balance.idle(model.rest) else balance.pull(state)
-    return replace(linear, certificate=certify(linear, residual, asymmetry, slope, loads, model.motion, state, pull))
+    return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state, pull))
 
 
 def _refuse_spins(model: Model, held: Sequence[str]) -> None:
