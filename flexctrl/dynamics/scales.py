@@ -10,6 +10,7 @@ from flexctrl.model.model import Model
 
 __all__ = ["farthest", "turning", "yardsticks"]
 
+_POINT = 1e-12
 _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
 
 
@@ -26,6 +27,8 @@ def _turning(model: Model) -> np.ndarray:
 def yardsticks(model: Model) -> np.ndarray:
     """Return what an error of 1 is in each degree of freedom, shape (n,): a radian, or the size of the machine.
 
+    A machine that is but a point counts as a metre.
+
     A source angle counts as the motion it drives, or a motor's many turns would excuse any error of the machine;
     inner freedoms of effects have scales of their own.
     """
@@ -33,7 +36,7 @@ def yardsticks(model: Model) -> np.ndarray:
 
 
 def _yardsticks(model: Model) -> np.ndarray:
-    size = model.structure.size
+    size = model.structure.size if model.structure.size > _POINT else 1.0
     gears = {f"{d.name}_source": abs(d.effective_ratio) * (1.0, size)[d.column == 0] for d in model.structure.drives}
     known = gears | model.motion.scales
     pairs = zip(model.coordinates, turning(model), strict=True)
