@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -122,7 +123,7 @@ class LinearModel:
     def __post_init__(self) -> None:
         for kind in ("coordinates", "inputs", "outputs"):
             names = getattr(self, kind)
-            if twice := sorted({name for name in names if names.count(name) > 1}):
+            if twice := sorted(name for name, count in Counter(names).items() if count > 1):
                 raise LinearizationError(
                     f"{kind} name {', '.join(map(repr, twice))} more than once; give each its own name"
                 )
