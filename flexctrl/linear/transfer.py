@@ -13,7 +13,7 @@ from flexctrl.linear.free_motion import with_free_motion_apart
 from flexctrl.linear.modal import ModalSystem, rayleigh
 from flexctrl.linear.modal_sum import divided, modal_sum, outer
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, Modes, modes_of
+from flexctrl.linear.modes import COMPLETE, DEFAULT_COUNT, Modes, modes_of
 from flexctrl.linear.pencil import Pencil
 from flexctrl.linear.sampled import sampled_transfer
 
@@ -27,7 +27,6 @@ MOST_COUPLED = 150
 FURTHER = 1.5
 UNSYMMETRIC = 1e-9
 COUPLED = 250
-FEW = 20
 
 
 def transfer(linear: LinearModel, top: float) -> Transfer:
@@ -80,9 +79,10 @@ def routed(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
     if base.stiffness[1] > UNSYMMETRIC:
         return direct_transfer(base), False
     if count > most:
-        return direct_transfer(with_free_motion_apart(base, modes_of(linear, base, FEW))[0]), False
+        return direct_transfer(with_free_motion_apart(base, modes_of(linear, base, DEFAULT_COUNT))[0]), False
     if fit is None:
-        return sampled_transfer(*with_free_motion_apart(base, modes_of(linear, base, max(count + 2, FEW))), top), True
+        modes = modes_of(linear, base, max(count + 2, DEFAULT_COUNT))
+        return sampled_transfer(*with_free_motion_apart(base, modes), top), True
     return residual_transfer(base, modes_of(linear, base, count + 2), fit, top), False
 
 
