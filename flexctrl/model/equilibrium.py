@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from flexctrl.model.certify import whole_body
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
 from flexctrl.model.search import Found, Newton, follow
+from flexctrl.model.stability import leaving
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -41,10 +43,6 @@ class Rest:
     model : Model
     held : tuple of str
         Coordinates that were held.
-    unstable : int
-        Independent directions in which the machine would leave the equilibrium by itself: negative pivots of
-        the tangent stiffness of the free coordinates (of its symmetric part). Zero: statically stable, or free
-        to move without force.
     """
 
     state: State
@@ -54,11 +52,28 @@ class Rest:
     iterations: int
     model: Model = field(repr=False)
     held: tuple[str, ...] = ()
-    unstable: int = 0
+
+    @cached_property
+    def unstable(self) -> int:
+        """Independent directions in which the machine would leave the equilibrium by itself.
+
+        Negative pivots of the tangent stiffness of the free coordinates, as long as the loads have a potential: zero
+        is statically stable, or free to move without force. Loads without one (`FollowerForce`, `FollowerTorque`,
+        `Torque` about a fixed axis) make the stiffness unsymmetric, and its pivots tell nothing: there the motions
+        that grow are counted by their poles, whether they diverge or flutter. Worked out when asked for.
+
+        Raises
+        ------
+        LinearizationError, MechanismError
+            Under loads without a potential, if the poles cannot be told: beyond 1000 freedoms, for a motion with
+            neither mass nor stiffness, or where massless freedoms are damped.
+        """
+        held = (self.model.coordinate(name) for name in self.held)
+        return leaving(Balance(self.model, self.inputs, {i: float(self.state.q[i]) for i in held}), self.state)
 
     @property
     def stable(self) -> bool:
-        """Whether no small disturbance alone makes the machine leave; loads that follow it may still flutter."""
+        """Whether no small disturbance alone makes the machine leave, be it by divergence or by flutter."""
         return self.unstable == 0
 
     def plot(self) -> Figure:
@@ -134,13 +149,12 @@ def equilibrium(
 
 
 def rest_of(balance: Balance, found: Found) -> Rest:
-    """Return what a search found as an equilibrium, with its verdict of stability."""
+    """Return what a search found as an equilibrium."""
     model = balance.model
     outputs = dict(zip(model.outputs, model.measure(found.state).tolist(), strict=True))
     held = tuple(model.coordinates[i] for i in balance.held)
-    unstable = balance.unstable(found.state)
     residual = min(found.residual, balance.beyond_noise(found.state))
-    return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held, unstable)
+    return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held)
 
 
 def _found(balance: Balance, start: State, tolerance: float) -> Found:

@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.effects.rotating_frame import RotatingFrame
-from flexctrl.effects.wind import Wind
 from flexctrl.errors import LinearizationError, MechanismError, StructureError
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.model.audit import audit
@@ -17,10 +15,10 @@ from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
+from flexctrl.model.stability import without_energy
 from flexctrl.model.state import State
 from flexctrl.model.tangents import TURNS, tangents
 from flexctrl.structure.elements import Beam
-from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque
 
 _BALANCED, _ROUND_OFF = 1e-6, 1e-12
 
@@ -80,7 +78,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     balance = Balance(model, u, {i: float(state.q[i]) for i in sorted(held)})
     residual = _check_balance(balance, state)
     _refuse_corners(model, state, free)
-    loads = _without_energy(model, u)
+    loads = without_energy(model, u)
     linear, asymmetry = _derivative(model, state, u, free, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
     pull = 0.0 if balance.idle(model.rest) else balance.pull(state)
@@ -103,15 +101,6 @@ def _refuse_spins(model: Model, held: Sequence[str]) -> None:
             f"{len(spins)} motion(s) with neither mass nor stiffness: {'; '.join(spins)}. "
             "Hold the freedom, or give the section a rotary inertia rhoJ."
         )
-
-
-def _without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:
-    """The loads at work that have no potential: they may make K unsymmetric."""
-    kinds = (FollowerForce, FollowerTorque, Torque)
-    signals = model.structure.inputs if model.large else ()
-    turning = any(isinstance(e, RotatingFrame) and any(e.rate) for e in model.effects)
-    drag = tuple("Wind" for e in model.effects if turning and isinstance(e, Wind))
-    return tuple(s.name for s, value in zip(signals, u, strict=False) if value and isinstance(s, kinds)) + drag
 
 
 def _derivative(

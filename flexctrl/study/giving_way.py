@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexctrl.errors import EquilibriumError, LinearizationError
+from flexctrl.linear.growth import growing
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.paths.path import equilibrium_path
@@ -13,7 +14,7 @@ from flexctrl.study.amplitudes import Case
 
 __all__ = ["gives_way", "giving_way_between", "loaded"]
 
-_SYMMETRIC, _GROWTH = 1e-9, 1e-7
+_SYMMETRIC = 1e-9
 
 
 def loaded(case: Case, u: np.ndarray) -> Rest:
@@ -48,7 +49,7 @@ def gives_way(case: Case, rest: Rest, u: np.ndarray) -> bool:
     -------
     bool
     """
-    if rest.unstable <= loaded(case, 0.0 * u).unstable and not _follows(case, u):
+    if not _follows(case, u) and rest.unstable <= loaded(case, 0.0 * u).unstable:
         return False
     try:
         now = linearize(case.model, at=rest)
@@ -56,12 +57,7 @@ def gives_way(case: Case, rest: Rest, u: np.ndarray) -> bool:
         return True
     if abs(now.K - now.K.T).max() <= _SYMMETRIC * abs(now.K).max():
         return now.modes().unstable > case.linear.modes().unstable
-    return _growth(now.damped_poles()) > _growth(case.linear.damped_poles())
-
-
-def _growth(poles: np.ndarray) -> int:
-    """How many poles grow."""
-    return int((poles.real > _GROWTH * np.abs(poles).max(initial=1.0)).sum())
+    return growing(now) > growing(case.linear)
 
 
 def _follows(case: Case, u: np.ndarray) -> bool:

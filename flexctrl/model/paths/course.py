@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
-from flexctrl.model.paths.pivots import negative_pivots, turned
+from flexctrl.model.paths.pivots import turned
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 
@@ -47,8 +47,6 @@ class Station:
         λ.
     tangent : Direction
         Of length one.
-    unstable : int
-        Negative pivots.
     turned : int
         What changes where the stiffness becomes singular.
     iterations : int
@@ -58,7 +56,6 @@ class Station:
     state: State
     factor: float
     tangent: Direction
-    unstable: int
     turned: int
     iterations: int
 
@@ -138,9 +135,9 @@ class Course:
         return self.balance.model.advance(state, full, self.balance.still, 0.0)
 
     def station(self, state: State, factor: float, along: Direction, iterations: int) -> Station:
-        """Return an equilibrium with its tangent and stability."""
+        """Return an equilibrium with its tangent."""
         K = self.stiffness(state, factor)
-        return Station(state, factor, self.tangent(state, factor, along), negative_pivots(K), turned(K), iterations)
+        return Station(state, factor, self.tangent(state, factor, along), turned(K), iterations)
 
     def step(self, start: Station, along: Direction, length: float, most: int = 12) -> Station | None:
         """Return the equilibrium at a distance along a direction, or none if the corrections do not shrink."""

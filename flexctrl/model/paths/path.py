@@ -248,7 +248,7 @@ def _begin(
     station = course.station(state, factor, Direction(np.zeros(len(balance.free)), float(rising)), 0)
     if isinstance(start, BranchPoint):
         away = across(course, station, start.mode[balance.free])
-        station = Station(state, factor, away, station.unstable, station.turned, 0)
+        station = Station(state, factor, away, station.turned, 0)
     return course, station
 
 
@@ -265,4 +265,4 @@ def _rest(course: Course, station: Station) -> Rest:
     held = tuple(model.coordinates[i] for i in balance.held)
     loads = float(np.abs(model.signals.loads_at(station.state) @ (course.factor_scale * course.load)).sum())
     residual = balance.relative(balance.force(station.state), max(balance.scale(station.state), loads))
-    return Rest(station.state, residual, outputs, balance.u, station.iterations, model, held, station.unstable)
+    return Rest(station.state, residual, outputs, balance.u, station.iterations, model, held)
