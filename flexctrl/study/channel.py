@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg as la
 
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.reduction.low_frequency import undamped
+from flexctrl.linear.reduction.low_frequency import nearest_modes, undamped, unsymmetric
 from flexctrl.linear.statespace import modal_first_order
 
 __all__ = ["Quadruple", "channel_states"]
@@ -21,7 +21,8 @@ def channel_states(linear: LinearModel) -> Quadruple:
     A link that may spin about its own axis, or a trolley whose position does not enter the output, would
     leave poles at 0 that no feedback moves. Undamped rigid-body motion has the response
     C_R B_R/s² + V_R B_R/s; only the directions in which the two products do not vanish are kept, and of
-    those seen through their velocity alone only the velocity.
+    those seen through their velocity alone only the velocity. Under loads that follow the machine nothing is left
+    out: K is not symmetric there, and free motion stands apart from the rest no more.
 
     Parameters
     ----------
@@ -32,7 +33,9 @@ def channel_states(linear: LinearModel) -> Quadruple:
     -------
     A, B, C, D : numpy.ndarray
     """
-    first, modes = modal_first_order(linear), linear.modes()
+    first, modes = modal_first_order(linear), nearest_modes(linear)
+    if unsymmetric(linear):
+        return first.A, first.B, first.C, first.D
     position = 2 * (modes.unstable + np.arange(modes.rigid))
     free = position[undamped(linear, modes.shapes[:, modes.unstable : modes.unstable + modes.rigid])]
     rest = np.setdiff1d(np.arange(len(first.A)), np.concatenate([free, free + 1]))

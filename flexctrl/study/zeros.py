@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
+from flexctrl.errors import LinearizationError
 from flexctrl.linear.model import LinearModel
+from flexctrl.linear.reduction.low_frequency import unsymmetric
 from flexctrl.study.channel import Quadruple, channel_states
 
 if TYPE_CHECKING:
@@ -64,7 +66,7 @@ def zeros(linear: LinearModel, inputs: Sequence[str] | None = None, outputs: Seq
     (1982) 415–430); the finite ones are then polished on the second-order Rosenbrock matrix itself, in
     physical coordinates, where they keep the accuracy of the entries of M, C and K. Free rigid-body motion
     that the channel neither drives nor sees gives no zeros; a flexible mode of that kind gives zeros on its
-    poles.
+    poles. Under loads that follow the machine (K not symmetric) the same equations hold.
 
     Parameters
     ----------
@@ -201,7 +203,7 @@ class SensorChoice:
         The channel.
     collocated : bool
         The output measures the motion its input works on (its row is a multiple of the input's
-        column), or its velocity: poles and zeros alternate and no phase is lost.
+        column), or its velocity: poles and zeros alternate and no phase is lost, unless loads follow the machine.
     in_phase : bool
         Every mode looked at has a residue of the sign of the first: minimum phase so far.
     first_flip : float
@@ -219,6 +221,10 @@ class SensorChoice:
 def sensor_choices(linear: LinearModel, below: float = np.inf) -> tuple[SensorChoice, ...]:
     """Label every input–output pair collocated, in phase, or not.
 
+    The residue of a mode is (c φ)(ψᵀ b) with ψᵀ M φ = 1. Under loads that follow the machine the left shape ψ, of
+    Kᵀ ψ = ω² M ψ, is another than φ: there a collocated pair may have residues of both signs, and only ``in_phase``
+    speaks of phase.
+
     Parameters
     ----------
     linear : LinearModel
@@ -229,21 +235,54 @@ def sensor_choices(linear: LinearModel, below: float = np.inf) -> tuple[SensorCh
     -------
     tuple of SensorChoice
         Outputs run fastest.
+
+    Raises
+    ------
+    LinearizationError
+        If modes looked at flutter: their residues have no sign.
     """
-    modes = linear.condense().modes()
-    seen = modes.omega <= below
-    shapes, omega = modes.shapes[:, seen], modes.omega[seen]
     condensed = linear.condense()
+    omega, right, left = _two_sided(condensed) if unsymmetric(condensed) else _one_sided(condensed)
+    seen = omega <= below
+    shapes = omega[seen], right[:, seen], left[:, seen]
+    _refuse_flutter(*shapes[:2])
     return tuple(
-        _label(condensed, shapes, omega, i, j) for i in range(len(linear.inputs)) for j in range(len(linear.outputs))
+        _label(condensed, *shapes, i, j) for i in range(len(linear.inputs)) for j in range(len(linear.outputs))
     )
 
 
-def _label(linear: LinearModel, shapes: np.ndarray, omega: np.ndarray, i: int, j: int) -> SensorChoice:
+def _one_sided(linear: LinearModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    modes = linear.modes()
+    return modes.omega, modes.shapes, modes.shapes
+
+
+def _two_sided(linear: LinearModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """ω and both shapes of K φ = ω² M φ, from those of the symmetric part of K; ω by its size where it is no number."""
+    system = linear._modal
+    values, left, right = eig(np.diag(system.modes.omega_squared) + system.circulatory, left=True)
+    order = np.argsort(np.abs(values), kind="stable")
+    values, left, right = values[order], left[:, order].conj(), right[:, order]
+    left = left / np.einsum("ij,ij->j", left, right)
+    omega = np.where(np.abs(values.imag) > 0.0, np.sqrt(np.abs(values)), np.sqrt(np.maximum(values.real, 0.0)))
+    real = not np.iscomplexobj(right) or not right.imag.any()
+    right, left = (right.real, left.real) if real else (right, left)
+    return omega, system.modes.shapes @ right, system.modes.shapes @ left
+
+
+def _refuse_flutter(omega: np.ndarray, shapes: np.ndarray) -> None:
+    turning = np.abs(shapes.imag).any(axis=0)
+    if turning.any():
+        raise LinearizationError(
+            f"sensor_choices: the mode at {omega[turning][0]:.4g} rad/s flutters, so its residues have no sign; take "
+            "load off, or look at modes below it: sensor_choices(linear, below=…)"
+        )
+
+
+def _label(linear: LinearModel, omega: np.ndarray, right: np.ndarray, left: np.ndarray, i: int, j: int) -> SensorChoice:
     column = linear.B[:, i]
     row = linear.Cq[j] if linear.Cq[j].any() else linear.Cv[j]
-    share = (row @ shapes) * (column @ shapes)
-    size = np.linalg.norm(row @ shapes) * np.linalg.norm(column @ shapes)
+    seen, driven = row @ right.real, column @ left.real
+    share, size = seen * driven, np.linalg.norm(seen) * np.linalg.norm(driven)
     levels, member = np.unique(omega, return_inverse=True)
     share = np.bincount(member, share, len(levels))  # repeated and rigid-body modes count together
     visible = abs(share) > 1e-9 * size
