@@ -48,17 +48,23 @@ class Exact:
     ----------
     step : float
         Spacing of the states computed [s]; with held inputs it has no bearing on their accuracy.
+    modes : int, optional
+        Vibrations that move, the slowest ones (beside motion that is free or grows); the others stay where constant
+        loads hold them. Default: all.
 
     Raises
     ------
     StructureError
-        For a step that is not positive.
+        For a step that is not positive, or modes that are no whole number ≥ 0.
     """
 
     step: float
+    modes: int | None = None
 
     def __post_init__(self) -> None:
         check_step(self.step, "Exact")
+        if self.modes is not None and (not isinstance(self.modes, int) or self.modes < 0):
+            raise StructureError(f"Exact: modes = {self.modes!r}; expected a whole number ≥ 0, or none for all")
 
     @property
     def order(self) -> int:
@@ -85,18 +91,18 @@ class Exact:
         from flexctrl.dynamics.march.leaps import LeapingStepper
         from flexctrl.dynamics.march.marching import can_march
 
-        plain = ExactStepper(model, feed, tolerance)
+        plain = ExactStepper(model, feed, tolerance, self.modes)
         marched: Any = LeapingStepper(plain)
         return marched if can_march(model) and not feed.continuous else plain
 
 
-def _modal(model: Model) -> tuple[ModalEquations, Propagator]:
+def _modal(model: Model, modes: int | None) -> tuple[ModalEquations, Propagator]:
     """The modal form of a model and its exponentials, worked out once."""
-    found = model.__dict__.get("_modal")
-    if found is None:
-        equations = opened(model)
-        found = model.__dict__["_modal"] = equations, Propagator(equations.first)
-    return found
+    kept: dict[int | None, tuple[ModalEquations, Propagator]] = model.__dict__.setdefault("_modal", {})
+    if modes not in kept:
+        equations = opened(model, modes)
+        kept[modes] = equations, Propagator(equations.first)
+    return kept[modes]
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,7 @@ class ExactStepper:
     model: Model
     feed: Feed
     tolerance: Tolerance
+    modes: int | None = None
     counts: Counts = field(default_factory=Counts)
     memory: None = None
     _slope: np.ndarray | None = None
@@ -121,7 +128,7 @@ class ExactStepper:
 
     def __post_init__(self) -> None:
         self.yard = yardsticks(self.model)
-        (self.equations, self.propagator), self.closed = _modal(self.model), False
+        (self.equations, self.propagator), self.closed = _modal(self.model, self.modes), False
         if isinstance(self.model, LinearPlant) and isinstance(self.feed.controller, LinearController):
             self.closed = self.feed.continuous
             if self.closed:
@@ -135,10 +142,9 @@ class ExactStepper:
 
     def start(self, state: State, supply: Supply, step: float) -> ModalPoint:
         """Return the point of a state; what no mass holds goes where its forces balance."""
-        e, n, z = self.equations, self.model.n, supply.x if self.closed else np.zeros(0)
+        e, z = self.equations, supply.x if self.closed else np.zeros(0)
         known = np.append(state.q, state.v) - e.first.D @ self.forcing(supply.u) - e.first.C[:, e.modes :] @ z
-        modal = np.linalg.lstsq(e.first.C[:, : e.modes], known, rcond=None)[0] if n else np.zeros(0)
-        return self.point(state, np.append(modal, z), supply, state.t)
+        return self.point(state, np.append(e.read @ known, z), supply, state.t)
 
     def renew(self, point: ModalPoint, supply: Supply, step: float) -> ModalPoint:
         """Return the point under other inputs."""

@@ -9,7 +9,7 @@ import numpy as np
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_plant import LinearPlant
-from flexctrl.linear.modal import modal_system
+from flexctrl.linear.modal import ModalSystem, modal_system
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import FirstOrder, first_order
 from flexctrl.model.model import Model
@@ -31,16 +31,31 @@ class ModalEquations:
     direct : numpy.ndarray, shape (inputs, inputs + 1)
     modes : int
         States that are not the controller's.
+    read : numpy.ndarray, shape (modes, 2 n)
+        These states from (q, v) less what inputs do at once.
     """
 
     first: FirstOrder
     gain: np.ndarray
     direct: np.ndarray
     modes: int
+    read: np.ndarray
 
 
-def opened(model: Model) -> ModalEquations:
-    """Return the modal form of a model that does not move far; the last input carries its constant loads."""
+def opened(model: Model, modes: int | None = None) -> ModalEquations:
+    """Return the modal form of a model that does not move far; the last input carries its constant loads.
+
+    Parameters
+    ----------
+    model : Model
+    modes : int, optional
+        Vibrations that are kept, the slowest ones, beside motion that is free or grows; those left out stay where
+        the constant loads hold them. Default: all.
+
+    Returns
+    -------
+    ModalEquations
+    """
     n, m, rest = model.n, len(model.inputs), model.rest
     still, none = np.zeros(n), np.zeros(m)
     seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -58,8 +73,32 @@ def opened(model: Model) -> ModalEquations:
         (*model.inputs, "constant_loads"),
         tuple(f"{name}_{what}" for what in ("place", "rate") for name in model.coordinates),
     )
-    first = first_order(replace(modal_system(linear), jump=np.zeros((2 * n, m + 1))))
-    return ModalEquations(first, np.zeros((m, len(first.A))), np.eye(m, m + 1), len(first.A))
+    system = replace(modal_system(linear), jump=np.zeros((2 * n, m + 1)))
+    first = first_order(system)
+    read = _inverse(first.C)
+    always = system.modes.unstable + system.modes.rigid
+    if modes is not None and always + modes < len(system.modes):
+        first, kept = _truncated(system, always + modes)
+        read = read[kept]
+    return ModalEquations(first, np.zeros((m, len(first.A))), np.eye(m, m + 1), len(first.A), read)
+
+
+def _truncated(system: ModalSystem, count: int) -> tuple[FirstOrder, np.ndarray]:
+    """The equations of the first modes, and which of all states these are; the others are held by constant loads."""
+    modes, relax, kept = system.modes, system.relaxation, np.arange(count)
+    left = modes.select(np.arange(count, len(modes)))
+    direct = system.feedthrough.copy()
+    direct[:, -1] += left.output_gain @ (left.input_gain[:, -1] / left.omega_squared)
+    smaller = replace(
+        system,
+        modes=modes.select(kept),
+        damping=system.damping[:count, :count],
+        circulatory=system.circulatory[:count, :count],
+        relaxation=replace(relax, drag=relax.drag[:, :count], reaction=relax.reaction[:count]),
+        feedthrough=direct,
+    )
+    relaxing = 2 * len(modes) + np.arange(relax.rates.size)
+    return first_order(smaller), np.concatenate([np.arange(2 * count), relaxing])
 
 
 def closed(plant: ModalEquations, model: LinearPlant, feed: Feed) -> ModalEquations:
@@ -84,7 +123,12 @@ def closed(plant: ModalEquations, model: LinearPlant, feed: Feed) -> ModalEquati
     C = np.hstack([first.C, np.zeros((2 * n, k))]) + first.D[:, :m] @ gain
     states = (*first.states, *(f"controller{i + 1}" for i in range(k)))
     whole = FirstOrder(A, _unloaded(B), C, _unloaded(first.D[:, :m] @ solved), states, (slice(0, d + k),))
-    return ModalEquations(whole, gain, _unloaded(solved), d)
+    return ModalEquations(whole, gain, _unloaded(solved), d, _inverse(C[:, :d]))
+
+
+def _inverse(C: np.ndarray) -> np.ndarray:
+    """States from what they show, least squares."""
+    return np.linalg.pinv(C, rcond=max(C.shape) * np.finfo(float).eps) if C.size else np.zeros(C.shape[::-1])
 
 
 def _unloaded(matrix: np.ndarray) -> np.ndarray:

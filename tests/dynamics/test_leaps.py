@@ -64,3 +64,28 @@ def test_leaps_go_on_bit_for_bit():
     rest = fc.simulate(crane(), until=0.1, start=half.checkpoint, **how)
     assert np.allclose(rest.final.q, whole.final.q, rtol=0.0, atol=1e-13)
     assert rest.report.steps == whole.report.steps
+
+
+def test_few_modes_are_a_reduced_linear_model():
+    """Exact steps of some modes against modal truncation of the linear model; what is left out keeps its place."""
+    model = crane(fc.RayleighDamping(0.1, 1e-3))
+    rest = fc.equilibrium(model)
+    linear = fc.linearize(model, at=rest)
+    for count in (0, 5, 11):
+        few = fc.simulate(model, until=0.1, start=rest, inputs={"push": 300.0}, method=fc.Exact(H, modes=count))
+        reduced = linear.reduce(fc.ModalTruncation(linear.modes().rigid + count)).linear
+        told = fc.simulate(reduced, until=0.1, inputs={"push": 300.0}, method=fc.Exact(H))
+        moved = few.y - np.array([rest.outputs[name] for name in few.outputs])
+        assert np.allclose(moved, told.y, rtol=0.0, atol=1e-9)
+        assert few.report.energy_residual < 1e-6
+
+
+def test_all_modes_are_the_whole_model_and_few_march_as_they_step(monkeypatch):
+    model, how = crane(fc.RayleighDamping(0.1, 1e-3)), {"inputs": {"push": 300.0}, "until": 0.05}
+    whole = fc.simulate(model, method=fc.Exact(H), **how)
+    assert np.array_equal(fc.simulate(model, method=fc.Exact(H, modes=1000), **how).y, whole.y)
+    a, b = both(model, monkeypatch, method=fc.Exact(H, modes=4), controller=law(), until=0.05)
+    assert np.allclose(a.y, b.y, rtol=1e-9, atol=1e-10)
+    for wrong in (-1, 2.5):
+        with pytest.raises(fc.errors.StructureError, match="modes"):
+            fc.Exact(H, modes=wrong)

@@ -27,7 +27,7 @@ def test_every_scene_is_here():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["bridge_crane", "ceiling_crane"])  # the arm's takes a minute
+@pytest.mark.parametrize("name", STRETCH)
 def test_the_ledger_keeps_what_matters(name):
     """What alone is worth more than the tolerance is kept; the minimal set holds, run against the full one."""
     scene = short(name)

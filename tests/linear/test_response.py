@@ -14,6 +14,7 @@ from fixtures.random_models import dense_response
 
 from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.linear.condense import scaled
+from flexctrl.linear.reduction.states import states_transfer
 from flexctrl.linear.transfer import direct_transfer, transfer
 
 
@@ -234,3 +235,21 @@ def test_bad_requests_are_refused():
         linear.frequency_response(span=(0.0, 1.0))
     with pytest.raises(StructureError, match="did you mean 'force1'"):
         linear.frequency_response([1.0]).channel("position1", "force2")
+
+
+@pytest.mark.parametrize("points", [1, 7, 40])
+def test_states_answer_alike_one_point_or_many(points):
+    """Few points go one by one, many together: either is D + C (sI − A)⁻¹ B."""
+    rng = np.random.default_rng(4)
+    A, B, C, D = (rng.normal(size=shape) for shape in ((12, 12), (12, 2), (3, 12), (3, 2)))
+    s = 1j * np.geomspace(0.1, 10.0, points)
+    found = states_transfer(A, B, C, D)(s)
+    for k, each in enumerate(s):
+        expected = D + C @ np.linalg.solve(each * np.eye(12) - A, B)
+        assert found[:, :, k] == pytest.approx(expected, rel=1e-10)
+
+
+def test_on_a_pole_states_answer_with_a_large_number():
+    evaluate = states_transfer(np.diag([0.0, -1.0]), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
+    for points in ([0.0], [0.0, 1.0, 2.0]):
+        assert 1e12 < abs(evaluate(np.array(points))[0, 0, 0]) < np.inf

@@ -29,7 +29,7 @@ class Leaper(Marcher):
 
     def __init__(self, model: Model, method: Method) -> None:
         super().__init__(model, method)
-        self._tables: dict[float, Tables] = {}
+        self._tables: dict[tuple[float, int | None], Tables] = {}
         self._steps: ExactStepper | None = None
 
     def taking(self, steps: ExactStepper) -> Leaper:
@@ -47,7 +47,7 @@ class Leaper(Marcher):
     def _made(self, seeds: tuple[float, float, float], task: int) -> int:
         h, steps = self.march.h, self._steps
         assert steps is not None
-        key = float(f"{h:.9e}")
+        key = float(f"{h:.9e}"), steps.modes
         if key not in self._tables:
             self._tables[key] = Tables.of(h, steps.propagator, steps.turnover)
         fill(self.leap, self._tables[key])

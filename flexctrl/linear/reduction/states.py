@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigvals, schur
+from scipy.linalg import eigvals, schur, solve_triangular
 
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.reduction.result import Reduced
@@ -46,14 +46,32 @@ def states_transfer(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) 
     T, Q = schur(A, output="complex") if len(A) else (np.zeros((0, 0)), np.zeros((0, 0)))
     load, seen = Q.conj().T @ B, C @ Q
 
+    poles = np.diag(T)
+    off = np.maximum(_CLOSEST * np.abs(poles), _CLOSEST**2)
+
+    def away(s: np.ndarray) -> np.ndarray:
+        """s less the poles; on a pole itself as near as round-off lets s be, so that a search sees a large value."""
+        gap = s - poles[:, None]
+        return np.where(gap == 0.0, off[:, None], gap)
+
+    def together(s: np.ndarray) -> np.ndarray:
+        """State by state, all points at once."""
+        x, gap = np.zeros((*load.shape, s.size), complex), away(s)
+        for k in range(len(T) - 1, -1, -1):
+            x[k] = (load[k, :, None] + np.tensordot(T[k, k + 1 :], x[k + 1 :], 1)) / gap[k]
+        return x
+
+    def singly(s: np.ndarray) -> np.ndarray:
+        """Point by point: quicker where there are few."""
+        x, gap, matrix, diagonal = np.zeros((*load.shape, s.size), complex), away(s), -T, np.arange(len(T))
+        for j in range(s.size):
+            matrix[diagonal, diagonal] = gap[:, j]
+            x[:, :, j] = solve_triangular(matrix, load, check_finite=False)
+        return x
+
     def evaluate(s: np.ndarray) -> np.ndarray:
         s = np.asarray(s, dtype=complex)
-        x = np.zeros((*load.shape, s.size), complex)
-        for k in range(len(T) - 1, -1, -1):
-            above = np.tensordot(T[k, k + 1 :], x[k + 1 :], 1)
-            away = s - T[k, k]
-            # on the pole itself: as near as round-off lets s be, so a search that runs into it sees a large value
-            x[k] = (load[k, :, None] + above) / np.where(away == 0.0, _CLOSEST * max(abs(T[k, k]), _CLOSEST), away)
+        x = (singly if s.size < len(T) else together)(s)
         return np.asarray(np.tensordot(seen, x, 1) + D[:, :, None])
 
     return evaluate
