@@ -32,7 +32,7 @@ from flexctrl.structure.signals import (
     Tension,
 )
 
-__all__ = ["Gauges", "gauges_of", "read"]
+__all__ = ["Gauges", "gauges_of", "read", "show"]
 
 _TURN = 2.0 * math.pi
 
@@ -93,6 +93,11 @@ def read(g: Gauges, z: Reals, y: Reals) -> None:
         y[i] = 0.0
     for k in range(g.tense):
         g.tensions[k](z, y)
+    show(g, z, y)
+
+
+def show(g: Gauges, z: Reals, y: Reals) -> None:
+    """Tell the outputs that are sums, angles of sums, and rotations."""
     for k in range(g.plains):
         y[g.plain[2 * k]] = g.sums[g.plain[2 * k + 1]]
     for k in range(g.angled):

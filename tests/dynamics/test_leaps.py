@@ -89,3 +89,55 @@ def test_all_modes_are_the_whole_model_and_few_march_as_they_step(monkeypatch):
     for wrong in (-1, 2.5):
         with pytest.raises(fc.errors.StructureError, match="modes"):
             fc.Exact(H, modes=wrong)
+
+
+def swinging() -> tuple[fc.Model, fc.Saturated]:
+    """A load on a rope below a trolley on an elastic shaft: what is small of it, with outputs of every plain kind."""
+    rope = fc.Rope("rope", start=(0, 0, 0), end=(0, 0, -2), EA=1e5)
+    trolley, load = fc.PointMass("trolley", at=rope.start, mass=40.0), fc.PointMass("load", at=rope.end, mass=20.0)
+    drive = fc.LinearDrive(
+        "drive", node=rope.start, direction="x", radius=0.1, ratio=10.0, stiffness=50.0, inertia=0.01
+    )
+    structure = fc.Structure(
+        elements=[rope, trolley, load],
+        joints=[fc.Support(rope.start, held="v w"), fc.Pin(rope.start, trolley.node), fc.Pin(rope.end, load.node)],
+        drives=[drive],
+        inputs=[fc.MotorTorque("torque", drive="drive"), fc.Force("lift", at=rope.end, direction="z")],
+        outputs=[
+            fc.DriveAngle("angle", drive="drive"),
+            fc.DriveSpeed("speed", drive="drive"),
+            fc.SwayAngle("sway", top=rope.start, load=rope.end, direction="x"),
+            fc.Velocity("rate", at=rope.end, minus=rope.start, direction="x"),
+        ],
+    )
+    effects = [fc.Gravity(), fc.Flexible(), fc.GeometricStiffness(), fc.RayleighDamping(0.05, 1e-3)]
+    return fc.assemble(structure, effects), pid(4.0, 0.0, 1.0, measured="angle", rate="speed", command="torque")
+
+
+def test_leaps_on_modal_states_alone_see_ropes_and_drives(monkeypatch):
+    model, inner = swinging()
+    follow = fc.Tracking(fc.Sampled(inner, H), {"angle": MinimumJerk(20.0, 0.3, at=0.02)})
+    how = {"controller": follow, "until": 0.6, "method": fc.Exact(H), "every": H, "start": fc.equilibrium(model)}
+    a, b = both(model, monkeypatch, **how)
+    assert np.abs(b["sway"]).max() > 1e-3
+    assert np.allclose(a.y, b.y, rtol=1e-8, atol=1e-10)
+    assert a.report.energy.dissipated == pytest.approx(b.report.energy.dissipated, rel=1e-6)
+    assert np.allclose(a.final.q, b.final.q, rtol=1e-9, atol=1e-11)
+
+
+def test_leaps_end_where_a_rope_goes_slack(monkeypatch):
+    model, _ = swinging()
+    how = {"inputs": {"lift": 300.0}, "until": 0.2, "method": fc.Exact(H), "every": H}
+    a, b = both(model, monkeypatch, start=fc.equilibrium(model).state, **how)
+    assert [e.name for e in a.events] == [e.name for e in b.events] != []
+    assert [e.t for e in a.events] == pytest.approx([e.t for e in b.events], rel=1e-9)
+    assert np.allclose(a.y, b.y, rtol=1e-8, atol=1e-10)
+
+
+def test_leaps_turn_what_shows_its_rotation(monkeypatch):
+    effects = [fc.Gravity(), fc.Flexible(), fc.GeometricStiffness(), fc.RayleighDamping(0.0, 1e-3)]
+    model = fc.assemble(fc.cranes.flexible_arm(), effects)
+    how = {"inputs": {"shoulder_torque": 0.1, "elbow_torque": -0.05}, "until": 0.3, "method": fc.Exact(H), "every": H}
+    a, b = both(model, monkeypatch, **how)
+    assert np.abs(b["elbow"]).max() > 0.01
+    assert np.allclose(a.y, b.y, rtol=1e-7, atol=1e-9)

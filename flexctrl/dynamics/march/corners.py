@@ -12,7 +12,7 @@ from flexctrl.model.flat.flat import Flat
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.model import Model
 
-__all__ = ["Corners", "corners_of", "passes"]
+__all__ = ["Corners", "corners_of", "passes", "within"]
 
 
 @dataclass

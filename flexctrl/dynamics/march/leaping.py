@@ -1,4 +1,4 @@
-"""Exact steps of linear equations in compiled loops: one product with a matrix a step."""
+"""The tables of exact steps of linear equations, and what outputs are read from."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.dynamics.march.record import DONE, WANTS_TANGENT, Leap, March
+from flexctrl.dynamics.march.pairs import pairs_of
+from flexctrl.dynamics.march.record import Leap
 from flexctrl.dynamics.modal_equations import ModalEquations
 from flexctrl.dynamics.propagator import Propagator
 from flexctrl.dynamics.quadratic import Turnover
-from flexctrl.kernels.eights import Eight, eight, put, total
-from flexctrl.kernels.native import Reals
 from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
-__all__ = ["Tables", "fill", "leap", "leap_of"]
+__all__ = ["Leaps", "Tables"]
 
-_ALIKE = 1e-9
-_NOTHING = 1e-150
-"""Below this a modal state is zero: processors are slow with the smallest numbers there are."""
+_DUST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,67 +48,206 @@ def _over(propagator: Propagator, t: float, h: float) -> np.ndarray:
     return np.hstack([transition.toarray(), powers[0]])
 
 
-def leap_of(F: Flattened, equations: ModalEquations) -> Leap:
-    """Return the leaps of a model, ready for tables."""
-    first, n, padded = equations.first, F.flat.n, F.flat.padded
-    modes, size = len(first.A), sum(first.B.shape)
-    wide = -(-size // 8) * 8
-    both = np.hstack([first.C, first.D])
-    places, rates = np.zeros((2, size, padded))
-    for j in range(size):
-        places[j], rates[j] = F.ordered(both[:n, j]), F.ordered(both[n:, j])
-    return Leap(
-        modes=modes,
-        size=size,
-        wide=wide,
-        transition=np.zeros(size * wide),
-        state=np.zeros(wide),
-        after=np.zeros(wide),
-        places=places.ravel(),
-        rates=rates.ravel(),
-        losses=np.zeros(size * wide),
-    )
+class Leaps:
+    """The leaps of a model, as loops know them.
+
+    Parameters
+    ----------
+    F : Flattened
+    equations : ModalEquations
+
+    Attributes
+    ----------
+    record : Leap
+    """
+
+    def __init__(self, F: Flattened, equations: ModalEquations) -> None:
+        first, n, padded, ways = equations.first, F.model.n, F.flat.padded, _ways(F)
+        self.pairs = pairs_of(first)
+        self.modes, few = 2 * self.pairs.half, first.B.shape[1]
+        self.size = self.modes + few
+        self.wide = -(-self.size // 8) * 8
+        self.places = np.append(self.pairs.where, self.modes + np.arange(few))
+        both = np.hstack([first.C @ self.pairs.basis, first.D])
+        gliding, seen, spun = _seen(F, both, ways)
+        sights = -(-len(seen) // 8) * 8
+        self.record = Leap(
+            modes=self.modes,
+            size=self.size,
+            wide=self.wide,
+            paired=0,
+            parted=0,
+            sights=sights,
+            spins=len(spun),
+            gliding=int(gliding),
+            transition=np.zeros(self.size * self.wide),
+            state=np.zeros(self.wide),
+            before=np.zeros(self.wide),
+            after=np.zeros(self.wide),
+            places=self._columns(both[:n][F.plan.order], padded),
+            rates=self._columns(both[n:][F.plan.order], padded),
+            losses=np.zeros(self.size * self.wide),
+            seen=self._columns(seen, sights),
+            sight=np.zeros(sights),
+            ways=np.array([F.ordered(row) for row in ways]).ravel(),
+            upright=F.model.rest.R[spun].ravel(),
+            spun=NODE_SLOT * spun + 3,
+        )
+
+    @property
+    def modal(self) -> np.ndarray:
+        """The modal state."""
+        return self.pairs.basis @ self.record.state[self.pairs.where]
+
+    @modal.setter
+    def modal(self, state: np.ndarray) -> None:
+        self.record.state[self.pairs.where] = self.pairs.inverse @ state
+
+    def _columns(self, rows: np.ndarray, padded: int) -> np.ndarray:
+        """A matrix on the state, as loops read it: column by column."""
+        found = np.zeros((self.size, padded))
+        found[self.places, : len(rows)] = rows.T
+        return found.ravel()
+
+    def fill(self, tables: Tables) -> tuple[bool, bool]:
+        """Put tables where loops read them; tell whether they go pair by pair: steps, and what is lost."""
+        leap, modes, turned = self.record, self.modes, np.eye(len(self.places))
+        turned[: len(self.pairs.basis), : len(self.pairs.basis)] = self.pairs.basis
+        transition, losses = np.zeros((modes, self.size)), np.zeros((self.size, self.size))
+        transition[np.ix_(self.pairs.where, self.places)] = self.pairs.inverse @ tables.transition @ turned
+        losses[np.ix_(self.places, self.places)] = turned.T @ tables.losses @ turned
+        paired, parted = self.pairs.apart and _apart(transition), self.pairs.apart and _parted(losses[:modes, :modes])
+        put = (_by_columns, _by_pairs)
+        steps = put[paired](transition, self.wide)
+        lost = _lost_by_pairs(losses, modes) if parted else _lost(losses, self.wide)
+        leap.transition[: steps.size], leap.losses[: lost.size] = steps, lost
+        return paired, parted
 
 
-def fill(leap: Leap, tables: Tables) -> None:
-    """Put tables where loops read them."""
-    leap.transition.reshape(leap.size, leap.wide)[:, : leap.modes] = tables.transition.T
-    leap.losses.reshape(leap.size, leap.wide)[:, : leap.size] = tables.losses
+def _by_columns(transition: np.ndarray, wide: int) -> np.ndarray:
+    found = np.zeros((transition.shape[1], wide))
+    found[:, : len(transition)] = transition.T
+    return found.ravel()
 
 
-def leap(m: March) -> int:
-    """Take a step, or ask for its tables."""
-    f = m.flat
-    e = m.leap
-    if abs(m.h - e.h) > _ALIKE * m.h:
-        return WANTS_TANGENT
-    for k in range(e.modes, e.size - 1):
-        e.state[k] = f.u[k - e.modes]
-    e.state[e.size - 1] = 1.0
-    if m.losing == 1:
-        m.lost += lost(m)
-    for i in range(0, e.wide, 8):
-        put(e.after[i:], weighed_sum(e.size, e.wide, e.state, e.transition[i:]))
-    for i in range(e.modes):
-        e.state[i] = e.after[i] if abs(e.after[i]) > _NOTHING else 0.0
-    for i in range(0, f.padded, 8):
-        put(f.step[i:], weighed_sum(e.size, f.padded, e.state, e.places[i:]) - eight(f.q[i:]))
-        put(f.v[i:], weighed_sum(e.size, f.padded, e.state, e.rates[i:]))
-    return DONE
+def _by_pairs(transition: np.ndarray, wide: int) -> np.ndarray:
+    modes = len(transition)
+    one, two = np.arange(modes // 2), np.arange(modes // 2, modes)
+    own = [transition[rows, columns] for rows in (one, two) for columns in (one, two)]
+    return np.concatenate([*own, transition[:, modes:].T.ravel()])
 
 
-def weighed_sum(count: int, stride: int, weights: Reals, rows: Reals) -> Eight:
-    """Return the sum of rows with weights, eight entries of it."""
-    sums = 0.0 * eight(rows)
-    for j in range(count):
-        sums = sums + weights[j] * eight(rows[stride * j :])
-    return sums
+def _lost(losses: np.ndarray, wide: int) -> np.ndarray:
+    """The form of losses by rows, as far as the eight of the diagonal; what is before that stands for both sides."""
+    found = np.zeros((len(losses), wide))
+    found[:, : len(losses)] = losses
+    eight = np.arange(wide) // 8
+    found[eight[: len(losses), None] > eight[None]] *= 2.0
+    found[eight[: len(losses), None] < eight[None]] = 0.0
+    return found.ravel()
 
 
-def lost(m: March) -> float:
-    """Return the energy dissipated over the step that is about to be taken."""
-    e = m.leap
-    sums = 0.0 * eight(e.state)
-    for i in range(0, e.wide, 8):
-        sums = sums + eight(e.state[i:]) * weighed_sum(e.size, e.wide, e.state, e.losses[i:])
-    return total(sums)
+def _lost_by_pairs(losses: np.ndarray, modes: int) -> np.ndarray:
+    one, two = np.arange(modes // 2), np.arange(modes // 2, modes)
+    own = [losses[one, one], 2.0 * losses[one, two], losses[two, two]]
+    return np.concatenate([*own, 2.0 * losses[:modes, modes:].T.ravel(), losses[modes:, modes:].ravel()])
+
+
+def _apart(transition: np.ndarray) -> bool:
+    """Tell whether no pair moves another one."""
+    left = _mixed(transition[:, : len(transition)])
+    return bool(left.max(initial=0.0) <= _DUST * np.abs(transition).max(initial=0.0))
+
+
+def _parted(losses: np.ndarray) -> bool:
+    """Tell whether no pair's motion changes what another one loses."""
+    scale = np.sqrt(np.maximum(np.diag(losses), 0.0))
+    return bool((_mixed(losses) <= _DUST * np.outer(scale, scale)).all())
+
+
+def _mixed(matrix: np.ndarray) -> np.ndarray:
+    """Sizes of the entries between pairs."""
+    found, k = np.abs(matrix), np.arange(len(matrix) // 2)
+    for rows in (k, k + len(k)):
+        found[rows, k] = found[rows, k + len(k)] = 0.0
+    return found
+
+
+def _ways(F: Flattened) -> np.ndarray:
+    """What the inputs' work is done along, on the degrees of freedom, shape (inputs, n)."""
+    model = F.model
+    units = np.eye(len(model.inputs))
+    return np.array([model.loads(model.rest, unit) for unit in units]).reshape(-1, model.n)
+
+
+def _seen(F: Flattened, both: np.ndarray, ways: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+    """Whether outputs and corners can be told from sums, ways, arms and turns; these; and the nodes that turn."""
+    sums, arms, spun = _sums(F, both), _arms(F, both), _spun(F)
+    if sums is None or arms is None:
+        return False, np.zeros((0, both.shape[1])), np.zeros(0, dtype=int)
+    return True, np.vstack([sums, ways @ both[: F.model.n], arms, _turns(F, both, spun)]), spun
+
+
+def _spun(F: Flattened) -> np.ndarray:
+    """The nodes whose rotations are shown."""
+    nodes = np.unique(F.gauges.turns.reshape(-1, 4)[:, 1:3]) // NODE_SLOT
+    return nodes[6 * nodes < F.model.motion.source_base]
+
+
+def _turns(F: Flattened, both: np.ndarray, spun: np.ndarray) -> np.ndarray:
+    """Rotation vectors of nodes, on modal states, inputs and 1."""
+    T = F.model.motion.jacobian(F.model.rest)
+    return np.asarray(T @ both[: F.model.n])[(6 * spun[:, None] + 3 + np.arange(3)).ravel()]
+
+
+def _sums(F: Flattened, both: np.ndarray) -> np.ndarray | None:
+    """The sums that outputs are read from, on modal states, inputs and 1; None where outputs need more than that."""
+    g, motion, n = F.gauges, F.model.motion, F.model.n
+    if g.tense:
+        return None
+    T = motion.jacobian(F.model.rest)
+    on_places, on_rates = (np.asarray(T @ part) for part in (both[:n], both[n:]))
+    found = np.zeros((g.rows, both.shape[1]))
+    winding = dict(zip(g.turns[3::4].tolist(), np.asarray(motion.winding @ both[:n]), strict=True))
+    for i in range(g.rows):
+        if i in winding:
+            found[i] = winding[i]
+            continue
+        for k in range(g.starts[i], g.starts[i + 1]):
+            row = _cell(F, int(g.cells[k]), on_places, on_rates)
+            if row is None:
+                return None
+            found[i] += g.weights[k] * row
+    return found
+
+
+def _arms(F: Flattened, both: np.ndarray) -> np.ndarray | None:
+    """The arms of lines that have corners, likewise; None where other laws of force have some."""
+    kinks, motion, n = F.model.kinks, F.model.motion, F.model.n
+    (ends, lengths), (drives, _), (travels, _) = kinks.lines, kinks.shafts, kinks.rails
+    if len(drives) or len(travels) or kinks.sheaves or (6 * ends >= motion.source_base).any():
+        return None
+    on_places = np.asarray(motion.jacobian(F.model.rest) @ both[:n])
+    found = np.zeros((3 * len(lengths), both.shape[1]))
+    for k, (start, end) in enumerate(ends.reshape(-1, 2).tolist()):
+        found[3 * k : 3 * k + 3] = on_places[6 * end : 6 * end + 3] - on_places[6 * start : 6 * start + 3]
+        found[3 * k : 3 * k + 3, -1] += F.model.rest.x[end] - F.model.rest.x[start]
+    return found
+
+
+def _cell(F: Flattened, cell: int, on_places: np.ndarray, on_rates: np.ndarray) -> np.ndarray | None:
+    """An entry of the workspace on modal states, inputs and 1; None for one that is not linear in them."""
+    motion, base = F.model.motion, F.flat.drive_base
+    if cell >= base:
+        drive, what = divmod(cell - base, DRIVE_SLOT)
+        if drive >= len(motion.drives) or motion.rigid[drive] or what > 1:
+            return None
+        return np.asarray((on_places, on_rates)[what][motion.source_base + drive])
+    node, what = divmod(cell, NODE_SLOT)
+    if 6 * node >= motion.source_base or not (what < 3 or 12 <= what < 18):
+        return None
+    if what >= 12:
+        return np.asarray(on_rates[6 * node + what - 12])
+    row = np.array(on_places[6 * node + what])
+    row[-1] += F.model.rest.x[node, what]
+    return row

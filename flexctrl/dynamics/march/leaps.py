@@ -12,7 +12,7 @@ from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.exact import ExactStepper, ModalPoint
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.march.leaping import Tables, fill, leap_of
+from flexctrl.dynamics.march.leaping import Leaps, Tables
 from flexctrl.dynamics.march.marching import Marcher, Method
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
@@ -35,14 +35,9 @@ class Leaper(Marcher):
     def taking(self, steps: ExactStepper) -> Leaper:
         """Take such steps; return the march."""
         self._steps = steps
-        self.leap = leap_of(self.flattened, steps.equations)
-        self._numbers = self.march.lend("leap", self.leap)
+        self.leaps = Leaps(self.flattened, steps.equations)
+        self._numbers = self.march.lend("leap", self.leaps.record)
         return self
-
-    @property
-    def modal(self) -> np.ndarray:
-        """The modal state."""
-        return self.leap.state[: self.leap.modes]
 
     def _made(self, seeds: tuple[float, float, float], task: int) -> int:
         h, steps = self.march.h, self._steps
@@ -50,7 +45,7 @@ class Leaper(Marcher):
         key = float(f"{h:.9e}"), steps.modes
         if key not in self._tables:
             self._tables[key] = Tables.of(h, steps.propagator, steps.turnover)
-        fill(self.leap, self._tables[key])
+        self._numbers.paired, self._numbers.parted = self.leaps.fill(self._tables[key])
         self._numbers.h = h
         return DONE
 
@@ -105,14 +100,14 @@ class LeapingStepper(MarchingStepper):
         if point is not self._here:
             zero = np.zeros(self.plain.model.n)
             self.marcher.entered(AlphaPoint(point.state, zero, point.supply, zero, zero))
-            self.marcher.modal[:] = point.modal
+            self.marcher.leaps.modal = point.modal
             self._here = point
 
     def leave(self, supply: Supply) -> Any:
         """Return where the march stands."""
         m, marcher, first = self.marcher.march, self.marcher, self.plain.equations.first
         state, w = marcher.flattened.state(m.v, m.t), self.plain.forcing(supply.u)
-        modal, course = marcher.modal.copy(), np.zeros((4, len(w)))
+        modal, course = marcher.leaps.modal, np.zeros((4, len(w)))
         course[0] = w
         rate = first.C[self.plain.model.n :] @ (first.A @ modal + first.B @ w)
         self._here = point = ModalPoint(state, rate, supply, modal, course)  # type: ignore[assignment]

@@ -8,8 +8,8 @@ from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import in_doubt, settled
 from flexctrl.dynamics.march.corners import passes
+from flexctrl.dynamics.march.gliding import back, glide, land, leap
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
-from flexctrl.dynamics.march.leaping import leap
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
     CORNER,
@@ -55,6 +55,14 @@ _MASSLESS = 1e-14
 
 def run(m: March) -> int:
     """Do the task that is set."""
+    status = task(m)
+    if m.leap.aloft == 1:
+        land(m)
+    return status
+
+
+def task(m: March) -> int:
+    """Do it, maybe on modal states alone."""
     if m.task == FIXED:
         return fixed(m)
     if m.task == CONTROLLED:
@@ -148,6 +156,8 @@ def fixed(m: March) -> int:
 
     Inputs that are told to jump do so first.
     """
+    if m.leap.gliding == 1 and m.keeping == 0:
+        return glided(m)
     if m.jumping == 1:
         status = jump(m)
         if status != DONE:
@@ -161,10 +171,25 @@ def fixed(m: March) -> int:
             judge(m)
         place(m.flat)
         if m.watching == 1 and passes(m.corners, m.flat):
+            if m.leap.modes > 0:
+                back(m)
             return CORNER
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
             return CORNER
         accept(m)
+    return DONE
+
+
+def glided(m: March) -> int:
+    """Take exact steps of one length on modal states alone, but where a state is to be kept."""
+    m.jumping = 0
+    while m.done < m.wanted and m.kept < m.shelf:
+        status = glide(m)
+        if status != DONE:
+            return status
+        if m.t >= m.due:
+            land(m)
+            shelve(m)
     return DONE
 
 
@@ -297,7 +322,9 @@ def enter(m: March) -> None:
     m.gained += total(work)
     if m.losing == 1:
         drive(f)
-        if m.leap.modes == 0:
+        if m.leap.modes > 0:
+            m.lost += m.leap.lost
+        else:
             energy(f)
             m.lost += 0.5 * m.h * (m.power + f.books[2])
             m.power = f.books[2]
@@ -312,18 +339,24 @@ def note(m: March) -> None:
         drive(f)
     read(m.gauges, f.z, row[1:])
     if m.keeping == 1 or m.t >= m.due:
-        nodes = 12 * f.nodes
-        angles = nodes + 2 * f.padded + f.drives
-        width = angles + m.gauges.turning + 1
-        state = m.states[width * m.kept :]
-        copy(nodes, f.pose, state)
-        copy(f.padded, f.q, state[nodes:])
-        copy(f.padded, m.v, state[nodes + f.padded :])
-        copy(f.drives, f.driven, state[nodes + 2 * f.padded :])
-        copy(m.gauges.turning, m.gauges.shown, state[angles:])
-        state[width - 1] = m.t
-        m.kept += 1
-        m.due = m.t + m.spacing
+        shelve(m)
+
+
+def shelve(m: March) -> None:
+    """Keep the state."""
+    f = m.flat
+    nodes = 12 * f.nodes
+    angles = nodes + 2 * f.padded + f.drives
+    width = angles + m.gauges.turning + 1
+    state = m.states[width * m.kept :]
+    copy(nodes, f.pose, state)
+    copy(f.padded, f.q, state[nodes:])
+    copy(f.padded, m.v, state[nodes + f.padded :])
+    copy(f.drives, f.driven, state[nodes + 2 * f.padded :])
+    copy(m.gauges.turning, m.gauges.shown, state[angles:])
+    state[width - 1] = m.t
+    m.kept += 1
+    m.due = m.t + m.spacing
 
 
 def copy(n: int, x: Reals, y: Reals) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.corners import Corners
 from flexctrl.dynamics.march.law import Law
-from flexctrl.kernels.native import Reals
+from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.fronts import Fronts
@@ -58,38 +58,72 @@ class Factors:
 class Leap:
     """Exact steps of linear equations.
 
+    Its state: modal states, the first of every pair and then the second, each filled up to a multiple of eight;
+    inputs; 1.
+
     Attributes
     ----------
     modes, size, wide : int
-        Modal states; these, inputs and 1; that filled up to a multiple of eight.
+        Modal states, filling included; these, inputs and 1; that filled up to a multiple of eight.
     transition : Reals
-        Over a step, column by column.
-    state, after : Reals
-        Modal states, inputs, 1; states at the end of the step.
+        Over a step, column by column; of pairs that nothing couples (``paired``) first their own entries: first on
+        first, second on first, first on second, second on second.
+    state, before, after : Reals
+        Where it is; at the start of the last step, and at its end.
     places, rates : Reals
-        What these add to degrees of freedom and their rates, column by column.
+        What the state adds to degrees of freedom and their rates, column by column.
     losses : Reals
-        The energy dissipated over a step as a quadratic form in them.
+        The energy dissipated over a step as a quadratic form in the state; where nothing couples pairs (``parted``)
+        first their own entries, as above but for one mixed, doubled, then columns of inputs and 1, doubled.
+    seen : Reals
+        What the state adds to the sums that outputs are read from, to the ways of the inputs, to the arms of lines that
+        have corners (3 each) and to the turns of nodes whose rotation is shown (3 each), column by column.
+    sight : Reals
+        These sums, ways, arms and turns.
+    upright, spun : Reals, Wholes
+        Rotations of these nodes as drawn, and where they stand in the workspace.
+    ways : Reals
+        What a unit of each degree of freedom adds to the ways of the inputs, input by input.
+    sights, spins, gliding : int
+        Number of sums, ways, arms and turns, filled up to a multiple of eight; of these nodes; whether outputs are all
+        read from them.
+    aloft : int
+        Whether the state is ahead of degrees of freedom and nodes.
     h : float
         Step that the tables are for.
+    lost : float
+        Dissipated over the last step.
     """
 
     modes: int
     size: int
     wide: int
+    paired: int
+    parted: int
+    sights: int
+    spins: int
+    gliding: int
     transition: Reals
     state: Reals
+    before: Reals
     after: Reals
     places: Reals
     rates: Reals
     losses: Reals
+    seen: Reals
+    sight: Reals
+    ways: Reals
+    upright: Reals
+    spun: Wholes
+    aloft: int = 0
     h: float = -1.0
+    lost: float = 0.0
 
 
 def no_leap() -> Leap:
     """Return the leaps of a model that is not linear."""
-    empty = np.zeros(0)
-    return Leap(0, 0, 0, empty, empty, empty, empty, empty, empty)
+    e, none = np.zeros(0), np.zeros(0, dtype=int)
+    return Leap(0, 0, 0, 0, 0, 0, 0, 0, e, e, e, e, e, e, e, e, e, e, e, none)
 
 
 @dataclass

@@ -1,0 +1,261 @@
+"""Exact steps of linear equations in compiled loops, on modal states alone: nodes are placed where they are wanted."""
+
+from __future__ import annotations
+
+import math
+
+from flexctrl.dynamics.march.clock import later
+from flexctrl.dynamics.march.corners import within
+from flexctrl.dynamics.march.record import CORNER, DONE, WANTS_TANGENT, March
+from flexctrl.kernels.eights import eight, larger, put, total
+from flexctrl.kernels.native import Reals
+from flexctrl.model.flat.flat import keep, load, place, pull
+from flexctrl.model.gauges import show
+
+__all__ = ["back", "glide", "land", "leap"]
+
+_ALIKE = 1e-9
+_STRAIGHT = 1e-9
+_NOTHING = 1e-150
+"""Below this a modal state is zero: processors are slow with the smallest numbers there are."""
+
+
+def glide(m: March) -> int:
+    """Take a step and enter it in books and rows, or ask for its tables."""
+    e = m.leap
+    if abs(m.h - e.h) > _ALIKE * m.h:
+        return WANTS_TANGENT
+    g = m.gauges
+    inputs = e.size - 1 - e.modes
+    if e.aloft == 0:
+        for j in range(inputs):
+            e.sight[g.rows + j] = way(m, j)
+        e.aloft = 1
+    work = 0.0
+    for j in range(inputs):
+        work -= m.flat.u[j] * e.sight[g.rows + j]
+    onward(m)
+    product(e.size, e.sights, e.state, e.seen, e.sight)
+    if m.watching == 1 and sees_corner(m):
+        back(m)
+        return CORNER
+    for j in range(inputs):
+        work += m.flat.u[j] * e.sight[g.rows + j]
+    m.gained += work
+    m.lost += e.lost
+    for i in range(g.rows):
+        g.sums[i] = e.sight[i]
+    m.t = later(m.t, m.h)
+    row = m.rows[(1 + g.outputs) * m.done :]
+    row[0] = m.t
+    spin(m)
+    show(g, m.flat.z, row[1:])
+    m.done += 1
+    return DONE
+
+
+def spin(m: March) -> None:
+    """Turn the nodes whose rotations are shown."""
+    e = m.leap
+    first = m.gauges.rows + e.size - 1 - e.modes + 3 * m.corners.lines
+    for k in range(e.spins):
+        about(e.sight[first + 3 * k :], e.upright[9 * k :], m.flat.z[e.spun[k] :])
+
+
+def about(theta: Reals, before: Reals, after: Reals) -> None:
+    """Turn a rotation by a rotation vector (Rodrigues)."""
+    square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
+    half = 0.5 * math.sqrt(square)
+    bent = math.sin(half) / half if half > _STRAIGHT else 1.0
+    once = bent * math.cos(half)
+    twice = 0.5 * bent * bent
+    for j in range(3):
+        x = before[j]
+        y = before[3 + j]
+        z = before[6 + j]
+        along = theta[0] * x + theta[1] * y + theta[2] * z
+        after[j] = x + once * (theta[1] * z - theta[2] * y) + twice * (theta[0] * along - square * x)
+        after[3 + j] = y + once * (theta[2] * x - theta[0] * z) + twice * (theta[1] * along - square * y)
+        after[6 + j] = z + once * (theta[0] * y - theta[1] * x) + twice * (theta[2] * along - square * z)
+
+
+def sees_corner(m: March) -> bool:
+    """Tell whether the step passes a corner of a line's law of force."""
+    c = m.corners
+    arms = m.leap.sight[m.gauges.rows + m.leap.size - 1 - m.leap.modes :]
+    for k in range(c.lines):
+        square = 0.0
+        for j in range(3):
+            square += arms[3 * k + j] * arms[3 * k + j]
+        if not within(c, k, math.sqrt(square) - c.lengths[k]):
+            return True
+    return False
+
+
+def back(m: March) -> None:
+    """Undo a step."""
+    e = m.leap
+    for i in range(0, e.wide, 8):
+        put(e.state[i:], eight(e.before[i:]))
+    e.lost = 0.0
+
+
+def way(m: March, j: int) -> float:
+    """Return the way of an input: what its work is done along."""
+    f = m.flat
+    sums = 0.0 * eight(f.q)
+    for i in range(0, f.padded, 8):
+        sums = sums + eight(f.q[i:]) * eight(m.leap.ways[f.padded * j + i :])
+    return total(sums)
+
+
+def onward(m: March) -> None:
+    """Go to the modal state at the end of the step; enter what is lost."""
+    e = m.leap
+    for k in range(e.modes, e.size - 1):
+        e.state[k] = m.flat.u[k - e.modes]
+    e.state[e.size - 1] = 1.0
+    e.lost = 0.0
+    if m.losing == 1:
+        e.lost = lost_apart(m) if e.parted == 1 else lost(m)
+    for i in range(0, e.wide, 8):
+        put(e.before[i:], eight(e.state[i:]))
+    if e.paired == 1:
+        by_pairs(m)
+    else:
+        product(e.size, e.wide, e.state, e.transition, e.after)
+    for i in range(e.modes):
+        e.state[i] = e.after[i] if abs(e.after[i]) > _NOTHING else 0.0
+
+
+def by_pairs(m: March) -> None:
+    """Go on with each pair by itself."""
+    e = m.leap
+    half = e.modes // 2
+    for i in range(0, half, 8):
+        first = eight(e.state[i:])
+        second = eight(e.state[half + i :])
+        own = eight(e.transition[i:]) * first + eight(e.transition[half + i :]) * second
+        other = eight(e.transition[2 * half + i :]) * first + eight(e.transition[3 * half + i :]) * second
+        for j in range(e.modes, e.size):
+            own = own + e.state[j] * eight(e.transition[4 * half + e.modes * (j - e.modes) + i :])
+            other = other + e.state[j] * eight(e.transition[5 * half + e.modes * (j - e.modes) + i :])
+        put(e.after[i:], own)
+        put(e.after[half + i :], other)
+
+
+def lost_apart(m: March) -> float:
+    """Return the energy dissipated over the step that is about to be taken, where nothing couples pairs."""
+    e = m.leap
+    half = e.modes // 2
+    sums = 0.0 * eight(e.state)
+    for i in range(0, half, 8):
+        first = eight(e.state[i:])
+        second = eight(e.state[half + i :])
+        own = eight(e.losses[i:]) * first + eight(e.losses[half + i :]) * second
+        other = eight(e.losses[2 * half + i :]) * second
+        for j in range(e.modes, e.size):
+            own = own + e.state[j] * eight(e.losses[3 * half + e.modes * (j - e.modes) + i :])
+            other = other + e.state[j] * eight(e.losses[4 * half + e.modes * (j - e.modes) + i :])
+        sums = sums + own * first + other * second
+    few = e.size - e.modes
+    rest = e.losses[3 * half + e.modes * few :]
+    found = total(sums)
+    for j in range(few):
+        for k in range(few):
+            found += e.state[e.modes + j] * rest[few * j + k] * e.state[e.modes + k]
+    return found
+
+
+def lost(m: March) -> float:
+    """Return the energy dissipated over the step that is about to be taken."""
+    e = m.leap
+    sums = 0.0 * eight(e.state)
+    other = sums
+    i = 0
+    while i < e.wide:  # columns of eight, from the rows of the diagonal on: two sums, as they wait for one another
+        a = 0.0 * sums
+        b = a
+        for j in range(i, e.size - 1, 2):
+            a = a + e.state[j] * eight(e.losses[e.wide * j + i :])
+            b = b + e.state[j + 1] * eight(e.losses[e.wide * (j + 1) + i :])
+        if (e.size - i) % 2 == 1:
+            a = a + e.state[e.size - 1] * eight(e.losses[e.wide * (e.size - 1) + i :])
+        sums = sums + eight(e.state[i:]) * a
+        other = other + eight(e.state[i:]) * b
+        i += 8
+    return total(sums + other)
+
+
+def product(count: int, length: int, weights: Reals, rows: Reals, out: Reals) -> None:
+    """Write the sum of rows with weights, 32 entries at a time where there are as many: sums wait for one another."""
+    i = 0
+    while i + 32 <= length:
+        a = 0.0 * eight(weights)
+        b = a
+        c = a
+        d = a
+        for j in range(count):
+            row = rows[length * j + i :]
+            a = a + weights[j] * eight(row)
+            b = b + weights[j] * eight(row[8:])
+            c = c + weights[j] * eight(row[16:])
+            d = d + weights[j] * eight(row[24:])
+        put(out[i:], a)
+        put(out[i + 8 :], b)
+        put(out[i + 16 :], c)
+        put(out[i + 24 :], d)
+        i += 32
+    while i + 16 <= length:
+        a = 0.0 * eight(weights)
+        b = a
+        for j in range(count):
+            row = rows[length * j + i :]
+            a = a + weights[j] * eight(row)
+            b = b + weights[j] * eight(row[8:])
+        put(out[i:], a)
+        put(out[i + 8 :], b)
+        i += 16
+    while i < length:
+        a = 0.0 * eight(weights)
+        for j in range(count):
+            a = a + weights[j] * eight(rows[length * j + i :])
+        put(out[i:], a)
+        i += 8
+
+
+def land(m: March) -> None:
+    """Bring degrees of freedom and nodes to where the modal state is."""
+    f = m.flat
+    e = m.leap
+    unfold(m)
+    place(f)
+    keep(f)
+    for i in range(0, f.padded, 8):
+        put(m.v[i:], eight(f.v[i:]))
+        put(m.reach[i:], larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:]))))
+        put(f.step[i:], 0.0 * eight(f.step[i:]))
+    load(f)
+    pull(f)
+    for i in range(0, f.padded, 8):
+        put(m.pulled[i:], eight(f.force[i:]))
+    e.aloft = 0
+
+
+def unfold(m: March) -> None:
+    """Work out the step and the rates from the modal state."""
+    f = m.flat
+    e = m.leap
+    product(e.size, f.padded, e.state, e.places, f.step)
+    product(e.size, f.padded, e.state, e.rates, f.v)
+    for i in range(0, f.padded, 8):
+        put(f.step[i:], eight(f.step[i:]) - eight(f.q[i:]))
+
+
+def leap(m: March) -> int:
+    """Take a step that is placed and entered as others are, or ask for its tables."""
+    if abs(m.h - m.leap.h) > _ALIKE * m.h:
+        return WANTS_TANGENT
+    onward(m)
+    unfold(m)
+    return DONE
