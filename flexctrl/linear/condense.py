@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.sparse.linalg as sla
 
 from flexctrl.errors import LinearizationError, MechanismError
 from flexctrl.linear.banded import Band, band_of
@@ -18,7 +19,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.pattern import asymmetry, congruent, mirror, symmetric
 from flexctrl.linear.words import motions_in_words
 
-__all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map"]
+__all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map", "static_response"]
 
 
 class Freedom(Enum):
@@ -155,11 +156,11 @@ def scaled(linear: LinearModel) -> Scaled:
     MechanismError
         For a motion with neither mass nor stiffness (nor damping), by coordinate names.
     LinearizationError
-        For a motion without mass on negative stiffness: as its mass vanishes it runs away ever faster; and for one
-        that velocities of others push.
+        For a motion without mass on negative stiffness: as its mass vanishes it runs away ever faster; and for those
+        that push each other by their velocities.
     """
     result = linear._scaled
-    loose, falling, pushed = result.massless.mechanisms, result.massless.falling, result.massless.pushed
+    loose, falling, whirling = result.massless.mechanisms, result.massless.falling, result.massless.whirling
     if loose.shape[1]:
         raise MechanismError(
             f"{loose.shape[1]} motion(s) with neither mass nor stiffness: {_told(loose, linear, result.scales)}. "
@@ -171,10 +172,11 @@ def scaled(linear: LinearModel) -> Scaled:
             f"{_told(falling, linear, result.scales)}. As mass vanishes they run away ever faster, so there is no "
             "model without it: give them mass, take load off, or linearise about a stable equilibrium."
         )
-    if pushed.shape[1]:
+    if whirling.shape[1]:
         raise LinearizationError(
-            f"{pushed.shape[1]} motion(s) without mass and without damping of their own, which velocities of others "
-            f"push: {_told(pushed, linear, result.scales)}. Give them inertia (rhoJ of a section) or damping."
+            f"{whirling.shape[1]} motion(s) without mass that push each other by their velocities (gyroscopic): "
+            f"{_told(whirling, linear, result.scales)}. As mass vanishes they turn about each other ever faster, so "
+            "there is no model without it: give them inertia (rhoJ of a section) or damping."
         )
     return result
 
@@ -182,10 +184,12 @@ def scaled(linear: LinearModel) -> Scaled:
 def condense(linear: LinearModel) -> LinearModel:
     """Eliminate massless, undamped freedoms exactly (the limit of vanishing mass).
 
-    With N the null space common to M and C, the equations Nᵀ(K q − B u) = 0 are algebraic; solved,
-    q = T b + N (Nᵀ K N)⁻¹ Nᵀ B u, where b are the coordinates kept (their names stay). On this set static
-    condensation (Guyan 1965) is exact. Inputs acting on eliminated freedoms become feedthrough D. Massless
-    but damped freedoms stay: M remains singular there.
+    With N the null space common to M and to the damping of N itself, the equations Nᵀ(C q̇ + K q − B u) = 0 are
+    algebraic in N's own coordinates; solved, q = T b + N (Nᵀ K N)⁻¹ Nᵀ (B u − C T ḃ), where b are the coordinates kept
+    (their names stay) and Nᵀ K T = 0. Without gyroscopic coupling static condensation (Guyan 1965) is exact. Velocities
+    that push a freedom of N (`RotatingFrame`) make it follow them, and so add the mass −Tᵀ C N (Nᵀ K N)⁻¹ Nᵀ C T.
+    Inputs acting on eliminated freedoms become feedthrough D. Massless but damped freedoms stay: M remains singular
+    there.
 
     Parameters
     ----------
@@ -201,8 +205,8 @@ def condense(linear: LinearModel) -> LinearModel:
     MechanismError
         For a motion with neither mass nor stiffness, by coordinate names.
     LinearizationError
-        If an output measures the velocity of an eliminated freedom that an input moves directly: the
-        response would contain the derivative of the input.
+        If an output measures the velocity of an eliminated freedom that an input moves directly, or such a freedom
+        pushes others by its velocity: the response would contain the derivative of the input.
     """
     base = scaled(linear)
     static, model = base.massless.static, base.model
@@ -210,13 +214,81 @@ def condense(linear: LinearModel) -> LinearModel:
         return linear
     right, kept = static_map(model.K, static)
     left, _ = static_map(model.K.T, static)
-    direct = static @ solved(static.T @ model.K @ static, static.T @ model.B)
+    direct = static_response(base)
     refuse_improper(model, direct)
     inner = sp.diags(1.0 / base.scales[kept])
     outer = sp.diags(base.scales)
     names = [linear.coordinates[i] for i in kept]
     reduced = linear.projected(outer @ right @ inner, names, left=outer @ left @ inner)
-    return replace(reduced, D=linear.D + model.Cq @ direct.toarray())
+    reduced = replace(reduced, D=linear.D + model.Cq @ direct)
+    if not base.massless.pushed.shape[1]:
+        return reduced
+    _refuse_derivatives(linear, base, left.T @ model.C @ direct)
+    follow = static @ solved(static.T @ model.K @ static, static.T @ model.C @ right)
+    return _with_followers(reduced, base, follow @ inner, inner @ left.T @ model.C @ follow @ inner)
+
+
+def _with_followers(reduced: LinearModel, base: Scaled, follow: sp.spmatrix, share: sp.spmatrix) -> LinearModel:
+    """The model with freedoms that follow the velocities of others, q = T b − F ḃ: a mass, and what outputs see."""
+    gap = _largest(share - share.T)
+    if gap > 1e-9 * _largest(share):
+        raise LinearizationError(
+            "massless freedoms are pushed by velocities of others that they do not push back (a force that is neither "
+            "gyroscopic nor a damper's): give them inertia or damping"
+        )
+    M = sp.csc_matrix(reduced.M - 0.5 * (share + share.T))
+    slid, flung = base.model.Cq @ follow, base.model.Cv @ follow
+    reduced = replace(reduced, M=M, Cv=reduced.Cv - slid)
+    if not np.abs(flung).max(initial=0.0):
+        return reduced
+    try:
+        gain = sla.splu(sp.csc_matrix(M.T)).solve(np.asarray(flung.T)).T
+    except RuntimeError as error:
+        raise LinearizationError(
+            "an output is the velocity of a massless freedom that velocities of others push, and some of these have "
+            "damping but no mass: give them inertia, or measure a position"
+        ) from error
+    return replace(
+        reduced, Cq=reduced.Cq + gain @ reduced.K, Cv=reduced.Cv + gain @ reduced.C, D=reduced.D - gain @ reduced.B
+    )
+
+
+def _refuse_derivatives(linear: LinearModel, base: Scaled, felt: sp.spmatrix) -> None:
+    """Refuse inputs whose derivative acts on other freedoms, through massless ones that push them by their velocity."""
+    pushed, model = base.massless.pushed, base.model
+    size = np.abs(as_dense(felt)).max(axis=0, initial=0.0)
+    bad = np.flatnonzero(size > 1e-11 * _largest(model.C))
+    if bad.size:
+        acted = pushed[:, np.abs(pushed.T @ model.B[:, bad[0]]) > 0.0]
+        raise LinearizationError(
+            f"input {linear.inputs[bad[0]]!r} acts on a motion without mass that pushes others by its velocity "
+            f"(gyroscopic): {_told(acted, linear, base.scales)}. They would feel the derivative of the input: give it "
+            "inertia (rhoJ of a section), or let the input act elsewhere"
+        )
+
+
+def _largest(A: sp.spmatrix) -> float:
+    return float(np.abs(A.data).max(initial=0.0)) if sp.issparse(A) else float(np.abs(A).max(initial=0.0))
+
+
+def static_response(base: Scaled) -> np.ndarray:
+    """Displacement of the condensed freedoms per input.
+
+    Parameters
+    ----------
+    base : Scaled
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, n_inputs)
+        Scaled; exactly zero for an input that acts on none of them.
+    """
+    static, model = base.massless.static, base.model
+    if not static.shape[1]:
+        return np.zeros_like(model.B)
+    acting = static.T @ model.B
+    acting = np.where(np.abs(acting) > 1e-13 * (abs(static).T @ np.abs(model.B)), acting, 0.0)
+    return np.asarray((static @ solved(static.T @ model.K @ static, acting)).toarray())
 
 
 def static_map(K: sp.spmatrix, null: sp.csc_matrix) -> tuple[sp.csc_matrix, np.ndarray]:
@@ -256,8 +328,8 @@ def refuse_improper(model: LinearModel, direct: sp.spmatrix | np.ndarray) -> Non
     """
     dense = as_dense(direct)
     jump = np.abs(model.Cv @ dense)
-    size = np.abs(model.Cv) @ np.abs(dense)
-    bad = np.argwhere(jump > 1e-12 * size.max(initial=0.0))
+    size = max(float((np.abs(model.Cv) @ np.abs(dense)).max(initial=0.0)), _largest(model.Cv) * _largest(model.B))
+    bad = np.argwhere(jump > 1e-12 * size)
     if bad.size:
         y, u = bad[0]
         raise LinearizationError(

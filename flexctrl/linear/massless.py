@@ -24,6 +24,7 @@ MASS_RANK = 1e-12
 STIFFNESS_RANK = 1e-13
 MASS_DUST = 1e-26
 DUST = 1e-14
+PUSH = 1e-11
 DENSE_BLOCK = 300
 SMALL_PIVOT = 1e-8
 
@@ -43,7 +44,9 @@ class Massless:
     falling : scipy.sparse.csc_matrix, shape (n, f)
         Static ones of negative stiffness, as of a buckled column: the less mass, the faster they run away.
     pushed : scipy.sparse.csc_matrix, shape (n, p)
-        Static ones that velocities of others push (gyroscopic): they would need the derivative of the inputs.
+        Static ones that velocities of others push (gyroscopic).
+    whirling : scipy.sparse.csc_matrix, shape (n, w)
+        Those that push each other by their velocities: as mass vanishes they turn ever faster about each other.
     """
 
     static: sp.csc_matrix
@@ -51,6 +54,7 @@ class Massless:
     mechanisms: sp.csc_matrix
     falling: sp.csc_matrix
     pushed: sp.csc_matrix
+    whirling: sp.csc_matrix
 
     @property
     def every(self) -> sp.csc_matrix:
@@ -81,21 +85,23 @@ def massless(M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix, band: Band | 
     """
     if _heavy(M, band):
         none = sp.csc_matrix((M.shape[0], 0))
-        return Massless(none, none, none, none, none)
+        return Massless(*(none,) * 6)
     null, _ = null_split(_without_dust(M), MASS_RANK, semidefinite=True)
     if not null.shape[1]:
-        return Massless(null, null, null, null, null)
+        return Massless(*(null,) * 6)
     own = _restricted(C, null)
-    undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK)
+    undamped, damped = null_split(0.5 * (own + own.T), MASS_RANK, size=_size(C, null).diagonal())
     static, relaxing = null @ undamped, null @ damped
-    push = np.maximum(*(abs(A @ static).max(axis=0).toarray().ravel() for A in (C, C.T)))
-    pushed = static[:, push > 1e-11 * _peak(C)]
+    pushed = static[:, _largest(C @ static, C.T @ static) > PUSH * _peak(C)]
+    among = undamped.T @ (own - own.T) @ undamped
+    whirling = static[:, _largest(among) > PUSH * _peak(C)]
     held = _restricted(K, static)
     free, _ = null_split(held, STIFFNESS_RANK, size=_size(K, static).diagonal())
     if relaxing.shape[1] and static.shape[1] and not free.shape[1]:
         relaxing = relaxing - static @ solved(static.T @ K @ static, static.T @ K @ relaxing)
     down = sp.csc_matrix((held.shape[0], 0)) if free.shape[1] else _downhill(held)
-    return Massless(*(sp.csc_matrix(basis) for basis in (static, relaxing, static @ free, static @ down, pushed)))
+    bases = (static, relaxing, static @ free, static @ down, pushed, whirling)
+    return Massless(*(sp.csc_matrix(basis) for basis in bases))
 
 
 def null_split(
@@ -200,6 +206,13 @@ def _restricted(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
 def _size(A: sp.csc_matrix, N: sp.csc_matrix) -> sp.csc_matrix:
     """The terms of Nᵀ A N without their signs."""
     return sp.csc_matrix(abs(N).T @ abs(A) @ abs(N))
+
+
+def _largest(*matrices: sp.spmatrix) -> np.ndarray:
+    """The largest entry of each column."""
+    if not min(matrices[0].shape):
+        return np.zeros(matrices[0].shape[1])
+    return np.max([abs(A).max(axis=0).toarray().ravel() for A in matrices], axis=0)
 
 
 def _peak(A: sp.spmatrix) -> float:

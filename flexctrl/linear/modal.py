@@ -9,8 +9,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError
-from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled
-from flexctrl.linear.massless import solved
+from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled, static_response
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, ROUND_OFF, Modes, refuse_unsymmetric
 from flexctrl.linear.pattern import aligned, symmetric
@@ -96,12 +95,17 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
             f"a complete modal form of {len(linear.coordinates)} freedoms is too much; give modes(count) or "
             "reduce the model first"
         )
-    if modes is None and linear._scaled.stiffness[1] > ROUND_OFF:
+    if linear._scaled.massless.pushed.shape[1] and modes is not None:
+        raise LinearizationError(
+            "some massless freedoms follow velocities of others, which the modes do not know: take the modes of "
+            "linear.condense(), and its modal form"
+        )
+    if modes is None and (linear._scaled.stiffness[1] > ROUND_OFF or linear._scaled.massless.pushed.shape[1]):
         linear = condense(linear)
     even = _with_even_stiffness(linear)
     base = scaled(even)
     chosen = even._every_mode if modes is None else modes
-    direct = _static_response(base)
+    direct = static_response(base)
     feedthrough, jump = base.model.D + base.model.Cq @ direct, base.model.Cv @ direct
     fit = rayleigh(base.model)
     if fit is not None:
@@ -175,14 +179,6 @@ def _circulatory(linear: LinearModel, shapes: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * shapes.T @ ((linear.K - linear.K.T) @ shapes))
 
 
-def _static_response(base: Scaled) -> np.ndarray:
-    """Displacement of the condensed freedoms per input, shape (n, n_inputs), scaled."""
-    static, model = base.massless.static, base.model
-    if not static.shape[1]:
-        return np.zeros_like(model.B)
-    return np.asarray((static @ solved(static.T @ model.K @ static, static.T @ model.B)).toarray())
-
-
 def _relaxation(base: Scaled, modes: Modes, beta: float) -> Relaxation:
     """First-order part; with β > 0 (Rayleigh) it is uncoupled and every rate is 1/β."""
     model, W = base.model, base.massless.relaxing
@@ -224,5 +220,5 @@ def proper(system: ModalSystem, linear: LinearModel) -> ModalSystem:
     """
     if system.jump.any():
         base = scaled(linear)
-        refuse_improper(base.model, _static_response(base))
+        refuse_improper(base.model, static_response(base))
     return replace(system, jump=np.zeros_like(system.jump))
