@@ -17,7 +17,7 @@ def answer(request: Request) -> Answer:
     scene = load_scene(request.scene)
     store = None if request.out is None else request.out / "cost.jsonl"
     with progress(f"{scene.name}: cost") as tell:
-        study = work_precision(scene, request.tolerance, store=store, progress=tell)
+        study = work_precision(scene, request.tolerance, store=store, workers=request.workers, progress=tell)
     data = _data(study)
     write_json(request.out, "cost.json", data)
     if request.out is not None:
@@ -31,6 +31,7 @@ def _data(study: WorkPrecision) -> dict[str, object]:
     points = [
         {
             "setting": str(p.setting),
+            "order": p.setting.order,
             "error": p.error,
             "time_ratio": p.time_ratio,
             "pareto": id(p) in front,

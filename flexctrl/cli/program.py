@@ -80,7 +80,7 @@ COMMANDS = {
         "flexctrl.cli.cost",
         "error against time for many settings, and the cheapest for the tolerance asked",
         "flexctrl cost examples/ceiling_crane.toml --tolerance 0.01 --out results",
-        ("tolerance",),
+        ("tolerance", "workers"),
     ),
     "ladder": Command(
         "flexctrl.cli.ladder",
@@ -101,6 +101,12 @@ _OPTIONS: dict[str, dict[str, object]] = {
     "tolerance": {"type": float, "default": 0.01, "metavar": "X", "help": "relative change that is borne (0.01)"},
     "input": {"default": "", "metavar": "NAME", "help": "input where the loop is looked at or cut"},
     "output": {"default": "", "metavar": "NAME", "help": "output of the response"},
+    "workers": {
+        "type": int,
+        "default": None,
+        "metavar": "N",
+        "help": "processes that find errors; times are taken in one (all processors with joblib, else 1)",
+    },
 }
 
 
@@ -117,6 +123,7 @@ class Request:
     count : int
     input, output : str
     tolerance : float
+    workers : int or None
     """
 
     scene: str
@@ -125,6 +132,7 @@ class Request:
     input: str = ""
     output: str = ""
     tolerance: float = 0.01
+    workers: int | None = None
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -16,9 +16,33 @@ from flexctrl.study.frequency import margins
 from flexctrl.study.gain_family import gain_family
 from flexctrl.study.omissions import Subject
 
-__all__ = ["Answer", "Change", "answer_of", "change_between", "outputs_apart"]
+__all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
 
 _SLOW = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The outputs of a run and nothing else: little to send to another process.
+
+    Attributes
+    ----------
+    t : numpy.ndarray, shape (m,)
+    outputs : tuple of str
+    y : numpy.ndarray, shape (m, outputs)
+    """
+
+    t: np.ndarray
+    outputs: tuple[str, ...]
+    y: np.ndarray
+
+    @classmethod
+    def of(cls, run: Run) -> Curves:
+        """Take those of a run."""
+        return cls(run.t, run.outputs, run.y)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.y[:, self.outputs.index(name)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,12 +153,12 @@ def change_between(first: Answer, second: Answer) -> Change:
     return Change(outputs, poles, _margins_apart(first.margins, second.margins), pole)
 
 
-def outputs_apart(first: Run, second: Run) -> dict[str, float]:
+def outputs_apart(first: Run | Curves, second: Run | Curves) -> dict[str, float]:
     """Return max |Δy| over the largest |y| of the first run, by output; 1 for one that the second does not have.
 
     Parameters
     ----------
-    first, second : Run
+    first, second : Run or Curves
 
     Returns
     -------
@@ -143,7 +167,7 @@ def outputs_apart(first: Run, second: Run) -> dict[str, float]:
     return {name: _apart(first, second, name) for name in first.outputs}
 
 
-def _apart(first: Run, second: Run, name: str) -> float:
+def _apart(first: Run | Curves, second: Run | Curves, name: str) -> float:
     if name not in second.outputs:
         return 1.0
     gap = np.abs(np.interp(first.t, second.t, second[name]) - first[name]).max()

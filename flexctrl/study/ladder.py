@@ -17,8 +17,8 @@ from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import FlexctrlError, StructureError
 from flexctrl.study.omissions import Subject
 from flexctrl.study.reference import Reference, certified, error_of, finished
-from flexctrl.study.settings import Fidelity, Setting, sweep
-from flexctrl.study.work_precision import calibration
+from flexctrl.study.settings import Fidelity, Setting, spacing_of, sweep
+from flexctrl.study.tryouts import calibration
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,16 +125,9 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     """
     method, tolerance = scene.simulation.method or AdaptiveAlpha(), scene.simulation.tolerance
     found = [(s.fidelity.value, s) for s in sweep(scene, meshes=(1,), methods=[(method, tolerance)])]
-    exact = Exact(_spacing(scene))
+    exact = Exact(spacing_of(scene))
     named = [(n, replace(s, method=exact) if s.fidelity is Fidelity.LINEAR else s) for n, s in found]
     return (*named, ("refined", Setting(Fidelity.FULL, _FINER, *_finer(method, tolerance))))
-
-
-def _spacing(scene: Subject) -> float:
-    """Where the exact motion is looked at: at samples of the controller, else where results are wanted."""
-    plan = scene.simulation
-    sample = scene.law.sample_time if scene.law is not None else 0.0
-    return float(sample or plan.every or plan.until / _STEPS)
 
 
 def _finer(method: Integrator, tolerance: Tolerance) -> tuple[Integrator, Tolerance]:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Run, Status, Tolerance
+from flexctrl.dynamics.steps import Fixed
 from flexctrl.errors import FlexctrlError
-from flexctrl.study.answers import outputs_apart
+from flexctrl.study.answers import Curves, outputs_apart
 from flexctrl.study.omissions import Subject
 from flexctrl.study.settings import Fidelity, Setting
 
@@ -44,6 +45,8 @@ class Reference:
 def finest_of(settings: Sequence[Setting]) -> Setting:
     """Return a setting finer than all of some: the reference's.
 
+    Its steps are fixed if those of most settings are, else controlled.
+
     Parameters
     ----------
     settings : sequence of Setting
@@ -54,9 +57,10 @@ def finest_of(settings: Sequence[Setting]) -> Setting:
     """
     mesh = 2 * max(s.mesh for s in settings)
     steps = [s.method.step for s in settings if isinstance(s.method, GeneralizedAlpha)]
-    if steps:
+    controlled = [s.tolerance for s in settings if not isinstance(s.method.pace, Fixed)]
+    if steps and len(steps) >= len(controlled):
         return Setting(Fidelity.FULL, mesh, GeneralizedAlpha(0.25 * min(steps)), Tolerance())
-    least = min((s.tolerance for s in settings), key=lambda t: t.relative)
+    least = min(controlled or [s.tolerance for s in settings], key=lambda t: t.relative)
     return Setting(Fidelity.FULL, mesh, AdaptiveAlpha(), Tolerance(0.1 * least.relative, 0.1 * least.absolute))
 
 
@@ -151,12 +155,12 @@ def finished(scene: Subject) -> Run:
     return run
 
 
-def error_of(reference: Run, run: Run) -> float:
+def error_of(reference: Run | Curves, run: Run | Curves) -> float:
     """Return the largest error of an output over its largest magnitude in the reference.
 
     Parameters
     ----------
-    reference, run : Run
+    reference, run : Run or Curves
 
     Returns
     -------

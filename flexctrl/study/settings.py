@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.exact import Exact
+from flexctrl.dynamics.extrapolation import Richardson
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.effects.component_modes import ComponentModes
@@ -23,6 +25,9 @@ from flexctrl.study.omissions import Subject
 __all__ = ["Fidelity", "Setting", "sweep"]
 
 _MODES = 1
+_STEPS = 1000
+_ORDERS = (1, 3)
+_LINEAR_ORDERS = (4, 12)
 
 
 def _rigid(effects: Sequence[Effect]) -> list[Effect]:
@@ -33,8 +38,8 @@ def _shafts(effects: Sequence[Effect]) -> list[Effect]:
     return [e for e in effects if not isinstance(e, Deforming) or isinstance(e, ShaftElasticity)]
 
 
-def _modes(effects: Sequence[Effect]) -> list[Effect]:
-    return [ComponentModes(_MODES, e.of) if type(e) is BeamFlexibility else e for e in effects]
+def _modes(effects: Sequence[Effect], count: int = _MODES) -> list[Effect]:
+    return [ComponentModes(count, e.of) if type(e) is BeamFlexibility else e for e in effects]
 
 
 def _linear(effects: Sequence[Effect]) -> list[Effect]:
@@ -97,18 +102,36 @@ class Setting:
     method : Integrator
     tolerance : Tolerance
         For error-controlled methods.
+    modes : int
+        Modes of an element in each plane, where physics are `Fidelity.COMPONENT_MODES`. (A linear machine is reduced
+        by its method, ``Exact(step, modes)``.)
     """
 
     fidelity: Fidelity
     mesh: int
     method: Integrator
     tolerance: Tolerance
+    modes: int = _MODES
+
+    @property
+    def order(self) -> int | None:
+        """To how many modes bending is reduced: of an element, or of the linear machine; None if it is not."""
+        if self.fidelity is Fidelity.COMPONENT_MODES:
+            return self.modes
+        return self.method.modes if isinstance(self.method, Exact) else None
 
     def __str__(self) -> str:
+        order = "" if self.order is None else f" of order {self.order}"
+        return f"{self.fidelity.value}{order}, mesh × {self.mesh}, {self._steps}"
+
+    @property
+    def _steps(self) -> str:
         kind = type(self.method).__name__
+        if isinstance(self.method, Richardson):
+            kind += f"({type(self.method.method).__name__})"
         pace = self.method.pace
         accuracy = f"step {pace.step:.3g} s" if isinstance(pace, Fixed) else f"tolerance {self.tolerance.relative:.0e}"
-        return f"{self.fidelity.value}, mesh × {self.mesh}, {kind}, {accuracy}"
+        return f"{kind}, {accuracy}"
 
     def of(self, scene: Subject) -> Subject:
         """Return a scene computed this way.
@@ -124,7 +147,10 @@ class Setting:
         structure = self.fidelity.structure(scene.structure)
         structure = refine(structure, self.mesh) if self.mesh > 1 else structure
         simulation = replace(scene.simulation, method=self.method, tolerance=self.tolerance)
-        return scene.with_(structure=structure, effects=self.fidelity.effects(scene.effects), simulation=simulation)
+        effects = self.fidelity.effects(scene.effects)
+        if self.fidelity is Fidelity.COMPONENT_MODES:
+            effects = _modes([part for e in scene.effects for part in e.parts()], self.modes)
+        return scene.with_(structure=structure, effects=effects, simulation=simulation)
 
 
 def sweep(
@@ -132,8 +158,9 @@ def sweep(
     fidelities: Sequence[Fidelity] = tuple(Fidelity),
     meshes: Sequence[int] = (1, 2, 4),
     methods: Sequence[tuple[Integrator, Tolerance]] = (),
+    orders: Sequence[int] = (),
 ) -> tuple[Setting, ...]:
-    """Return the settings to try on a scene, each once.
+    """Return the settings to try on a scene, each once: fidelity × mesh × integrator × step or tolerance × order.
 
     Parameters
     ----------
@@ -143,13 +170,17 @@ def sweep(
     meshes : sequence of int
         Factors; a machine whose beams are rigid is tried with the first only.
     methods : sequence of (Integrator, Tolerance)
-        Default: around the scene's own: steps from 8 times as long to half, or tolerances from 1e-2 to 1e-6.
+        Default: around the scene's own: steps from 8 times as long to half, or tolerances from 1e-2 to 1e-5; and
+        some of the other kind. A linear machine is also integrated exactly.
+    orders : sequence of int
+        To how many modes bending is reduced, of each element with component modes or of the linear machine
+        (vibrations beside free motion). Default: 1 and 3 of an element; 4 and 12 of the linear machine, and all.
 
     Returns
     -------
     tuple of Setting
     """
-    chosen = tuple(methods) or around(scene.simulation.method, scene.simulation.tolerance)
+    chosen = tuple(methods) or (*around(scene.simulation.method, scene.simulation.tolerance), *_others(scene))
     found: list[Setting] = []
     parts = (*scene.structure.elements, *scene.structure.drives)
     seen: list[list[Effect]] = []
@@ -162,8 +193,50 @@ def sweep(
         seen.append(acting)
         bends = any(e.bends(p) for e in effects for p in scene.structure.elements if isinstance(p, Beam))
         finer = meshes if bends else meshes[:1]
-        found += [Setting(fidelity, mesh, method, tolerance) for mesh in finer for method, tolerance in chosen]
+        if fidelity is Fidelity.LINEAR:
+            ways = [*chosen, *(() if methods and not orders else _exact(scene, orders))]
+        else:
+            ways = list(chosen)
+        modes = (tuple(orders) or _ORDERS) if fidelity is Fidelity.COMPONENT_MODES else (_MODES,)
+        found += [
+            Setting(fidelity, mesh, method, tolerance, count)
+            for mesh in finer
+            for count in modes
+            for method, tolerance in ways
+        ]
     return tuple(found)
+
+
+def _exact(scene: Subject, orders: Sequence[int]) -> list[tuple[Integrator, Tolerance]]:
+    """The whole linear machine, and reduced to fewer modes than it has."""
+    step, fewer = spacing_of(scene), [n for n in orders or _LINEAR_ORDERS if n < scene.model.n]
+    return [(Exact(step, n), Tolerance()) for n in (*fewer, None)]
+
+
+def spacing_of(scene: Subject) -> float:
+    """Return where the exact motion is looked at: at samples of the controller, else where results are wanted.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    float
+        [s]
+    """
+    plan = scene.simulation
+    sample = scene.law.sample_time if scene.law is not None else 0.0
+    return float(sample or plan.every or plan.until / _STEPS)
+
+
+def _others(scene: Subject) -> tuple[tuple[Integrator, Tolerance], ...]:
+    """Methods of the other kind than the scene's own: controlled steps for fixed ones, fixed for controlled."""
+    method, tolerance = scene.simulation.method, scene.simulation.tolerance
+    if isinstance(method, GeneralizedAlpha):
+        return tuple((AdaptiveAlpha(), Tolerance(r, 1e-3 * r)) for r in (1e-3, 1e-5))
+    step = spacing_of(scene)
+    return tuple((GeneralizedAlpha(f * step), tolerance) for f in (1.0, 0.5))
 
 
 def _acts(effect: Effect, parts: Sequence[Part | Drive]) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,41 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.run import Run
-from flexctrl.errors import FlexctrlError, StructureError
+from flexctrl.errors import StructureError
+from flexctrl.study.answers import Curves
 from flexctrl.study.held_out import load_cases
 from flexctrl.study.omissions import Subject
 from flexctrl.study.reference import Reference, certified, error_of, finished
 from flexctrl.study.settings import Setting, sweep
+from flexctrl.study.store import Point, Store, fingerprint, timed
+from flexctrl.study.tryouts import errors, time_of, workers_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["Point", "WorkPrecision", "work_precision"]
-
-_REPEATS = 2
-
-
-@dataclass(frozen=True)
-class Point:
-    """One setting that was tried.
-
-    Attributes
-    ----------
-    setting : Setting
-    error : float
-        Largest |Δy| of an output over its largest magnitude in the reference; infinite if the run failed.
-    time_ratio : float
-        Processor time of the run over that of a fixed calculation in the same process; infinite if the run failed.
-    steps : int
-    failure : str
-        Why the run ended early; empty if it did not.
-    """
-
-    setting: Setting
-    error: float
-    time_ratio: float
-    steps: int
-    failure: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,13 +97,15 @@ def work_precision(
     *,
     settings: Sequence[Setting] = (),
     store: str | Path | None = None,
+    workers: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> WorkPrecision:
     """Try many settings on a scene: what accuracy costs.
 
     The reference is the full physics on a mesh twice as fine as the finest tried, with steps four times as short as
     the shortest; it is run again on the coarser mesh, with longer steps and with another integrator, and refined
-    until these agree. Times are the shortest of several runs over that of a fixed calculation made in between.
+    until these agree. Errors are found in several processes at once; times afterwards, one setting after the other on
+    a core that does nothing else: the shortest of several runs over that of a fixed calculation made in between.
 
     Parameters
     ----------
@@ -138,6 +116,9 @@ def work_precision(
         Default: `sweep` of the scene.
     store : str or Path, optional
         A file that keeps each point as it is found: a study that was stopped goes on from there.
+    workers : int, optional
+        Processes that find errors; default: one for each processor if joblib is there (``flexctrl[parallel]``), else
+        one.
     progress : callable, optional
         Called with the fraction done.
 
@@ -149,7 +130,7 @@ def work_precision(
     Raises
     ------
     StructureError
-        For a tolerance that is not positive, or a scene without a simulation.
+        For a tolerance that is not positive, a scene without a simulation, or several workers without joblib.
     FlexctrlError
         If the reference cannot be run, or the reference runs do not agree within a third of the tolerance.
     """
@@ -163,7 +144,8 @@ def work_precision(
     simulation = replace(scene.simulation, every=every, rigid_twin=False)
     base = scene.with_(controller=scene.law, simulation=simulation)
     tried = tuple(settings) or sweep(base)
-    return _Study(base, tolerance, tried, _Store(store, base.name), progress or (lambda done: None)).made()
+    kept = Store(store, fingerprint(base))
+    return _Study(base, tolerance, tried, kept, workers_of(workers), progress or (lambda done: None)).made()
 
 
 class _Study:
@@ -174,102 +156,65 @@ class _Study:
         scene: Subject,
         tolerance: float,
         settings: Sequence[Setting],
-        store: _Store,
+        store: Store,
+        workers: int,
         progress: Callable[[float], None],
     ) -> None:
         self.scene, self.tolerance, self.settings, self.store = scene, tolerance, settings, store
-        self.progress = progress
+        self.workers, self.progress = workers, progress
 
     def made(self) -> WorkPrecision:
         reference = certified(self.scene, self.settings, self.tolerance)
-        points: list[Point] = []
+        chosen: Point | None = None
+        held_out: dict[str, tuple[float, ...]] = {}
         complete = True
         try:
-            for i, setting in enumerate(self.settings):
-                self.progress((i + 1.0) / (len(self.settings) + 2.0))
-                points.append(self.store.known(setting) or self._point(setting, reference))
-                self.store.keep(points[-1])
+            self._errors(reference)
+            self._times()
+            chosen, held_out = self._choice(reference)
         except KeyboardInterrupt:
             complete = False
-        chosen, held_out = self._choice(points, reference) if complete else (None, {})
         self.progress(1.0)
-        return WorkPrecision(self.scene.name, self.tolerance, tuple(points), reference, chosen, held_out, complete)
+        return WorkPrecision(self.scene.name, self.tolerance, self._points, reference, chosen, held_out, complete)
 
-    def _point(self, setting: Setting, reference: Reference) -> Point:
-        try:
-            scene = setting.of(self.scene)
-            runs, times = [], []
-            for _ in range(_REPEATS):
-                unit, began = calibration(), time.process_time()
-                runs.append(finished(scene))
-                took = time.process_time() - began
-                times.append(took / min(unit, calibration()))
-        except FlexctrlError as error:
-            return Point(setting, np.inf, np.inf, 0, str(error).splitlines()[0])
-        return Point(setting, error_of(reference.run, runs[0]), min(times), runs[0].report.steps)
+    @property
+    def _points(self) -> tuple[Point, ...]:
+        known = (self.store.known(setting) for setting in self.settings)
+        return tuple(point for point in known if point is not None and timed(point))
 
-    def _choice(
-        self, points: Sequence[Point], reference: Reference
-    ) -> tuple[Point | None, dict[str, tuple[float, ...]]]:
+    def _tick(self, done: int) -> None:
+        """Errors and times of so many settings are found."""
+        self.progress((done + 1.0) / (2.0 * len(self.settings) + 3.0))
+
+    def _errors(self, reference: Reference) -> None:
+        left = [setting for setting in self.settings if self.store.known(setting) is None]
+        done = len(self.settings) - len(left)
+        self._tick(done)
+        for _, point in errors(self.scene, left, Curves.of(reference.run), self.workers):
+            self.store.keep(point)
+            self._tick(done := done + 1)
+
+    def _times(self) -> None:
+        """Of those that ran, on this processor alone."""
+        for i, setting in enumerate(self.settings):
+            point = self.store.known(setting)
+            assert point is not None
+            if not timed(point):
+                self.store.keep(replace(point, time_ratio=time_of(self.scene, setting)))
+            self._tick(len(self.settings) + i + 1)
+
+    def _choice(self, reference: Reference) -> tuple[Point | None, dict[str, tuple[float, ...]]]:
         """The cheapest point that holds here and on cases it was not chosen on."""
-        fit = sorted((p for p in points if p.error <= self.tolerance), key=lambda p: p.time_ratio)
+        fit = sorted((p for p in self._points if p.error <= self.tolerance), key=lambda p: p.time_ratio)
         cases = load_cases(self.scene)
         references: list[Run] = []
         held_out: dict[str, tuple[float, ...]] = {}
         for point in fit:
             references = references or [finished(reference.setting.of(case)) for case in cases]
-            errors = tuple(
+            held = tuple(
                 error_of(r, finished(point.setting.of(case))) for r, case in zip(references, cases, strict=True)
             )
-            held_out[str(point.setting)] = errors
-            if max(errors, default=0.0) <= self.tolerance:
+            held_out[str(point.setting)] = held
+            if max(held, default=0.0) <= self.tolerance:
                 return point, held_out
         return None, held_out
-
-
-def calibration() -> float:
-    """Return the processor time of a fixed calculation [s]: small dense solves, as runs are made of."""
-    A = np.eye(40) + 0.01 * np.arange(1600.0).reshape(40, 40) % 0.7
-    b: np.ndarray = np.ones(40)
-    began = time.process_time()
-    for _ in range(100):
-        b = np.linalg.solve(A, b)
-        b = b / np.abs(b).max()
-    return time.process_time() - began
-
-
-class _Store:
-    """Points on disk, one a line; nothing without a path."""
-
-    def __init__(self, path: str | Path | None, name: str) -> None:
-        self.path = None if path is None else Path(path)
-        self.name = name
-        self.lines: dict[str, dict[str, float | int | str]] = {}
-        if self.path is not None and self.path.is_file():
-            for line in self.path.read_text(encoding="utf-8").splitlines():
-                found = json.loads(line)
-                if found["scene"] == name:
-                    self.lines[found["setting"]] = found
-
-    def known(self, setting: Setting) -> Point | None:
-        found = self.lines.get(repr(setting))
-        if found is None:
-            return None
-        return Point(
-            setting, float(found["error"]), float(found["time_ratio"]), int(found["steps"]), str(found["failure"])
-        )
-
-    def keep(self, point: Point) -> None:
-        key = repr(point.setting)
-        if self.path is None or key in self.lines:
-            return
-        line = {
-            "scene": self.name,
-            "setting": key,
-            "error": point.error,
-            "time_ratio": point.time_ratio,
-            "steps": point.steps,
-            "failure": point.failure,
-        }
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")

@@ -1,0 +1,110 @@
+"""Points of a study on disk, to go on from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from flexctrl.dynamics.checkpoint import machine_of
+from flexctrl.study.omissions import Subject
+from flexctrl.study.settings import Setting
+
+__all__ = ["Point", "Store", "fingerprint"]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting that was tried.
+
+    Attributes
+    ----------
+    setting : Setting
+    error : float
+        Largest |Δy| of an output over its largest magnitude in the reference; infinite if the run failed.
+    time_ratio : float
+        Processor time of the run over that of a fixed calculation in the same process; infinite if the run failed,
+        NaN before it was timed.
+    steps : int
+    failure : str
+        Why the run ended early; empty if it did not.
+    """
+
+    setting: Setting
+    error: float
+    time_ratio: float
+    steps: int
+    failure: str = ""
+
+
+class Store:
+    """Points on disk, one a line, the later line of a setting counts; in memory only without a path.
+
+    Parameters
+    ----------
+    path : str or Path, optional
+    scene : str
+        Which scene the points are of, as `fingerprint` tells it; those of others are passed over.
+    """
+
+    def __init__(self, path: str | Path | None, scene: str) -> None:
+        self.path = None if path is None else Path(path)
+        self.scene = scene
+        self.lines: dict[str, dict[str, float | int | str]] = {}
+        if self.path is not None and self.path.is_file():
+            for line in self.path.read_text(encoding="utf-8").splitlines():
+                self._read(line)
+
+    def _read(self, line: str) -> None:
+        """A line that was cut off while it was written is passed over."""
+        try:
+            found = json.loads(line)
+        except json.JSONDecodeError:
+            return
+        if found.get("scene") == self.scene:
+            self.lines[found["setting"]] = found
+
+    def known(self, setting: Setting) -> Point | None:
+        """Return what is known of a setting: its error, and its time if it was timed."""
+        found = self.lines.get(repr(setting))
+        if found is None:
+            return None
+        numbers = float(found["error"]), float(found["time_ratio"]), int(found["steps"])
+        return Point(setting, *numbers, str(found["failure"]))
+
+    def keep(self, point: Point) -> Point:
+        """Write a point down; return it."""
+        line = {"scene": self.scene, "setting": repr(point.setting)} | {
+            name: getattr(point, name) for name in ("error", "time_ratio", "steps", "failure")
+        }
+        self.lines[repr(point.setting)] = line
+        if self.path is not None:
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(line) + "\n")
+        return point
+
+
+def fingerprint(scene: Subject) -> str:
+    """Return a text that tells a scene from others: its name, and a digest of machine, effects, loads and run.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    str
+        Controllers and loads that are functions have no part in it.
+    """
+    loads = {name: float(load) for name, load in scene.loads.items() if not callable(load)}
+    plan = replace(scene.simulation, method=None)
+    text = repr((machine_of(scene.model), sorted(loads.items()), plan))
+    return f"{scene.name} {hashlib.sha256(text.encode()).hexdigest()[:12]}"
+
+
+def timed(point: Point) -> bool:
+    """Tell whether a point is complete."""
+    return not np.isnan(point.time_ratio)
