@@ -6,7 +6,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-__all__ = ["Eight", "eight", "larger", "largest", "put", "total"]
+__all__ = ["Eight", "eight", "larger", "largest", "lost", "put", "rounded", "total"]
+
+SPLIT = 2.0**27 + 1.0
 
 Eight: TypeAlias = np.ndarray
 
@@ -16,7 +18,7 @@ def eight(x: np.ndarray) -> Eight:
     return np.array(x[:8])
 
 
-def put(x: np.ndarray, value: Eight) -> None:
+def put(x: np.ndarray, value: Eight | float) -> None:
     """Write the first eight entries of a vector."""
     x[:8] = value
 
@@ -34,3 +36,19 @@ def largest(a: Eight) -> float:
 def total(a: Eight) -> float:
     """Return the sum of the entries."""
     return float(np.sum(a))
+
+
+def rounded(a: Eight | float, b: Eight) -> Eight:
+    """Return a · b rounded to a double, whatever it is added to afterwards."""
+    return a * b
+
+
+def lost(a: Eight | float, b: Eight) -> Eight:
+    """Return what `rounded` has lost, exactly (T. J. Dekker, Numer. Math. 18 (1971) 224–242)."""
+    (a_high, a_low), (b_high, b_low) = _halves(a), _halves(b)
+    return ((a_high * b_high - a * b) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def _halves(a: Eight | float) -> tuple[Eight | float, Eight | float]:
+    high = SPLIT * a - (SPLIT * a - a)
+    return high, a - high

@@ -55,18 +55,14 @@ class Packed:
     """
 
     def __init__(self, record: Any) -> None:
-        known = record_fields(type(record))  # type: ignore[arg-type]
-        words = np.zeros(len(known), dtype=_WHOLE)
-        own: dict[str, Any] = {"_record": record, "_words": words, "_reals": words.view(FLOAT), "_kept": []}
-        own["_places"] = {name: (i, kind) for i, (name, kind) in enumerate(known.items()) if kind in SCALARS}
-        own["_lent"] = {}
-        self.__dict__.update(own)
-        for i, (name, kind) in enumerate(known.items()):
-            if kind in SCALARS:
-                setattr(self, name, getattr(record, name))
-            else:
-                words[i] = self._address(name, kind, getattr(record, name))
-
+        places, others = _layout(type(record))  # type: ignore[arg-type]
+        words = np.zeros(len(places) + len(others), dtype=_WHOLE)
+        reals = words.view(FLOAT)
+        self.__dict__.update(_record=record, _words=words, _reals=reals, _kept=[], _lent={}, _places=places)
+        for name, (i, kind) in places.items():
+            (reals if kind == "float" else words)[i] = getattr(record, name)
+        for name, (i, kind) in others.items():
+            words[i] = self._address(name, kind, getattr(record, name))
         self.__dict__["_first"] = words.copy()
 
     def reset(self) -> None:
@@ -78,21 +74,21 @@ class Packed:
         """Put another record in the place of one until the numbers are set back; return it as machine code sees it."""
         known = record_fields(type(self._record))  # type: ignore[arg-type]
         inner = self._lent[name] = Packed(record)
-        self._words[list(known).index(name)] = inner._words.ctypes.data
+        self._words[list(known).index(name)] = _start(inner._words)
         return inner
 
     def _address(self, name: str, kind: Any, value: Any) -> int:
         if isinstance(kind, type):
             inner = value if isinstance(value, Packed) else Packed(value)
             self._kept.append(inner)
-            return int(inner._words.ctypes.data)
+            return _start(inner._words)
         if kind == RUNS:
             value = np.array([word for run in value for word in (run.address, run.arguments)], dtype=_WHOLE)
         wanted = FLOAT if kind == "Reals" else _WHOLE
         if not (isinstance(value, np.ndarray) and value.dtype == wanted and value.flags.c_contiguous):
             raise KernelError(f"record field {name!r} is no contiguous vector of {wanted}")
         self._kept.append(value)
-        return int(value.__array_interface__["data"][0])  # quicker than value.ctypes
+        return _start(value)
 
     def __getattr__(self, name: str) -> Any:
         if name not in self._places:
@@ -111,9 +107,21 @@ class Packed:
 
     def bound(self, function: Callable[[Any], int]) -> Callable[[], int]:
         """Return a function of such records, compiled, on this one, which it keeps alive."""
-        bound = _Bound(compiled(function), ctypes.c_void_p(self._words.ctypes.data))
+        bound = _Bound(compiled(function), ctypes.c_void_p(_start(self._words)))
         bound.owner = self
         return bound
+
+
+def _start(a: np.ndarray) -> int:
+    return int(a.__array_interface__["data"][0])  # quicker than a.ctypes
+
+
+@cache
+def _layout(record: type) -> tuple[dict[str, tuple[int, Any]], dict[str, tuple[int, Any]]]:
+    """Places and types of the numbers of a record, and those of all else."""
+    known = {name: (i, kind) for i, (name, kind) in enumerate(record_fields(record).items())}
+    numbers = {name: place for name, place in known.items() if place[1] in SCALARS}
+    return numbers, {name: place for name, place in known.items() if name not in numbers}
 
 
 class _Bound(partial):

@@ -26,7 +26,7 @@ from flexctrl.kernels.native_types import (
 
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _ORDER = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
-_EIGHTS = {getattr(eights, name): name for name in ("eight", "put", "larger", "largest", "total")}
+_EIGHTS = {getattr(eights, n): n for n in ("eight", "put", "larger", "largest", "total", "rounded", "lost")}
 _BUILT_IN = ("float", "int", "abs", "min", "max")
 
 
@@ -239,6 +239,13 @@ class Expressions:
         if name == "put":
             self._put(f"store {EIGHT} {self._cast(arguments[1], 'Eight').text}, ptr {a}, align 8")
             return Value(None, "")
+        if name in ("rounded", "lost"):
+            one, other = (self._cast(value, "Eight").text for value in arguments)
+            product = self._value("Eight", f"fmul {EIGHT} {one}, {other}")  # without "contract"
+            if name == "rounded":
+                return product
+            less = self._value("Eight", f"fneg {EIGHT} {product.text}").text
+            return self._value("Eight", f"call {EIGHT} @llvm.fma.v8f64({EIGHT} {one}, {EIGHT} {other}, {EIGHT} {less})")
         if name == "larger":
             return self._value("Eight", f"call {EIGHT} @llvm.maxnum.v8f64({EIGHT} {a}, {EIGHT} {arguments[1].text})")
         if name == "largest":

@@ -64,6 +64,7 @@ DECLARATIONS = (
     *(f"declare double @llvm.{n}.f64({'double, double' if n == 'copysign' else 'double'})" for n in INTRINSICS),
     f"declare {EIGHT} @llvm.fabs.v8f64({EIGHT})",
     f"declare {EIGHT} @llvm.maxnum.v8f64({EIGHT}, {EIGHT})",
+    f"declare {EIGHT} @llvm.fma.v8f64({EIGHT}, {EIGHT}, {EIGHT})",
     f"declare double @llvm.vector.reduce.fmax.v8f64({EIGHT})",
     f"declare double @llvm.vector.reduce.fadd.v8f64(double, {EIGHT})",
 )

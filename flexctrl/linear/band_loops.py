@@ -12,7 +12,18 @@ from dataclasses import dataclass
 from flexctrl.kernels.eights import eight, put, total
 from flexctrl.kernels.native import Reals, Wholes
 
-__all__ = ["Factorising", "LanczosRun", "Solving", "Tiles", "factorise", "lanczos", "ready", "solve"]
+__all__ = [
+    "Factorising",
+    "LanczosRun",
+    "Product",
+    "Solving",
+    "Tiles",
+    "complete",
+    "factorise",
+    "lanczos",
+    "ready",
+    "solve",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +87,21 @@ class Solving:
     factor: Factorising
     count: int
     x: Reals
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """A symmetric matrix as it is multiplied.
+
+    Attributes
+    ----------
+    tiles : Tiles
+    lower : numpy.ndarray
+        Its lower triangle.
+    """
+
+    tiles: Tiles
+    lower: Reals
 
 
 @dataclass(eq=False)
@@ -148,6 +174,16 @@ def ready(f: Factorising) -> int:
             for j in range(8):
                 f.turned[64 * p + 8 * i + j] = own[8 * j + i]
         put(f.pivots[8 * p :], 1.0 / eight(f.pivots[8 * p :]))
+    return 0
+
+
+def complete(m: Product) -> int:
+    """Make the tiles on the diagonal whole."""
+    for p in range(m.tiles.panels):
+        own = m.lower[64 * m.tiles.first[p] :]
+        for k in range(8):
+            for i in range(k + 1, 8):
+                own[8 * i + k] = own[8 * k + i]
     return 0
 
 

@@ -53,36 +53,46 @@ class Band:
     Attributes
     ----------
     order : numpy.ndarray of int, shape (n,)
-    reach : numpy.ndarray of int, shape (n,)
-        Last row of each column of the ordered matrix, its diagonal at least.
-    chosen : numpy.ndarray of int
-        Which entries lie on or under the diagonal of the ordered matrix.
-    rows, columns : numpy.ndarray of int
-        Where these stand in it.
+    starts, indices : numpy.ndarray of int, shapes (n + 1,) and (entries,)
+        The pattern: where its columns start, and the rows of their entries.
     """
 
     order: np.ndarray
-    reach: np.ndarray
-    chosen: np.ndarray
-    rows: np.ndarray
-    columns: np.ndarray
+    starts: np.ndarray
+    indices: np.ndarray
 
     @cached_property
     def back(self) -> np.ndarray:
         """Place of each freedom in the order."""
-        back = np.empty_like(self.order)
+        back = np.empty(self.order.size, dtype=np.int64)
         back[self.order] = np.arange(self.order.size)
         return back
 
     @cached_property
-    def _width(self) -> int:
-        """Half bandwidth."""
-        return _width(self.reach)
+    def reach(self) -> np.ndarray:
+        """Last row of each column of the ordered matrix, its diagonal at least. Shape (n,)."""
+        rows, filled = self.back.take(self.indices), np.flatnonzero(np.diff(self.starts))
+        reach = np.arange(self.order.size)
+        last = self.back[filled]
+        reach[last] = np.maximum(last, np.maximum.reduceat(rows, self.starts[filled])) if filled.size else last
+        return reach
 
     @cached_property
-    def _places(self) -> np.ndarray:
-        """Where the lower entries stand in LAPACK's band storage, column by column."""
-        return self.columns * self._width + self.rows
+    def _under(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Which entries lie on or under the diagonal of the ordered matrix, their rows and their columns."""
+        rows, columns = self.back.take(self.indices), np.repeat(self.back, np.diff(self.starts))
+        chosen = np.flatnonzero(rows >= columns)
+        return chosen, rows.take(chosen), columns.take(chosen)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether factors in it are worth while."""
+        return self._width <= WIDEST
+
+    @cached_property
+    def _width(self) -> int:
+        """Half bandwidth."""
+        return int((self.reach - np.arange(self.reach.size)).max(initial=0))
 
     def factorise(self, data: np.ndarray) -> Factor | None:
         """Cholesky factor of the matrix with these entries, or None if it is not positive definite.
@@ -143,7 +153,8 @@ class Band:
         """Lower band column by column, shape (n, width + 1)."""
         n = self.order.size
         storage = np.zeros(n * (self._width + 1))
-        storage[self._places] = data.take(self.chosen)
+        chosen, rows, columns = self._under
+        storage[columns * self._width + rows] = data.take(chosen)
         return storage.reshape(n, -1)
 
 
@@ -194,23 +205,8 @@ def band_of(A: sp.csc_matrix) -> Band | None:
     -------
     Band or None
     """
-    n = A.shape[0]
-    order = reverse_cuthill_mckee(sp.csr_matrix((A.data, A.indices, A.indptr), A.shape), symmetric_mode=True)
-    back = np.empty_like(order)
-    back[order] = np.arange(n)
-    rows, filled = back.take(A.indices), np.flatnonzero(np.diff(A.indptr))
-    reach = np.arange(n)
-    last = back[filled]
-    reach[last] = np.maximum(last, np.maximum.reduceat(rows, A.indptr[filled])) if filled.size else last
-    if _width(reach) > WIDEST:
-        return None
-    columns = np.repeat(back, np.diff(A.indptr))
-    chosen = np.flatnonzero(rows >= columns)
-    return _kind()(order, reach, chosen, rows.take(chosen), columns.take(chosen))
-
-
-def _width(reach: np.ndarray) -> int:
-    return int((reach - np.arange(reach.size)).max(initial=0))
+    band = _kind()(reverse_cuthill_mckee(A, symmetric_mode=True), A.indptr, A.indices)
+    return band if band.narrow else None
 
 
 def _kind() -> type[Band]:

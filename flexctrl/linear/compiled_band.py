@@ -10,9 +10,21 @@ from typing import Any
 import numpy as np
 
 from flexctrl.kernels.native import Packed
-from flexctrl.linear.band_loops import Factorising, LanczosRun, Solving, Tiles, factorise, lanczos, ready, solve
+from flexctrl.linear.band_loops import (
+    Factorising,
+    LanczosRun,
+    Product,
+    Solving,
+    Tiles,
+    complete,
+    factorise,
+    lanczos,
+    ready,
+    solve,
+)
 from flexctrl.linear.banded import Band, Factor
 from flexctrl.linear.krylov import NOTHING, Grown
+from flexctrl.linear.pattern_loops import Arranging, Filling, arrange, fill
 
 __all__ = ["CompiledBand", "Recurrence"]
 
@@ -22,12 +34,23 @@ class CompiledBand(Band):
     """A band in tiles of eight rows and columns; see `band_loops`."""
 
     @cached_property
+    def _arranged(self) -> Arranging:
+        n, (starts, rows) = self.order.size, (a.astype(np.int64) for a in (self.starts, self.indices))
+        found = (np.empty(size, dtype=np.int64) for size in (n, -(-n // 8), -(-n // 8), rows.size))
+        arranging = Arranging(n, -(-n // 8), starts, rows, self.back, *found)
+        Packed(arranging).bound(arrange)()
+        return arranging
+
+    @cached_property
+    def reach(self) -> np.ndarray:
+        """See `Band`."""
+        return self._arranged.reach
+
+    @cached_property
     def tiles(self) -> Any:
         """The tiles between the diagonal and where a panel, or one before it, reaches: `Tiles`, packed."""
-        panels = -(-self.order.size // 8)
-        ends = np.maximum.reduceat(self.reach, np.arange(0, self.order.size, 8)) // 8
-        below = np.maximum.accumulate(ends) - np.arange(panels)
-        return Packed(Tiles(panels, np.cumsum(below + 1) - below - 1, below))
+        a = self._arranged
+        return Packed(Tiles(a.panels, a.first, a.below))
 
     @cached_property
     def room(self) -> int:
@@ -35,45 +58,44 @@ class CompiledBand(Band):
         return int(64 * (self.tiles.first[-1] + 1))
 
     @cached_property
-    def _tiled(self) -> np.ndarray:
-        """Where the lower entries stand."""
-        panel = self.columns >> 3
-        tile = self.tiles.first.take(panel) + (self.rows >> 3) - panel
-        return (tile << 6) + ((self.columns & 7) << 3) + (self.rows & 7)
+    def _tallest(self) -> int:
+        """Tiles in the panel that has most."""
+        return int(self.tiles.below.max()) + 1
+
+    @cached_property
+    def _own(self) -> np.ndarray:
+        """Where the diagonal stands."""
+        return ((self.tiles.first << 6)[:, None] + 9 * np.arange(8)).ravel()
 
     def lower(self, data: np.ndarray) -> np.ndarray:
         """Tiles of the lower triangle of the matrix with these entries in the order of the pattern."""
-        tiles = np.zeros(self.room)
-        tiles[self._tiled] = data.take(self.chosen)
-        return tiles
+        where, lower = self._arranged.where, np.empty(self.room + 1)
+        Packed(Filling(where.size, lower.size, where, data, lower)).bound(fill)()
+        return lower[: self.room]
 
     def whole(self, data: np.ndarray) -> np.ndarray:
         """As `lower`, with whole tiles on the diagonal."""
-        tiles = self.lower(data)
-        near = np.flatnonzero(self.rows >> 3 == self.columns >> 3)
-        across = (self._tiled[near] & ~63) + ((self.rows[near] & 7) << 3) + (self.columns[near] & 7)
-        tiles[across] = data[self.chosen[near]]
-        return tiles
+        lower = self.lower(data)
+        Packed(Product(self.tiles, lower)).bound(complete)()
+        return lower
 
     def padded(self, x: np.ndarray) -> np.ndarray:
         """Columns of x, shape (n, k), as rows in the band's order and filled up to whole panels."""
         rows = np.zeros((x.shape[1], 8 * self.tiles.panels))
-        rows[:, : len(x)] = x.take(self.order, axis=0).T
+        rows[:, : len(x)] = x.take(self.order, axis=0, mode="clip").T
         return rows
 
     def unpadded(self, rows: np.ndarray) -> np.ndarray:
         """What `padded` was given."""
-        return np.ascontiguousarray(rows.take(self.back, axis=1).T)
+        return rows.T.copy().take(self.back, axis=0, mode="clip")
 
     def _eliminated(self, data: np.ndarray) -> tuple[Any, int, np.ndarray]:
         """Factors, the number of negative pivots, and the diagonal of the matrix."""
         t, n, lower = self.tiles, self.order.size, self.lower(data)
-        diagonal = lower.reshape(-1, 64)[t.first, ::9].ravel()[:n]
-        lower[self.room - 64 + 9 * np.arange(n % 8 or 8, 8)] = 1.0
+        diagonal = lower.take(self._own)[:n]
+        lower[self.room - 64 + 9 * (n % 8 or 8) :: 9] = 1.0
         pivots, size = np.zeros((2, 8 * t.panels))
-        f = Packed(
-            Factorising(t, lower, np.empty(64 * t.panels), pivots, size, np.empty(64 * (int(t.below.max()) + 1)))
-        )
+        f = Packed(Factorising(t, lower, np.empty(64 * t.panels), pivots, size, np.empty(64 * self._tallest)))
         return f, f.bound(factorise)(), diagonal
 
     def factorise(self, data: np.ndarray) -> Factor | None:

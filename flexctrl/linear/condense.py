@@ -352,8 +352,7 @@ def scaled_any(linear: LinearModel) -> Scaled:
     s = coordinate_scales(linear.M, linear.C, linear.K)
     (M, K), (C,) = congruent(s, linear.M, linear.K), congruent(s, linear.C)
     band = band_of(K) if len(s) > DENSE_BLOCK else None
-    signals = {"B": s[:, None] * linear.B, "Cq": linear.Cq * s, "Cv": linear.Cv * s}
-    return Scaled(replace(linear, M=M, C=C, K=K, parts={}, place=None, **signals), s, massless(M, C, K, band), band)
+    return Scaled(linear._rescaled(s, M, C, K), s, massless(M, C, K, band), band)
 
 
 def _told(basis: sp.csc_matrix, linear: LinearModel, scales: np.ndarray) -> str:

@@ -238,10 +238,14 @@ def _missed(pencil: Pencil, found: _Found, count: int, space: Space) -> int:
 def _settled(pencil: Pencil | DensePencil, found: _Found) -> Eigenpairs:
     """Set λ of the rigid ones to 0, orthonormalise (these first) and sort."""
     first = np.argsort(~found.rigid, kind="stable")
-    phi = _orthonormal(pencil.M, found.phi.take(first, axis=1))
+    phi = _orthonormal(pencil.M, _arranged(found.phi, first))
     lam, rigid, noise = np.where(found.rigid, 0.0, found.lam)[first], found.rigid[first], found.noise[first]
     order = np.argsort(lam, kind="stable")
-    return Eigenpairs(lam[order], phi.take(order, axis=1), rigid[order], noise[order])
+    return Eigenpairs(lam[order], _arranged(phi, order), rigid[order], noise[order])
+
+
+def _arranged(phi: np.ndarray, order: np.ndarray) -> np.ndarray:
+    return phi if (order[1:] > order[:-1]).all() else phi.take(order, axis=1)
 
 
 def _orthonormal(M: np.ndarray | sp.csc_matrix, phi: np.ndarray) -> np.ndarray:

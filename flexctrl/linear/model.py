@@ -123,7 +123,8 @@ class LinearModel:
     def __post_init__(self) -> None:
         for kind in ("coordinates", "inputs", "outputs"):
             names = getattr(self, kind)
-            if twice := sorted(name for name, count in Counter(names).items() if count > 1):
+            if len(set(names)) < len(names):
+                twice = sorted(name for name, count in Counter(names).items() if count > 1)
                 raise LinearizationError(
                     f"{kind} name {', '.join(map(repr, twice))} more than once; give each its own name"
                 )
@@ -207,6 +208,14 @@ class LinearModel:
             parts=projected_parts(self.parts, T),
             place=self.place and replace(self.place, basis=sp.csc_matrix(self.place.basis @ T)),
         )
+
+    def _rescaled(self, scales: np.ndarray, M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> LinearModel:
+        """In scaled coordinates, with matrices that are scaled already; not checked again. No parts and no place."""
+        result = object.__new__(LinearModel)
+        signals = {"B": scales[:, None] * self.B, "Cq": self.Cq * scales, "Cv": self.Cv * scales, "D": self.D}
+        names = {name: getattr(self, name) for name in ("coordinates", "inputs", "outputs", "name", "certificate")}
+        result.__dict__.update(M=M, C=C, K=K, parts={}, place=None, **signals, **names)
+        return result
 
     # -- analysis
 
@@ -383,8 +392,8 @@ class LinearModel:
 def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, int]) -> None:
     if value.shape != shape:
         raise LinearizationError(f"{name} has shape {value.shape}; the names ask for {shape}")
-    data = value.data if sp.issparse(value) else value
-    if np.iscomplexobj(data):
+    data = value if isinstance(value, np.ndarray) else value.data
+    if data.dtype.kind == "c":
         raise LinearizationError(f"{name} is complex; expected real numbers")
     if not np.isfinite(data).all():
         raise LinearizationError(f"{name} holds a value that is not finite; check the parameters it came from")

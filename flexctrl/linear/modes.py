@@ -11,12 +11,12 @@ import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.linear.basis import canonical, clusters
+from flexctrl.linear.columns import energies
 from flexctrl.linear.condense import Scaled, scaled, static_map
 from flexctrl.linear.eigen import EPS, RIGID_NOISE, Eigenpairs, complete_pairs, lowest_pairs
 from flexctrl.linear.massless import STIFFNESS_RANK, null_split
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.linear.parts import energies_by_part
-from flexctrl.linear.pattern import with_entries
 from flexctrl.structure.freedoms import check_whole
 
 if TYPE_CHECKING:
@@ -360,20 +360,16 @@ def _grounded(base: Scaled) -> sp.csc_matrix:
 def _sharpened(K: sp.csc_matrix, M: sp.csc_matrix, pairs: Eigenpairs) -> Eigenpairs:
     """Soft λ, which the rounding of φᵀ K φ blurs, as Rayleigh quotients with that in extended precision.
 
-    The error of the vectors is in them squared (B. N. Parlett, The Symmetric Eigenvalue Problem, 1998, § 4.6).
+    The error of the vectors, which have an M-length of one, is in them squared (B. N. Parlett, The Symmetric
+    Eigenvalue Problem, 1998, § 4.6).
     """
     soft = ~pairs.rigid & (pairs.noise > BLURRED * np.abs(pairs.values))
     if not soft.any():
         return pairs
     phi = pairs.shapes[:, soft]
     values = pairs.values.copy()
-    values[soft] = (_strain(K, phi) / _energy(M, phi)).astype(float)
+    values[soft] = energies(K, phi) / _energy(M, phi)
     return replace(pairs, values=values)
-
-
-def _strain(K: sp.csc_matrix, phi: np.ndarray) -> np.ndarray:
-    """φᵀ K φ, every operation in extended precision."""
-    return _energy(with_entries(K, K.data.astype(np.longdouble)), phi.astype(np.longdouble))
 
 
 def _settled_basis(base: Scaled, pairs: Eigenpairs) -> Eigenpairs:

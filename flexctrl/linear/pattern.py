@@ -7,6 +7,10 @@ import copy
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.kernels.kernel import can_compile
+from flexctrl.kernels.native import Packed
+from flexctrl.linear.pattern_loops import Mirroring, reflect
+
 __all__ = ["aligned", "asymmetry", "congruent", "mirror", "symmetric", "with_entries"]
 
 SMALL = 200
@@ -66,7 +70,7 @@ def congruent(scale: np.ndarray, *matrices: sp.spmatrix) -> tuple[sp.csc_matrix,
     """
     given = aligned(*matrices)
     pattern = given[0]
-    factor = scale[pattern.indices] * np.repeat(scale, np.diff(pattern.indptr))
+    factor = scale.take(pattern.indices, mode="clip") * np.repeat(scale, np.diff(pattern.indptr))
     return tuple(with_entries(pattern, A.data * factor) for A in given)
 
 
@@ -84,8 +88,13 @@ def mirror(A: sp.csc_matrix) -> np.ndarray | None:
     """
     if A.shape[0] <= SMALL:
         return None  # a dense comparison is quicker
-    T = with_entries(A, np.arange(A.nnz)).T.tocsc()
-    return T.data if _same_pattern(A, T) else None
+    if not can_compile():
+        T = with_entries(A, np.arange(A.nnz)).T.tocsc()
+        return T.data if _same_pattern(A, T) else None
+    n, starts, rows = A.shape[0], A.indptr.astype(np.int64), A.indices.astype(np.int64)
+    across = np.empty_like(rows)
+    missing = Packed(Mirroring(n, starts, rows, np.empty(n, dtype=np.int64), across)).bound(reflect)()
+    return None if missing else across
 
 
 def symmetric(A: sp.csc_matrix, across: np.ndarray | None = None) -> tuple[sp.csc_matrix, float]:

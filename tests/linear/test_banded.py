@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from fixtures import structures as s
 
-from flexctrl.linear import banded
+from flexctrl.linear import banded, columns, pattern
 from flexctrl.linear.band_loops import Factorising, factorise
 from flexctrl.linear.banded import Band, band_of
 
@@ -57,6 +59,29 @@ def test_negative_eigenvalues_are_counted_or_not_told(way, seed, growth):
     B = sp.csc_matrix(A - shift * sp.identity(90))
     vectors = np.linalg.eigh(B.toarray())[1][:, : below + 2]
     assert band_of(B).negative(B.data, lambda: vectors, growth) in (below, None)
+
+
+@pytest.mark.parametrize("n", [201, 260])
+def test_entries_across_the_diagonal_are_found_or_missed(way, n, monkeypatch):
+    monkeypatch.setattr(pattern, "can_compile", banded.can_compile)
+    A, _ = shuffled_band(n, 6, n)
+    A.sort_indices()
+    np.testing.assert_array_equal(A.data[pattern.mirror(A)], A.data)
+    odd = sp.csc_matrix(sp.triu(A) + sp.tril(A, -2))
+    odd.sort_indices()
+    assert pattern.mirror(odd) is None
+
+
+def test_quadratic_forms_lose_nothing_to_cancellation(way, monkeypatch):
+    monkeypatch.setattr(columns, "can_compile", banded.can_compile)
+    A = shuffled_band(40, 4, 1)[0]
+    x = np.random.default_rng(2).normal(size=(40, 11)) * 10.0 ** np.linspace(0, 8, 40)[:, None]
+    x[-1] -= (A @ x)[-1] / A[-1, -1]
+    exact = [
+        sum(Fraction(a) * Fraction(v[i]) * Fraction(v[j]) for i, j, a in zip(*sp.find(A), strict=True)) for v in x.T
+    ]
+    size = np.einsum("ij,ij->j", abs(x), abs(A) @ abs(x))
+    assert (np.abs(columns.energies(A, x) - [float(e) for e in exact]) <= 2e-18 * size + 2e-16 * np.abs(exact)).all()
 
 
 def test_rounding_that_grows_is_not_trusted():
