@@ -13,6 +13,8 @@ from flexctrl.kernels.native import Packed, Reals, Wholes
 
 __all__ = ["Columns", "energies", "strain"]
 
+SMALL = 300
+
 
 @dataclass(frozen=True, eq=False)
 class Columns:
@@ -81,7 +83,7 @@ def energies(A: sp.csc_matrix, x: np.ndarray) -> np.ndarray:
     -------
     numpy.ndarray, shape (k,)
     """
-    if not can_compile():
+    if len(x) <= SMALL or not can_compile():
         long = x.astype(np.longdouble)
         return np.einsum("ij,ij->j", long, A.astype(np.longdouble) @ long).astype(float)
     n, k = x.shape
