@@ -30,10 +30,10 @@ from flexctrl.dynamics.march.record import (
     WEIGHED,
     March,
 )
-from flexctrl.dynamics.march.step import blended, refactored, step, to_rate, to_v
+from flexctrl.dynamics.march.step import blended, refactored, sloped, step, to_rate, to_v
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals
-from flexctrl.model.flat.flat import clear, drive, energy, keep, load, place, pull, push, tangent
+from flexctrl.model.flat.flat import clear, drive, energy, keep, load, place, pull, push
 from flexctrl.model.flat.fronts import factor
 from flexctrl.model.gauges import read
 
@@ -81,9 +81,9 @@ def task(m: March) -> int:
 def made_again(m: March) -> int:
     """Make a matrix again in the workspace in which it was made."""
     if m.task == WEIGHED:
-        tangent(m.flat, 0.0, 0.0, 1.0, m.entries)
+        sloped(m, 0.0, 0.0, 1.0)
         return weighed(m)
-    tangent(m.flat, 1.0, to_v(m), to_rate(m), m.entries)
+    sloped(m, 1.0, to_v(m), to_rate(m))
     return refactored(m)
 
 
@@ -412,7 +412,7 @@ def jump(m: March) -> int:
 
 def spent(m: March) -> bool:
     """Tell whether the mass was believed in as long as it may, and making it takes less than looking at it again."""
-    return m.asking == 0 and m.believed >= _TRUSTED
+    return m.asking == 0 and m.probes.groups == 0 and m.believed >= _TRUSTED
 
 
 def small(m: March) -> bool:
@@ -456,7 +456,7 @@ def massed(m: March) -> int:
     if m.asking == 1:
         return WANTS_MASS
     drive(m.flat)
-    tangent(m.flat, 0.0, 0.0, 1.0, m.entries)
+    sloped(m, 0.0, 0.0, 1.0)
     return weighed(m)
 
 

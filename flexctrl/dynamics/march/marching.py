@@ -15,6 +15,7 @@ from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.law import Sampling, no_law
 from flexctrl.dynamics.march.loops import run
+from flexctrl.dynamics.march.probing import probes_of
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
     DONE,
@@ -397,7 +398,7 @@ def _state_width(F: Flattened) -> int:
 def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
-    state = _state_width(F)
+    state, probes = _state_width(F), probes_of(F, method.weight)
     shelf = int(min(_CAPACITY, max(1, _BYTES // (8 * state))))
     return March(
         flat=flat,
@@ -410,6 +411,7 @@ def _march(F: Flattened, method: Method) -> March:
         axes=F.axes,
         tangent=_factors(F),
         mass=_factors(F),
+        probes=probes,
         entries=np.zeros(F.plan.length + 1),
         v=v,
         rate=rate,
@@ -430,8 +432,8 @@ def _march(F: Flattened, method: Method) -> March:
         least=method.least,
         loosest=max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
         share=_SHARE if c.damping else _KEEPING,
-        price=_MADE if flat.tangents else _ASKED,
-        asking=int(not flat.tangents),
+        price=_MADE + probes.groups if flat.tangents or probes.groups else _ASKED,
+        asking=int(not flat.tangents and not probes.groups),
         tolerance=method.least,
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.corners import Corners
 from flexctrl.dynamics.march.law import Law
+from flexctrl.dynamics.march.probing import Probes
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.flat import Flat
@@ -141,6 +142,7 @@ class March:
     fronts : Fronts
     axes : Axes
     tangent, mass : Factors
+    probes : Probes
     entries : Reals
         Fronts of the matrix that is being made.
     alpha_m, alpha_f, beta, gamma : float
@@ -205,6 +207,7 @@ class March:
     axes: Axes
     tangent: Factors
     mass: Factors
+    probes: Probes
     entries: Reals
     v: Reals
     rate: Reals

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.model.flat.flat import drive, place, push, tangent
 from flexctrl.model.flat.fronts import factor
 
-__all__ = ["blended", "refactored", "step", "to_rate", "to_v"]
+__all__ = ["blended", "refactored", "sloped", "step", "to_rate", "to_v"]
 
 _TURNED = 0.03
 _POOR = 0.25
@@ -76,7 +77,7 @@ def newton(m: March) -> int:
                 m.last = math.inf
                 if m.asking == 1:
                     return WANTS_TANGENT
-                tangent(f, 1.0, to_v(m), to_rate(m), m.entries)
+                sloped(m, 1.0, to_v(m), to_rate(m))
                 if refactored(m) != DONE:
                     return SINGULAR
         m.phase = EVALUATE
@@ -93,6 +94,14 @@ def newton(m: March) -> int:
             return DONE
         m.iteration += 1
     return FAILED
+
+
+def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) -> None:
+    """Fill in the slope of the forces for motions that add these times an increment."""
+    if m.probes.groups > 0:
+        probe(m.probes, m.flat, on_place, on_rate, on_acceleration, m.entries)
+    else:
+        tangent(m.flat, on_place, on_rate, on_acceleration, m.entries)
 
 
 def foremost(m: March) -> int:

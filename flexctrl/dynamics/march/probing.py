@@ -1,0 +1,145 @@
+"""Tangents in compiled loops where levers turn them: differences of the forces, many columns at a time.
+
+Where nodes are placed by others (drives, rigid parts, rails), the tangent of pieces is not that of the machine: what
+levers do as they turn comes on top. Here the forces themselves are asked. Columns without a row in common are probed
+together (A. R. Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Maths Applics 13 (1974) 117).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.native import Reals, Wholes
+from flexctrl.model.flat.flat import Flat, clear, drive, place, push
+from flexctrl.model.flat.layout import Flattened
+
+__all__ = ["Probes", "probe", "probes_of"]
+
+_STEP = 1e-7
+"""Of a place, in yardsticks; rates and accelerations that come with it only add to the forces."""
+_PULL = 1e4
+"""Of an acceleration alone, in which forces are linear."""
+
+
+@dataclass
+class Probes:
+    """Which columns are probed together, and where their entries go.
+
+    Attributes
+    ----------
+    groups : int
+        0: tangents are made otherwise.
+    starts, columns : Wholes
+        Where each group begins; the degrees of freedom in it.
+    firsts, rows, cells : Wholes
+        Where the entries of each of these columns begin; their rows, and where they stand in the fronts.
+    size : Reals
+        What an error of 1 is, of each of them.
+    base, step, v, rate, driven : Reals
+        Forces and motion between probes.
+    """
+
+    groups: int
+    starts: Wholes
+    columns: Wholes
+    firsts: Wholes
+    rows: Wholes
+    cells: Wholes
+    size: Reals
+    base: Reals
+    step: Reals
+    v: Reals
+    rate: Reals
+    driven: Reals
+
+
+def probes_of(F: Flattened, weight: np.ndarray) -> Probes:
+    """Return the probes of a model; none if its tangents are those of its pieces."""
+    if F.flat.tangents:
+        none, empty = np.zeros(0, dtype=int), np.zeros(0)
+        return Probes(0, none, none, none, none, none, empty, empty, empty, empty, empty, empty)
+    found = F.model.__dict__.get("_probed")
+    if found is None:
+        found = F.model.__dict__["_probed"] = _grouped(F)
+    groups, starts, columns, firsts, rows, cells = found
+    base, step, v, rate = np.zeros((4, F.flat.padded))
+    size, driven = F.ordered(1.0 / weight), np.zeros(len(F.flat.driven))
+    return Probes(groups, starts, columns, firsts, rows, cells, size, base, step, v, rate, driven)
+
+
+def _grouped(F: Flattened) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Columns in groups that share no row, and the entries of each."""
+    n, order = F.flat.n, F.plan.position
+    damping = F.model.viscous.tocoo()
+    keys = np.concatenate([n * F.pattern[1] + F.pattern[0], n * damping.col + damping.row])
+    own = np.unique(keys)
+    columns, rows = own // n, own % n
+    cells = F.plan.places(rows, columns)
+    bounds = np.searchsorted(columns, np.arange(n + 1))
+    taken: list[np.ndarray] = []
+    groups: list[list[int]] = []
+    for j in np.argsort(-np.diff(bounds), kind="stable").tolist():
+        mine = rows[bounds[j] : bounds[j + 1]]
+        k = next((k for k, used in enumerate(taken) if not used[mine].any()), len(taken))
+        if k == len(taken):
+            taken.append(np.zeros(n, dtype=bool))
+            groups.append([])
+        taken[k][mine] = True
+        groups[k].append(j)
+    chosen = np.array([j for group in groups for j in group], dtype=int)
+    entries = np.concatenate([np.arange(bounds[j], bounds[j + 1]) for j in chosen.tolist()])
+    return (
+        len(groups),
+        np.cumsum([0, *map(len, groups)]),
+        order[chosen],
+        np.cumsum([0, *np.diff(bounds)[chosen].tolist()]),
+        order[rows[entries]],
+        cells[entries],
+    )
+
+
+def probe(p: Probes, f: Flat, on_place: float, on_rate: float, on_acceleration: float, entries: Reals) -> None:
+    """Fill in the slope of the forces for motions that add these times an increment."""
+    clear(f.entries, entries)
+    for i in range(f.drives):
+        p.driven[i] = f.driven[i]
+        f.driven[i] = f.found[i]
+    for i in range(0, f.padded, 8):
+        put(p.step[i:], eight(f.step[i:]))
+        put(p.v[i:], eight(f.v[i:]))
+        put(p.rate[i:], eight(f.rate[i:]))
+    far = _STEP if on_place > 0.0 else _PULL
+    forces(f, on_place)
+    for i in range(0, f.padded, 8):
+        put(p.base[i:], eight(f.force[i:]))
+    for k in range(p.groups):
+        for c in range(p.starts[k], p.starts[k + 1]):
+            j = p.columns[c]
+            way = far * p.size[j]
+            f.step[j] += on_place * way
+            f.v[j] += on_rate * way
+            f.rate[j] += on_acceleration * way
+        forces(f, on_place)
+        for c in range(p.starts[k], p.starts[k + 1]):
+            j = p.columns[c]
+            way = far * p.size[j]
+            for i in range(p.firsts[c], p.firsts[c + 1]):
+                row = p.rows[i]
+                entries[p.cells[i]] = (f.force[row] - p.base[row]) / way
+            f.step[j] = p.step[j]
+            f.v[j] = p.v[j]
+            f.rate[j] = p.rate[j]
+    forces(f, on_place)
+    for i in range(f.drives):
+        f.driven[i] = p.driven[i]
+
+
+def forces(f: Flat, on_place: float) -> None:
+    """Sum up the forces of the motion under way."""
+    if on_place > 0.0:
+        place(f)
+    drive(f)
+    push(f)
