@@ -29,6 +29,7 @@ Told = tuple["ca.SX", "ca.SX"]
 """A command and the state at the next sample."""
 
 _MOST = 4000
+_REMEMBERED = 8
 _NEAREST = 1.5 * 2.0**52
 """What is added to this and taken off again is rounded to whole numbers, halves to even ones, as by `numpy.rint`."""
 
@@ -131,6 +132,7 @@ class Lowered:
     values: np.ndarray
     clocks: tuple[Signal, ...]
     states: int
+    _kept: dict[tuple[int, int, float], np.ndarray] = field(default_factory=dict, repr=False)
 
     def now(self, t: float) -> np.ndarray:
         """Return what depends on time alone at an instant [s]."""
@@ -150,6 +152,26 @@ class Lowered:
         """
         columns = [_along(clock, times) for clock in self.clocks]
         return np.column_stack(columns) if columns else np.zeros((len(times), 0))
+
+    def samples(self, first: int, count: int, period: float) -> np.ndarray:
+        """Return what depends on time alone at some samples; what was asked last is remembered.
+
+        Parameters
+        ----------
+        first, count : int
+        period : float
+            [s]
+
+        Returns
+        -------
+        numpy.ndarray, shape (count, clocks)
+        """
+        key = first, count, period
+        if key not in self._kept:
+            while len(self._kept) >= _REMEMBERED:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = self.table(np.arange(first, first + count) * period)
+        return self._kept[key]
 
 
 _known: WeakKeyDictionary[Any, Lowered | None] = WeakKeyDictionary()

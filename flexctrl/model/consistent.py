@@ -144,7 +144,14 @@ def _worst(gaps: np.ndarray, say: Callable[[int], str]) -> Breach:
 
 
 def _free(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Which nodal freedoms have a number of their own, and which are held, shape (nodes + 1, 6)."""
+    """Which nodal freedoms have a number of their own, and which are held, shape (nodes + 1, 6); kept with it."""
+    found = motion.__dict__.get("_own_and_held")
+    if found is None:
+        found = motion.__dict__["_own_and_held"] = _own_and_held(motion)
+    return found
+
+
+def _own_and_held(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     own = motion.place < motion.n
     held, linkage = ~own, motion.linkage
     closing = (linkage.cells >= linkage.free) & (linkage.cells < linkage.free + len(linkage.loops))

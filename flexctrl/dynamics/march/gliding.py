@@ -168,23 +168,30 @@ def lost_apart(m: March) -> float:
 
 
 def lost(m: March) -> float:
-    """Return the energy dissipated over the step that is about to be taken."""
+    """Return the energy dissipated over the step that is about to be taken.
+
+    Eight columns at a time, from the rows of the diagonal on, in four sums: they wait for one another.
+    """
     e = m.leap
     sums = 0.0 * eight(e.state)
-    other = sums
-    i = 0
-    while i < e.wide:  # columns of eight, from the rows of the diagonal on: two sums, as they wait for one another
+    for i in range(0, e.wide, 8):
         a = 0.0 * sums
         b = a
-        for j in range(i, e.size - 1, 2):
+        c = a
+        d = a
+        j = i
+        while j + 4 <= e.size:
+            row = e.losses[e.wide * j + i :]
+            a = a + e.state[j] * eight(row)
+            b = b + e.state[j + 1] * eight(row[e.wide :])
+            c = c + e.state[j + 2] * eight(row[2 * e.wide :])
+            d = d + e.state[j + 3] * eight(row[3 * e.wide :])
+            j += 4
+        while j < e.size:
             a = a + e.state[j] * eight(e.losses[e.wide * j + i :])
-            b = b + e.state[j + 1] * eight(e.losses[e.wide * (j + 1) + i :])
-        if (e.size - i) % 2 == 1:
-            a = a + e.state[e.size - 1] * eight(e.losses[e.wide * (e.size - 1) + i :])
-        sums = sums + eight(e.state[i:]) * a
-        other = other + eight(e.state[i:]) * b
-        i += 8
-    return total(sums + other)
+            j += 1
+        sums = sums + eight(e.state[i:]) * ((a + b) + (c + d))
+    return total(sums)
 
 
 def product(count: int, length: int, weights: Reals, rows: Reals, out: Reals) -> None:

@@ -149,11 +149,10 @@ class Sampling:
         count = max(1, min(_AHEAD, math.ceil(last / self.law.period) - passed + 1))
         found = self.feed.lowered
         assert found is not None
-        times = np.arange(passed + 1, passed + 1 + count) * self.law.period
         try:
-            rows = found.table(times)
+            rows = found.samples(passed + 1, count, self.law.period)
         except (Exception, KeyboardInterrupt):
-            rows = _until_one_fails(found, times)
+            rows = _until_one_fails(found, np.arange(passed + 1, passed + 1 + count) * self.law.period)
         self.law.table[: rows.size] = rows.ravel()
         return passed, len(rows)
 

@@ -63,6 +63,7 @@ class Leaps:
 
     def __init__(self, F: Flattened, equations: ModalEquations) -> None:
         first, n, padded, ways = equations.first, F.model.n, F.flat.padded, _ways(F)
+        self._filled: tuple[Tables, tuple[bool, bool]] | None = None
         self.pairs = pairs_of(first)
         self.modes, few = 2 * self.pairs.half, first.B.shape[1]
         self.size = self.modes + few
@@ -111,6 +112,11 @@ class Leaps:
 
     def fill(self, tables: Tables) -> tuple[bool, bool]:
         """Put tables where loops read them; tell whether they go pair by pair: steps, and what is lost."""
+        if self._filled is None or self._filled[0] is not tables:
+            self._filled = tables, self._written(tables)
+        return self._filled[1]
+
+    def _written(self, tables: Tables) -> tuple[bool, bool]:
         leap, modes, turned = self.record, self.modes, np.eye(len(self.places))
         turned[: len(self.pairs.basis), : len(self.pairs.basis)] = self.pairs.basis
         transition, losses = np.zeros((modes, self.size)), np.zeros((self.size, self.size))

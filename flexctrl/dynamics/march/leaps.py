@@ -30,12 +30,15 @@ class Leaper(Marcher):
     def __init__(self, model: Model, method: Method) -> None:
         super().__init__(model, method)
         self._tables: dict[tuple[float, int | None], Tables] = {}
+        self._known: dict[int | None, Leaps] = {}
         self._steps: ExactStepper | None = None
 
     def taking(self, steps: ExactStepper) -> Leaper:
         """Take such steps; return the march."""
         self._steps = steps
-        self.leaps = Leaps(self.flattened, steps.equations)
+        if steps.modes not in self._known:
+            self._known[steps.modes] = Leaps(self.flattened, steps.equations)
+        self.leaps = self._known[steps.modes]
         self._numbers = self.march.lend("leap", self.leaps.record)
         return self
 

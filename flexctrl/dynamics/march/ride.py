@@ -31,6 +31,7 @@ __all__ = ["ride"]
 _NEAR = 1e-9
 _SECONDS = 0.1
 _FIRST = 8
+_MORE = 32.0
 _SHARE = 0.2
 
 
@@ -126,7 +127,8 @@ class _Ride:
             sampling.state[:] = self.supply.x
             began = time.perf_counter()
             status = marcher.sampled(pacing and pacing._replace(size=mark.size))
-            wanted = 2 * wanted if time.perf_counter() - began < _SHARE * _SECONDS else max(1, wanted // 2)
+            took = max(time.perf_counter() - began, 1e-9)
+            wanted = max(1, int(wanted * min(_MORE, _SHARE * _SECONDS / took)))
             done = m.done
             self._enter_told(law, sampling, pacing)
             if mark.left:
