@@ -254,7 +254,7 @@ class Stepper:
         c = self.coefficients
         local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self.weight
         allowed = tolerance.of(farthest(self.model, moved))
-        return float(local.max(initial=0.0)) / allowed
+        return float((local / allowed).max(initial=0.0))
 
 
 def _lean(change: np.ndarray, before: np.ndarray) -> float:

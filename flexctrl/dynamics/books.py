@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from flexctrl.dynamics.dense import Booked, Curve
 from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.march.record import OFTEN
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.settling import quasistatic
-from flexctrl.dynamics.steps import Block, Point
+from flexctrl.dynamics.steps import Point
 from flexctrl.model.state import State
 
 __all__ = ["Books", "Sums"]
 
-_OFTEN = 32
 _ABSURD = 0.5
 _VISIBLE = 1e-3
 _ROUND_OFF = 1e-6
@@ -92,7 +91,7 @@ class Books:
                 self._trapezoid(before, after)
         sums.moved = np.maximum(sums.moved, np.abs(after.state.q - self.first))
         sums.entered += 1
-        if sums.entered < _OFTEN or sums.entered % _OFTEN == 0:
+        if sums.entered < OFTEN or sums.entered % OFTEN == 0:
             self.close(after)
 
     def jump(self, before: Point, after: Point) -> None:
@@ -114,31 +113,6 @@ class Books:
         """Note that what is dissipated jumps."""
         if self.dissipates:
             self.sums.power = self.model.energy(point.state)[2]
-
-    def enter_block(self, before: Point, block: Block) -> None:
-        """Enter many steps."""
-        sums = self.sums
-        sums.work += block.work
-        sums.lost += block.lost
-        sums.moved = np.maximum(sums.moved, np.abs(before.state.q - self.first) + block.reach)
-        if self.dissipates:
-            sums.power = self.model.energy(block.last.state)[2]
-        due = sums.entered // _OFTEN < (sums.entered + len(block.times)) // _OFTEN
-        sums.entered += len(block.times)
-        if due or sums.entered < _OFTEN:
-            self.close(block.last)
-
-    def enter_ride(self, steps: int, found: tuple[float, float, np.ndarray, float], last: Point) -> None:
-        """Enter many steps with their work, losses, reach from the run's start, and the power at their end."""
-        sums = self.sums
-        work, lost, sums.moved, power = found
-        sums.work += work
-        sums.lost += lost
-        sums.power = power if self.dissipates else sums.power
-        due = sums.entered // _OFTEN < (sums.entered + steps) // _OFTEN or sums.entered < _OFTEN
-        sums.entered += steps
-        if due:
-            self.close(last)
 
     def _trapezoid(self, before: Point, after: Point) -> None:
         loads = self.model.loads
@@ -178,19 +152,9 @@ class Books:
         s.kinetic, s.stored, _ = self.model.energy(point.state)
         gap = s.kinetic + s.stored - s.start - s.work + s.lost
         s.turnover = max(s.turnover, abs(s.work), s.lost, abs(s.stored + s.kinetic - s.start))
-        self._exchanged(s.kinetic, s.stored)
+        s.turnover = max(s.turnover, s.kinetic, abs(s.kinetic - s.moving), abs(s.stored - (s.start - s.moving)))
         s.gap, s.made = max(s.gap, abs(gap)), gap
         s.closure = max(s.closure, self.model.motion.closure_error(point.state))
-
-    def glance(self, states: Sequence[State]) -> None:
-        """Note what has been turned over in some states on the way."""
-        for state in states:
-            self._exchanged(*self.model.energy(state)[:2])
-
-    def _exchanged(self, kinetic: float, stored: float) -> None:
-        """Note what has gone between kinetic and stored energy since the start."""
-        s = self.sums
-        s.turnover = max(s.turnover, kinetic, abs(kinetic - s.moving), abs(stored - (s.start - s.moving)))
 
     @property
     def overflown(self) -> bool:
@@ -202,7 +166,7 @@ class Books:
     def nonsense(self) -> str:
         """What is wrong with a run whose method makes energy from nothing, a large share of all; empty if none is."""
         s = self.sums
-        if not (self.lawful and s.entered >= _OFTEN and s.made > _ABSURD * s.turnover):
+        if not (self.lawful and s.entered >= OFTEN and s.made > _ABSURD * s.turnover):
             return ""
         if (s.moved < _VISIBLE * self.reach).all() or s.made < _ROUND_OFF * abs(s.start):
             return ""

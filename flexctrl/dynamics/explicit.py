@@ -193,14 +193,12 @@ class _Stepper:
         h, n, c = after.state.t - before.state.t, self.model.n, self.local.count
         K, table = after.slopes, self.table
         high, low = table.E5 @ K, table.E3 @ K
-        scale = np.concatenate([self.weight, h * self.weight])
+        weight = self.weight / tolerance.of(farthest(self.model, moved))
+        scale = np.concatenate([weight, h * weight])
         places = np.concatenate([np.arange(n), np.arange(c, c + n)])
         fifth, third = (float(np.abs(e[places] * scale).max(initial=0.0)) for e in (high, low))
-        worst = int(np.argmax(np.abs(high[:n] * self.weight))) if n else 0
-        self.counts.worst = worst
-        allowed = tolerance.of(farthest(self.model, moved))
-        local = h * fifth * fifth / np.hypot(fifth, 0.1 * third) if fifth > 0.0 else 0.0
-        return local / allowed
+        self.counts.worst = int(np.argmax(np.abs(high[:n] * weight))) if n else 0
+        return h * fifth * fifth / float(np.hypot(fifth, 0.1 * third)) if fifth > 0.0 else 0.0
 
     def curve(self, before: _Point, after: _Point) -> _Curve:
         """Return the motion over a step."""

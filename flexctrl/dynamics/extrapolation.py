@@ -180,7 +180,7 @@ class _Stepper:
         """Return the error that the step added to the finer run, over what is allowed."""
         local = self.weight * np.abs(after.gap - before.gap) * self.yard
         allowed = tolerance.of(farthest(self.model, moved))
-        return float(local.max(initial=0.0)) / allowed
+        return float((local / allowed).max(initial=0.0))
 
     def curve(self, before: _Point, after: _Point) -> Curve:
         """Return the motion over a step."""

@@ -20,7 +20,7 @@ from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
-from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Joining, Marching, Mark, Point, StepError, Stepper
+from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Joining, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
 from flexctrl.model.model import Model
@@ -28,8 +28,6 @@ from flexctrl.model.model import Model
 __all__ = ["SMALLEST", "Journey", "Plan"]
 
 SMALLEST = 1e-12
-_BLOCK = 1000
-_BLOCK_BYTES = 16e6
 _NEAR = 1e-9
 _LANDINGS = 5
 _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
@@ -121,6 +119,7 @@ class Journey:
         except (ControllerError, EventError) as error:
             self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
             self.fault = error.__cause__
+        self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
 
     @property
@@ -149,10 +148,10 @@ class Journey:
                 remedy = "take smaller steps, or AdaptiveAlpha" if fixed else "give a smaller Tolerance"
                 where = f"at t = {self.point.state.t:.6g} s; {remedy}"
                 raise StepError(self.stepper.counts.worst, f"{nonsense} {where}")
-            interruption.check()
             if (now := time.perf_counter()) - self._told > 0.1:
                 self._told = now
                 self._report(now)
+            interruption.check()
 
     def _report(self, now: float) -> None:
         self.plan.tell(self.point.state.t / self.plan.until)
@@ -221,30 +220,9 @@ class Journey:
         if not room:
             self.saved = self.saved or self.snapshot()
             return self._take(until - t, stop)
-        count = min(room, _BLOCK) if mark.left < 0 else min(room, mark.left, _BLOCK)
-        done = self._march(mark.size, count, stop)
-        if not done:
-            self._take(mark.size, stop)
+        self._take(mark.size, stop)
         if mark.left > 0:
-            mark.left -= max(done, 1)
-
-    def _march(self, h: float, count: int, stop: float) -> int:
-        """Take many steps at once, if the stepper can; return how many."""
-        if not isinstance(self.stepper, Marching) or self.plan.feed.continuous or not self.watch.quiet:
-            return 0
-        before = self.point
-        count = max(1, min(count, int(_BLOCK_BYTES / (100.0 * len(before.state.x) + 32.0 * before.state.q.size))))
-        block = self.stepper.march(before, h, count)
-        if self.watch.corner_names and (clear := self.watch.corner_in(before.state, block.states)) < len(block.times):
-            block = self.stepper.march(before, h, clear) if clear else replace(block, times=np.zeros(0))
-        if not len(block.times):
-            return 0
-        self.books.enter_block(before, block)
-        self.point = block.last
-        self.mark.steps += len(block.times)
-        self.track.keep(block.states, before, block.last)
-        self.rows.among(before, block, stop - block.times[-1] <= self._tick)
-        return len(block.times)
+            mark.left -= 1
 
     def _take(self, h: float, stop: float) -> None:
         """A step of fixed length; where it does not converge, in halves."""

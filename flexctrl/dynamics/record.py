@@ -118,8 +118,11 @@ class CsvStream:
             file.write(header)
             return _Stream(file, 1 + len(signals))
         file = path.open("r+", encoding="utf-8")
-        found = file.readline()
-        if found != header or sum(1 for _ in zip(range(after), iter(file.readline, ""), strict=False)) < after:
+        found, ends = file.readline(), ["", ""]
+        for _ in range(after):
+            line = file.readline()
+            ends = [ends[0] or line, line]
+        if found != header or not ends[1]:
             file.close()
             raise StructureError(
                 f"CsvStream: {path} is not what the checkpoint goes on from: expected {after} rows of "
@@ -127,7 +130,7 @@ class CsvStream:
             )
         file.seek(file.tell())
         file.truncate()
-        return _Stream(file, 1 + len(signals))
+        return _Stream(file, 1 + len(signals), [[float(number) for number in line.split(",")] for line in ends])
 
 
 class _Table:
@@ -168,9 +171,9 @@ class _Table:
 class _Stream:
     """Lines of a file; numbers are written so that they read back the same."""
 
-    def __init__(self, file: TextIOBase, width: int) -> None:
+    def __init__(self, file: TextIOBase, width: int, ends: Sequence[list[float]] = ()) -> None:
         self.file, self.width = file, width
-        self.ends: list[list[float]] = []
+        self.ends = list(ends)
 
     def row(self, t: float, y: np.ndarray, u: np.ndarray) -> None:
         values = [float(t), *y.tolist(), *u.tolist()]

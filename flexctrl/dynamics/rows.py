@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.record import Recorder
-from flexctrl.dynamics.steps import Block, Fixed, Pace, Point
+from flexctrl.dynamics.steps import Fixed, Pace, Point
 from flexctrl.model.state import State
 
 __all__ = ["Rows"]
@@ -63,23 +63,19 @@ class Rows:
         if not to_jump:
             self.here(after, near)
 
-    def among(self, before: Point, block: Block, to_jump: bool) -> None:
+    def among(self, start: State, times: np.ndarray, states: list[State], supply: Supply, to_jump: bool) -> None:
         """Write the rows within many steps."""
-        times, states, u, h = block.times, block.states, before.supply.u, block.times[0] - before.state.t
-        kept, near = len(times) - to_jump, _near(times[-1], h)
-        if self.every is None:
-            for i in range(kept):
-                self._write(states[i], u)
-            return
+        kept, near = len(times) - to_jump, _near(times[-1], times[0] - start.t)
+        assert self.every is not None
         while (row := self.count * self.every) <= times[-1] + near:
             i = int(np.searchsorted(times, row - near))
             state = states[i]
             if abs(times[i] - row) > near:
-                start = replace(before, state=states[i - 1]) if i else before
-                state = self.curve(start, replace(block.last, state=state)).at(row)
+                before, after = (Point(end, np.zeros(0), supply) for end in (states[i - 1] if i else start, state))
+                state = self.curve(before, after).at(row)
             elif i >= kept:
                 return
-            self._write(state, u)
+            self._write(state, supply.u)
 
     def on_steps(self, pace: Pace, sample: float, t: float) -> bool:
         """Tell whether rows are due at the ends of steps only, as these are from a time on."""
@@ -96,9 +92,7 @@ class Rows:
         """Write the rows of many steps: times and outputs, and all states or those due for drawing."""
         times, kept = table[:, 0], len(table) - to_jump
         if self.every is not None and len(states) == len(table):
-            before, last = (Point(state, np.zeros(0), supply) for state in (start, states[-1]))
-            self.among(before, Block(times, states, last, 0.0, 0.0, np.zeros(0)), to_jump)
-            return
+            return self.among(start, times, states, supply, to_jump)
         self.frames += states
         chosen = table[:kept]
         if self.every is not None:

@@ -38,8 +38,9 @@ class Tolerance:
     Parameters
     ----------
     relative : float
-        Local error per step over the distance moved so far, that of the freedom that has moved most; it counts as
-        a radian or the size of the machine at most, or what spins or travels would excuse errors of all else.
+        Local error per step over the distance moved so far, that of the freedom that has moved most among those
+        coupled to it; it counts as a radian or the size of the machine at most, or what spins or travels would
+        excuse errors of all else.
     absolute : float
         Local error per step below which nothing is asked [rad, and m over the size of the machine].
 
@@ -56,17 +57,17 @@ class Tolerance:
         check_number(self.relative, "relative", "Tolerance", least=0.0)
         check_number(self.absolute, "absolute", "Tolerance", above=0.0)
 
-    def of(self, moved: float) -> float:
-        """Return the error allowed after a motion.
+    def of(self, moved: np.ndarray) -> np.ndarray:
+        """Return the errors allowed after a motion.
 
         Parameters
         ----------
-        moved : float
-            Largest distance of a freedom so far [rad, and m over the size of the machine].
+        moved : numpy.ndarray, shape (n,)
+            Largest distance of a freedom so far, for each freedom [rad, and m over the size of the machine].
 
         Returns
         -------
-        float
+        numpy.ndarray, shape (n,)
         """
         return self.absolute + self.relative * moved
 

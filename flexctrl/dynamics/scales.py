@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from flexctrl.model.model import Model
 
-__all__ = ["farthest", "turning", "yardsticks"]
+__all__ = ["components", "farthest", "turning", "yardsticks"]
 
 _POINT = 1e-12
 _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
@@ -43,10 +45,34 @@ def _yardsticks(model: Model) -> np.ndarray:
     return np.array([known.get(name, 1.0 if turns else size) for name, turns in pairs])
 
 
-def farthest(model: Model, moved: np.ndarray) -> float:
+def components(model: Model) -> np.ndarray:
+    """Return to which part of a machine each degree of freedom belongs, counted from 0, shape (n,).
+
+    What elements, joints, ropes and drives connect is one part; what stands beside it, uncoupled, is another one.
+    """
+    return once(model, _components)
+
+
+def _components(model: Model) -> np.ndarray:
+    if not isinstance(model, Model):  # coordinates of a linear model may be modes of one machine
+        return np.zeros(model.n, dtype=int)
+    motion, n = model.motion, model.n
+    T, viscous, raw = sp.coo_matrix(motion.jacobian(model.rest)), model.viscous.tocoo(), np.arange(motion.raw)
+    of_node = np.where(raw < motion.source_base, raw - raw % 6, raw)
+    ends = [(T.col, n + T.row), (n + raw, n + of_node), (viscous.row, viscous.col)]
+    for rows in (family.scatter(motion.source_base) for family in model.forces.families):
+        ends.append((n + rows.ravel(), n + np.repeat(rows[:, 0], rows.shape[1])))
+    first, last = (np.concatenate(side) for side in zip(*ends, strict=True))
+    size = n + motion.raw
+    links = sp.coo_matrix((np.ones(first.size), (first, last)), shape=(size, size))
+    return np.unique(connected_components(links, directed=False)[1][:n], return_inverse=True)[1]
+
+
+def farthest(model: Model, moved: np.ndarray) -> np.ndarray:
     """Return how far the freedom has moved that has moved most: what relative tolerances are relative to.
 
-    A radian, or the size of the machine, at most: or what spins or travels would excuse errors of all else.
+    In each part of a machine that is not coupled to others, that of the part; and a radian, or the size of the
+    machine, at most: or what spins or travels would excuse errors of all else.
 
     Parameters
     ----------
@@ -56,12 +82,14 @@ def farthest(model: Model, moved: np.ndarray) -> float:
 
     Returns
     -------
-    float
+    numpy.ndarray, shape (n,)
         In yardsticks.
     """
-    way = moved * (1.0 / yardsticks(model))
+    way, part = moved * (1.0 / yardsticks(model)), components(model)
+    most = np.zeros(part.max(initial=0) + 1)
     # no more than 1; the compiled loops work it out in the same order, to the bit
-    return float((way + 1.0 - np.maximum(way, 1.0)).max(initial=0.0))
+    np.maximum.at(most, part, way + 1.0 - np.maximum(way, 1.0))
+    return most[part]
 
 
 def once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:

@@ -231,7 +231,8 @@ def _resumed(
 
 def _result(journey: Journey) -> Run:
     plan, state, supply = journey.plan, journey.point.state, journey.point.supply
-    checkpoint = journey.saved or journey.snapshot()
+    checkpoint = journey.saved
+    assert checkpoint is not None
     if abs(state.t - plan.until) <= 1e-9 * plan.until:
         state = state.with_(t=plan.until)
     rows = journey.rows.finish(state, supply.u)

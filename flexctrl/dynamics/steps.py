@@ -7,7 +7,6 @@ stopping at samples, breaks and events is the run's business, the same for all m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -20,13 +19,11 @@ from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
 
 __all__ = [
-    "Block",
     "Controlled",
     "Counts",
     "Fixed",
     "Integrator",
     "Joining",
-    "Marching",
     "Mark",
     "Pace",
     "Point",
@@ -160,40 +157,6 @@ class Stepper(Protocol[P]):
 
     def error(self, before: P, after: P, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error of the step just taken over what is allowed; ``moved`` is the reach so far (n,)."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """Many steps taken at once.
-
-    Attributes
-    ----------
-    times : numpy.ndarray, shape (steps,)
-        The end of each step [s]; fewer than asked for where a step did not converge.
-    states : sequence of State
-        After each step; they may be made when they are asked for.
-    last : Point
-        After the last of them; the start if there are none.
-    work, lost : float
-        Work of the inputs and energy dissipated over them (trapezoidal) [J].
-    reach : numpy.ndarray, shape (n,)
-        Largest |q − q of the block's start| of each degree of freedom.
-    """
-
-    times: np.ndarray
-    states: Sequence[State]
-    last: Point
-    work: float
-    lost: float
-    reach: np.ndarray
-
-
-@runtime_checkable
-class Marching(Stepper[P], Protocol[P]):
-    """A stepper that takes many steps of one length in a call, quicker than one by one."""
-
-    def march(self, point: P, h: float, count: int) -> Block:
-        """Return up to ``count`` steps of length h under the inputs of ``point``, which stay as they are."""
 
 
 @runtime_checkable

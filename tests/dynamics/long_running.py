@@ -85,7 +85,7 @@ def resume(folder: str, until: str) -> None:
 def ends(run: fc.dynamics.run.Run) -> dict[str, np.ndarray]:
     """What a run ends with."""
     e, final = run.report.energy, run.final
-    books = np.array([e.work, e.dissipated, e.kinetic, e.stored, run.report.steps])
+    books = np.array([e.work, e.dissipated, e.kinetic, e.stored, run.report.energy_residual, run.report.steps])
     return {"x": final.x, "R": final.R, "q": final.q, "v": final.v, "books": books, "t": np.array(final.t)}
 
 

@@ -42,6 +42,8 @@ class Closing:
         Their values at the start of the step.
     most : float
         How far a loop may be open [m or rad].
+    open : float
+        How far any has been.
     """
 
     loops: int
@@ -53,6 +55,7 @@ class Closing:
     cells: Wholes
     speeds: Reals
     most: float
+    open: float = 0.0
 
 
 def closing_of(F: Flattened) -> Closing:
@@ -85,6 +88,7 @@ def in_doubt(c: Closing, f: Flat, h: float) -> bool:
     for i in range(c.loops):
         if not abs(c.found[i]) <= c.most:
             return True
+        c.open = max(c.open, abs(c.found[i]))
     if locking(c):
         return True
     drive(f)

@@ -18,6 +18,7 @@ from flexctrl.dynamics.march.record import (
     FIXED,
     FRESH,
     JUMP,
+    OFTEN,
     REFACTOR,
     REMADE,
     SAMPLED,
@@ -187,8 +188,14 @@ def glided(m: March) -> int:
         status = glide(m)
         if status != DONE:
             return status
-        if m.t >= m.due:
+        due = drawn_now(m)
+        if due or m.t >= m.due:
             land(m)
+        if due:
+            drive(m.flat)
+            energy(m.flat)
+            draw(m)
+        if m.t >= m.due:
             shelve(m)
     return DONE
 
@@ -211,7 +218,7 @@ def controlled(m: March) -> int:
         error = 0.0
         if status == DONE:
             judge(m)
-            error = m.error / (m.absolute + m.relative * m.reached)
+            error = compared(m)
         if status != DONE or error > 1.0:
             m.rejected += 1
             m.size = 0.25 * m.h if status != DONE else m.h * max(0.2, 0.9 * growth(error))
@@ -255,6 +262,19 @@ def judge(m: March) -> None:
     m.error = abs(m.beta - 1.0 / 6.0) * m.h * m.h * largest(local)
 
 
+def compared(m: March) -> float:
+    """Return the error over what is allowed: in every part of the machine by how far that has been."""
+    if m.parts == 1:
+        return m.error / (m.absolute + m.relative * m.reached)
+    f = m.flat
+    worst = 0.0
+    for i in range(f.n):
+        rate = (1.0 - m.alpha_f) * f.rate[i] + m.alpha_f * m.rate[i] - m.alpha_m * m.algorithmic[i]
+        local = abs(rate * (1.0 / (1.0 - m.alpha_m)) - m.algorithmic[i]) * m.weight[i]
+        worst = max(worst, local / (m.absolute + m.relative * m.farthest[m.part[i]]))
+    return abs(m.beta - 1.0 / 6.0) * m.h * m.h * worst
+
+
 def accept(m: March) -> None:
     """Go on to the end of the step, where the nodes have been placed; enter it in the books and records."""
     f = m.flat
@@ -284,12 +304,21 @@ def accept(m: March) -> None:
         put(m.rate[i:], rate)
         put(m.v[i:], eight(f.v[i:]))
     m.reached = max(m.reached, largest(far))
+    if m.parts > 1:
+        follow(m)
     tighten(m, total(still), total(onward))
     lean(m, total(shared), total(square))
     m.t = later(m.t, m.h)
     enter(m)
     note(m)
     m.done += 1
+
+
+def follow(m: March) -> None:
+    """Take up how far each part of the machine has been."""
+    for i in range(m.flat.n):
+        way = m.reach[i] * m.weight[i]
+        m.farthest[m.part[i]] = max(m.farthest[m.part[i]], way + 1.0 - max(way, 1.0))
 
 
 def tighten(m: March, still: float, onward: float) -> None:
@@ -320,14 +349,35 @@ def enter(m: March) -> None:
         for i in range(0, f.padded, 8):
             work = work + eight(f.load[i:]) * eight(f.step[i:])
     m.gained += total(work)
-    if m.losing == 1:
+    due = drawn_now(m)
+    if m.losing == 1 or due:
         drive(f)
-        if m.leap.modes > 0:
-            m.lost += m.leap.lost
-        else:
+        if m.leap.modes == 0 or due:
             energy(f)
-            m.lost += 0.5 * m.h * (m.power + f.books[2])
-            m.power = f.books[2]
+    if m.leap.modes > 0:
+        m.lost += m.leap.lost
+    elif m.losing == 1:
+        m.lost += 0.5 * m.h * (m.power + f.books[2])
+        m.power = f.books[2]
+    if due:
+        draw(m)
+
+
+def drawn_now(m: March) -> bool:
+    """Count a step; tell whether the balance is to be drawn after it."""
+    m.entered += 1
+    return m.drawing == 1 and (m.entered < OFTEN or m.entered % OFTEN == 0)
+
+
+def draw(m: March) -> None:
+    """Draw the balance; as `Books.close` does."""
+    kinetic = m.flat.books[0]
+    stored = m.flat.books[1]
+    m.made = kinetic + stored - m.begun - m.gained + m.lost
+    m.gap = max(m.gap, abs(m.made))
+    turned = max(abs(m.gained), max(m.lost, abs(stored + kinetic - m.begun)))
+    swung = max(kinetic, max(abs(kinetic - m.moving), abs(stored - (m.begun - m.moving))))
+    m.turnover = max(m.turnover, max(turned, swung))
 
 
 def note(m: March) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
+from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
@@ -35,7 +36,7 @@ from flexctrl.dynamics.march.record import (
     March,
     no_leap,
 )
-from flexctrl.dynamics.scales import farthest
+from flexctrl.dynamics.scales import components, farthest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
@@ -237,9 +238,18 @@ class Marcher:
         """
         m, F = self.march, self.flattened
         m.first[:], m.reach[:] = F.ordered(first), F.ordered(moved)
-        m.reached = farthest(self.model, moved)
-        m.losing, m.gained, m.lost = int(losing), 0.0, 0.0
+        way = farthest(self.model, moved)
+        m.reached = float(way.max(initial=0.0))
+        m.farthest[components(self.model)] = way
+        m.losing, m.drawing, m.gained, m.lost = int(losing), 0, 0.0, 0.0
         self._do(SETTLE)
+
+    def go_on(self, sums: Sums) -> None:
+        """Go on with books: what is summed up does not depend on where marches begin and end."""
+        m = self.march
+        m.drawing, m.gained, m.lost, m.entered = 1, sums.work, sums.lost, sums.entered
+        m.begun, m.moving, m.turnover, m.gap, m.made = sums.start, sums.moving, sums.turnover, sums.gap, sums.made
+        m.closing.open = sums.closure
 
     def worst(self) -> int:
         """Return the degree of freedom with the largest correction in the last iteration."""
@@ -325,10 +335,21 @@ class Marcher:
         m.corners.sides[:] = sides if sides.size else 0.0
         m.watching = int(sides.size > 0)
 
-    def books(self) -> tuple[float, float, np.ndarray, float]:
-        """Return work, losses, how far degrees of freedom have been, and the power dissipated now."""
+    def books(self, sums: Sums) -> Sums:
+        """Return the books, gone on from some sums."""
         m = self.march
-        return m.gained, m.lost, self.flattened.own(m.reach), m.power
+        return replace(
+            sums,
+            work=m.gained,
+            lost=m.lost,
+            gap=m.gap,
+            turnover=m.turnover,
+            made=m.made,
+            power=m.power if m.losing else sums.power,
+            closure=m.closing.open,
+            entered=m.entered,
+            moved=self.flattened.own(m.reach),
+        )
 
     def jump(self, u: np.ndarray) -> int:
         """Let the inputs jump; return how it ended."""
@@ -398,7 +419,7 @@ def _state_width(F: Flattened) -> int:
 def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
-    state, probes = _state_width(F), probes_of(F, method.weight)
+    state, part, probes = _state_width(F), components(F.model), probes_of(F, method.weight)
     shelf = int(min(_CAPACITY, max(1, _BYTES // (8 * state))))
     return March(
         flat=flat,
@@ -424,6 +445,9 @@ def _march(F: Flattened, method: Method) -> March:
         first=first,
         rows=np.zeros((1 + F.gauges.outputs) * _CAPACITY),
         states=np.zeros(state * shelf),
+        parts=int(part.max(initial=0)) + 1,
+        part=part[F.plan.order],
+        farthest=np.zeros(int(part.max(initial=0)) + 1),
         shelf=shelf,
         alpha_m=c.alpha_m,
         alpha_f=c.alpha_f,

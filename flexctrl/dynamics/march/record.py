@@ -25,6 +25,9 @@ law does not say numbers."""
 FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """What to do."""
 
+OFTEN = 32
+"""Steps between balances of energy; the first so many have one each."""
+
 FRESH, EVALUATE, CORRECT = 0, 1, 2
 """Where in a step it is: before it, before an iteration, or with the forces of one known."""
 
@@ -157,6 +160,9 @@ class March:
         Of error-controlled steps: the next one and the largest, where to end and what not to pass [s].
     relative, absolute, reached : float
         Their tolerance, and how far any degree of freedom has been from where it was first.
+    parts, part, farthest : int, Wholes, Reals
+        Parts of the machine that are not coupled, which one each degree of freedom belongs to, and how far each of
+        them has been.
     task : int
     wanted, done, rejected : int
         Steps.
@@ -181,6 +187,10 @@ class March:
     keeping, due, spacing, kept, shelf : int, float
         Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many
         there are, and how many there is room for.
+    drawing, entered : int
+        Whether balances are drawn, and steps since the run's start: often at first, then every few.
+    begun, moving, turnover, gap, made : float
+        Energy at the run's start and what of it was kinetic; see `flexctrl.dynamics.books.Sums`.
     power, gained, lost : float
         Dissipated power; work of the inputs and energy dissipated.
     v, rate, algorithmic, trend : Reals
@@ -220,6 +230,9 @@ class March:
     first: Reals
     rows: Reals
     states: Reals
+    parts: int
+    part: Wholes
+    farthest: Reals
     alpha_m: float
     alpha_f: float
     beta: float
@@ -272,6 +285,13 @@ class March:
     due: float = 0.0
     spacing: float = 0.0
     kept: int = 0
+    drawing: int = 0
+    entered: int = 0
+    begun: float = 0.0
+    moving: float = 0.0
+    turnover: float = 0.0
+    gap: float = 0.0
+    made: float = 0.0
     power: float = 0.0
     gained: float = 0.0
     lost: float = 0.0

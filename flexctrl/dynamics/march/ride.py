@@ -60,6 +60,7 @@ class _Ride:
         sums = j.books.sums
         self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved)
         self.marcher.open(j.books.first, sums.moved, j.books.dissipates)
+        self.marcher.go_on(sums)
         self.marcher.watch(j.watch.corner_sides, j.point.state)
         self.marcher.keep(
             not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time, j.point.state.t), *j.rows.due()
@@ -67,7 +68,7 @@ class _Ride:
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
-        self.steps, self.mute, self.frames = j.mark.steps, False, len(j.rows.frames)
+        self.mute = False
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
@@ -269,8 +270,7 @@ class _Ride:
         if not self.legs.parts:
             return False
         self.legs.end = j.point = self.stepper.leave(self.supply)
-        j.books.glance(j.rows.frames[self.frames :])
-        j.books.enter_ride(j.mark.steps - self.steps, self.marcher.books(), j.point)
+        j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)
         if not j.watch.idle:
             j.watch.settle(j.point)
