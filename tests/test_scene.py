@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import math
+import re
 
 import numpy as np
 import pytest
@@ -370,6 +372,24 @@ BAD = [
     ('name = "trolley"', 'name = "trolley"\nplanar = "q"', "planar: planar: no direction 'q'"),
     ('notes = ["made up"]', 'notes = "made up"', "notes = 'made up'; expected a list"),
 ]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"until": "x"}, "simulation: until = 'x'; expected seconds > 0"),
+        ({"until": math.inf}, "simulation: until = inf; expected seconds > 0"),
+        ({"every": "a"}, "simulation: every = 'a'; expected seconds > 0"),
+        ({"method": "alpha"}, "simulation: method = 'alpha'; expected a method with its parameters"),
+        ({"tolerance": 1e-4}, "simulation: tolerance = 0.0001; expected a Tolerance"),
+        ({"start": "equilibrium"}, "simulation: start = 'equilibrium'; expected Start.DRAWN"),
+        ({"rigid_twin": 1}, "simulation: rigid_twin = 1; expected True or False"),
+    ],
+    ids=lambda v: next(iter(v)) if isinstance(v, dict) else "",
+)
+def test_what_a_simulation_cannot_be_is_told_by_name(given, said):
+    with pytest.raises(SceneError, match=re.escape(said)):
+        fc.Simulation(**{"until": 1.0, **given})
 
 
 @pytest.mark.parametrize(("old", "new", "said"), BAD, ids=lambda v: str(v)[:30])

@@ -37,6 +37,14 @@ def _blamed(error: Exception) -> ControllerError:
     return blamed
 
 
+def _reals(values: Any, what: str) -> np.ndarray:
+    """Return what a controller answers as real numbers."""
+    found = np.asarray(values)
+    if found.dtype.kind == "c":
+        raise CommandError(f"the controller's {what} is complex: {values!r}; give real numbers, as by numpy.real")
+    return np.asarray(found, dtype=float)
+
+
 @dataclass(frozen=True)
 class Supply:
     """Inputs at an instant: u, the controller's state, and how fast that changes."""
@@ -130,7 +138,7 @@ class Feed:
         """Return the inputs at the start."""
         if self.controller is None:
             return Supply(self.base, np.zeros(0), np.zeros(0))
-        x = np.asarray(self.controller.initial(), dtype=float)
+        x = _reals(self.controller.initial(), "initial state")
         return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self.evaluate(state, x)
 
     def sample(self, state: State, supply: Supply) -> Supply:
@@ -150,7 +158,7 @@ class Feed:
             return said
         try:
             u = self._total(c.command(t, x, y))
-            return u, np.asarray(c.update(t, x, y), dtype=float) if x.size else x
+            return u, _reals(c.update(t, x, y), "next state") if x.size else x
         except Exception as error:
             raise _blamed(error)  # noqa: B904 - its cause is set
 
@@ -163,7 +171,7 @@ class Feed:
         assert self.controller is not None
         y = self.measured(state)
         try:
-            rate = np.asarray(self.controller.rate(state.t, x, y), dtype=float) if x.size else x
+            rate = _reals(self.controller.rate(state.t, x, y), "rate") if x.size else x
             return Supply(np.array(self._total(self.controller.command(state.t, x, y))), x, rate)
         except Exception as error:
             raise _blamed(error)  # noqa: B904 - its cause is set
@@ -181,7 +189,7 @@ class Feed:
     def _total(self, command: Any) -> list[float]:
         u = self._base.copy()
         column = type(command) is np.ndarray and command.ndim == 1 and command.dtype is FLOAT
-        values = command.tolist() if column else np.asarray(command, dtype=float).ravel().tolist()
+        values = command.tolist() if column else _reals(command, "command").ravel().tolist()
         writes = self.writes
         if len(values) != len(writes):
             raise ControllerError(
@@ -214,7 +222,7 @@ class Feed:
             if not before.x.size:
                 return Supply(np.array(self._total(c.command(t, before.x, y))), before.x, before.x)
             x = _trapezoidal(c, t, y, before, h)
-            return Supply(np.array(self._total(c.command(t, x, y))), x, np.asarray(c.rate(t, x, y), dtype=float))
+            return Supply(np.array(self._total(c.command(t, x, y))), x, _reals(c.rate(t, x, y), "rate"))
         except Exception as error:
             raise _blamed(error)  # noqa: B904 - its cause is set
 
@@ -247,13 +255,13 @@ def _trapezoidal(c: Controller, t: float, y: np.ndarray, before: Supply, h: floa
     """Solve x = x₀ + h/2 (ẋ₀ + f(t, x, y)) by Newton's method."""
     x = before.x + h * before.rate
     for _ in range(10):
-        f = np.asarray(c.rate(t, x, y), dtype=float)
+        f = _reals(c.rate(t, x, y), "rate")
         gap = x - before.x - 0.5 * h * (before.rate + f)
         J = np.empty((x.size, x.size))
         for i in range(x.size):
             d = np.zeros(x.size)
             d[i] = _SMALL * max(1.0, abs(x[i]))
-            J[:, i] = (np.asarray(c.rate(t, x + d, y), dtype=float) - f) / d[i]
+            J[:, i] = (_reals(c.rate(t, x + d, y), "rate") - f) / d[i]
         step = np.linalg.solve(np.eye(x.size) - 0.5 * h * J, gap)
         x = x - step
         if np.abs(step).max() <= 1e-12 * (1.0 + np.abs(x).max()):

@@ -10,7 +10,6 @@ import numpy as np
 from flexctrl.errors import StructureError
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import HUGE
 from flexctrl.structure.relations import Copy, Turn
 
 if TYPE_CHECKING:
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Breach", "breaches", "check_state", "extent", "off_rails"]
 
+_FAR = 1e15
 _ALLOWED = 1e-8
 
 
@@ -53,8 +53,11 @@ def check_state(model: Model, state: State, owner: str) -> None:
             )
         if not np.isfinite(getattr(state, name)).all():
             raise StructureError(f"{owner}: the state's {name} holds what is no finite number")
-        if (largest := np.abs(getattr(state, name)).max(initial=0.0)) >= HUGE:
-            raise StructureError(f"{owner}: the state's {name} holds {largest:.3g}; expected numbers below {HUGE:g}")
+        if (largest := np.abs(getattr(state, name)).max(initial=0.0)) >= _FAR:
+            raise StructureError(
+                f"{owner}: the state's {name} holds {largest:.3g}, outside any sensible range: numbers have 16 digits, "
+                f"so nothing else of the machine would be seen beside it; expected values below {_FAR:g}"
+            )
     worst = max(breaches(model, state), default=Breach(0.0, ""))
     if worst.gap > _ALLOWED:
         raise StructureError(

@@ -11,22 +11,22 @@ from typing import Any
 
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.tracking import OpenLoop, Together
-from flexctrl.dynamics.alpha import Integrator
 from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.simulate import simulate
+from flexctrl.dynamics.steps import Integrator
 from flexctrl.effects.automatic import Automatic
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import Flexible
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.errors import SceneError, did_you_mean
+from flexctrl.errors import SceneError, StructureError, did_you_mean
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
+from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, check_seconds
 from flexctrl.structure.naming import node_of
 from flexctrl.structure.structure import Structure
 from flexctrl.study.ledger import ledger
@@ -67,9 +67,20 @@ class Simulation:
     rigid_twin: bool = False
 
     def __post_init__(self) -> None:
-        for name, value in (("until", self.until), ("every", self.every)):
-            if value is not None and not value > 0:
-                raise SceneError(f"simulation: {name} = {value!r}; expected a number of seconds > 0")
+        try:
+            check_seconds(self.until, "until", "simulation")
+            if self.every is not None:
+                check_seconds(self.every, "every", "simulation", endless=True)
+        except StructureError as error:
+            raise SceneError(str(error)) from None
+        for name, value, kinds, expected in (
+            ("method", self.method, Integrator | None, "a method with its parameters, as GeneralizedAlpha(1e-3)"),
+            ("tolerance", self.tolerance, Tolerance, "a Tolerance, as Tolerance(relative=1e-5)"),
+            ("start", self.start, Start, "Start.DRAWN or Start.EQUILIBRIUM"),
+            ("rigid_twin", self.rigid_twin, bool, "True or False"),
+        ):
+            if isinstance(value, type) or not isinstance(value, kinds):
+                raise SceneError(f"simulation: {name} = {value!r}; expected {expected}")
 
 
 @dataclass(frozen=True)

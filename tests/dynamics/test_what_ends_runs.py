@@ -57,6 +57,21 @@ def test_a_controller_that_raises_ends_the_run_and_nothing_is_lost(method, sampl
     assert run["x"] == pytest.approx(1.0 + 0.3 * np.cos(10.0 * run.t), abs=5e-3)
 
 
+class Imaginary(Faulty):
+    """A controller that forgot to take the real part."""
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.exp(1j * x[:1]) if t >= self.after else np.zeros(1)
+
+
+@pytest.mark.parametrize("sample_time", [0.0, 0.1])
+def test_complex_commands_end_a_run_by_name(sample_time):
+    run = fc.simulate(swing(), Imaginary(sample_time, 0.25, states=1), until=1.0, method=fc.GeneralizedAlpha(1e-2))
+    assert run.status is fc.Status.FAILED
+    assert "the controller's command is complex" in run.report.message
+    assert 0.2 <= run.t[-1] <= 0.31
+
+
 def test_a_run_that_finishes_has_no_fault():
     assert fc.simulate(swing(), until=0.1).fault is None
 
