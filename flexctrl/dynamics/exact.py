@@ -8,6 +8,7 @@ the run.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -33,6 +34,7 @@ _SWEEPS = 30
 _SETTLED = 1e-13
 _SMALL = 1e-6
 _HALF = 0.5
+_ROUND_OFF = 1e-9
 _POLYNOMIAL = np.linalg.inv(np.vander(NODES, increasing=True))
 """Powers of the share of a step from values at the nodes."""
 
@@ -91,7 +93,7 @@ class Exact:
         from flexctrl.dynamics.march.leaps import LeapingStepper
         from flexctrl.dynamics.march.marching import can_march
 
-        plain = ExactStepper(model, feed, tolerance, self.modes)
+        plain = ExactStepper(model, feed, tolerance, self.modes, self.step)
         marched: Any = LeapingStepper(plain)
         return marched if can_march(model) and not feed.continuous else plain
 
@@ -121,6 +123,7 @@ class ExactStepper:
     feed: Feed
     tolerance: Tolerance
     modes: int | None = None
+    step_length: float = 0.0
     counts: Counts = field(default_factory=Counts)
     memory: None = None
     _slope: np.ndarray | None = None
@@ -139,6 +142,12 @@ class ExactStepper:
     def recall(self, memory: None) -> None:
         """There is nothing to go on from but the point."""
         return
+
+    def nominal(self, h: float) -> float:
+        """Return the step asked for, or that between samples, where h is that but for round-off of times."""
+        period, asked = self.feed.sample_time, self.step_length
+        steps = (asked, period / max(1, math.ceil(period / asked - 1e-6))) if asked else ()
+        return next((step for step in steps if abs(step - h) <= _ROUND_OFF * step), h)
 
     def start(self, state: State, supply: Supply, step: float) -> ModalPoint:
         """Return the point of a state; what no mass holds goes where its forces balance."""

@@ -50,6 +50,34 @@ def arm(*effects, backend=None) -> fc.Model:
     return fc.assemble(machine, [fc.LargeRotation(), fc.Gravity(), fc.ShaftElasticity(), *effects], backend)
 
 
+class Damper:
+    """A sampled controller of the cantilever's tip."""
+
+    inputs, outputs, sample_time = ("tip",), ("push",), 10 * SAMPLE
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(1)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([np.cos(3.0 * t) - 20.0 * (y[0] - x[0])])
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return y[:1]
+
+
+def small() -> fc.Model:
+    """A cantilever that moves little, with a mass on it."""
+    section = fc.Section(EA=1e5, EI_y=10.0, EI_z=10.0, GJ=10.0, rhoA=1.0, rhoJ=1e-3)
+    beam, load = fc.Beam("beam", (0, 0, 0), (1, 0, 0), section, 4), fc.PointMass("load", (1, 0, 0), 0.3)
+    machine = fc.Structure(
+        [beam, load],
+        [fc.Support(beam.start), fc.Pin(beam.end, load.node)],
+        inputs=[fc.Force("push", beam.end, "z")],
+        outputs=[fc.Position("tip", beam.end, "z"), fc.Rotation("lean", beam.end, "y")],
+    )
+    return fc.assemble(machine, [fc.Gravity(), fc.Flexible(), fc.RayleighDamping(0.1, 1e-3)])
+
+
 FIXED = fc.GeneralizedAlpha(SAMPLE)
 DRY = fc.CoulombFriction({"motor": fc.Coulomb(0.2, static=0.3)})
 CASES = {
@@ -61,6 +89,8 @@ CASES = {
     "sampled": (lambda: arm(), Servo, FIXED, {}),
     "sampled_plain": (lambda: arm(backend=fc.CasadiVM()), Servo, FIXED, {}),
     "midpoint": (lambda: arm(), Servo, fc.ConservingMidpoint(SAMPLE), {}),
+    "exact": (lambda: small(), None, fc.Exact(SAMPLE), {"push": 0.8}),
+    "exact_sampled": (lambda: small(), Damper, fc.Exact(SAMPLE), {}),
     "explicit": (lambda: arm(), Servo, fc.ExplicitRungeKutta(SAMPLE), {}),
 }
 

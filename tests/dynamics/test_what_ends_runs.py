@@ -61,12 +61,12 @@ class Imaginary(Faulty):
     """A controller that forgot to take the real part."""
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return np.exp(1j * x[:1]) if t >= self.after else np.zeros(1)
+        return np.exp(1j * y) if t >= self.after else np.zeros(1)
 
 
 @pytest.mark.parametrize("sample_time", [0.0, 0.1])
 def test_complex_commands_end_a_run_by_name(sample_time):
-    run = fc.simulate(swing(), Imaginary(sample_time, 0.25, states=1), until=1.0, method=fc.GeneralizedAlpha(1e-2))
+    run = fc.simulate(swing(), Imaginary(sample_time, 0.25), until=1.0, method=fc.GeneralizedAlpha(1e-2))
     assert run.status is fc.Status.FAILED
     assert "the controller's command is complex" in run.report.message
     assert 0.2 <= run.t[-1] <= 0.31

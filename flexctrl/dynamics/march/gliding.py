@@ -28,8 +28,11 @@ def glide(m: March) -> int:
     g = m.gauges
     inputs = e.size - 1 - e.modes
     if e.aloft == 0:
-        for j in range(inputs):
-            e.sight[g.rows + j] = way(m, j)
+        if e.state[e.size - 1] == 1.0:
+            product(e.size, e.sights, e.state, e.seen, e.sight)
+        else:
+            for j in range(inputs):
+                e.sight[g.rows + j] = way(m, j)
         e.aloft = 1
     work = 0.0
     for j in range(inputs):
@@ -235,13 +238,14 @@ def land(m: March) -> None:
     """Bring degrees of freedom and nodes to where the modal state is."""
     f = m.flat
     e = m.leap
-    unfold(m)
-    place(f)
-    keep(f)
+    product(e.size, f.padded, e.state, e.places, f.q)  # not by a step from where it was: to the bit the same always
+    product(e.size, f.padded, e.state, e.rates, f.v)
     for i in range(0, f.padded, 8):
+        put(f.step[i:], 0.0 * eight(f.step[i:]))
         put(m.v[i:], eight(f.v[i:]))
         put(m.reach[i:], larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:]))))
-        put(f.step[i:], 0.0 * eight(f.step[i:]))
+    place(f)
+    keep(f)
     load(f)
     pull(f)
     for i in range(0, f.padded, 8):

@@ -102,6 +102,7 @@ class Leaps:
 
     @modal.setter
     def modal(self, state: np.ndarray) -> None:
+        self.record.state[:] = 0.0
         self.record.state[self.pairs.where] = self.pairs.inverse @ state
 
     def _columns(self, rows: np.ndarray, padded: int) -> np.ndarray:

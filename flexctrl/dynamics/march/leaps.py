@@ -24,6 +24,13 @@ from flexctrl.model.state import State
 __all__ = ["Leaper", "LeapingStepper"]
 
 
+@dataclass(frozen=True)
+class LeapPoint(ModalPoint):
+    """A point with the modal state as loops have it, and the inputs over the step that led to it."""
+
+    leaping: np.ndarray
+
+
 class Leaper(Marcher):
     """A linear model on a march of exact steps."""
 
@@ -47,7 +54,7 @@ class Leaper(Marcher):
         assert steps is not None
         key = float(f"{h:.9e}"), steps.modes
         if key not in self._tables:
-            self._tables[key] = Tables.of(h, steps.propagator, steps.turnover)
+            self._tables[key] = Tables.of(steps.nominal(h), steps.propagator, steps.turnover)
         self._numbers.paired, self._numbers.parted = self.leaps.fill(self._tables[key])
         self._numbers.h = h
         return DONE
@@ -88,7 +95,10 @@ class LeapingStepper(MarchingStepper):
 
     def renew(self, point: Any, supply: Supply, step: float) -> Any:
         """Return the point under other inputs."""
-        return self.plain.renew(point, supply, step)
+        fresh = self.plain.renew(point, supply, step)
+        if not isinstance(point, LeapPoint):
+            return fresh
+        return LeapPoint(fresh.state, fresh.rate, fresh.supply, point.modal, fresh.course, point.leaping)
 
     def step(self, point: Any, h: float) -> Any:
         """Return the point a step later."""
@@ -103,7 +113,10 @@ class LeapingStepper(MarchingStepper):
         if point is not self._here:
             zero = np.zeros(self.plain.model.n)
             self.marcher.entered(AlphaPoint(point.state, zero, point.supply, zero, zero))
-            self.marcher.leaps.modal = point.modal
+            if isinstance(point, LeapPoint):
+                self.marcher.leaps.record.state[:] = point.leaping
+            else:
+                self.marcher.leaps.modal = point.modal
             self._here = point
 
     def leave(self, supply: Supply) -> Any:
@@ -113,7 +126,8 @@ class LeapingStepper(MarchingStepper):
         modal, course = marcher.leaps.modal, np.zeros((4, len(w)))
         course[0] = w
         rate = first.C[self.plain.model.n :] @ (first.A @ modal + first.B @ w)
-        self._here = point = ModalPoint(state, rate, supply, modal, course)  # type: ignore[assignment]
+        leaping = marcher.leaps.record.state.copy()
+        self._here = point = LeapPoint(state, rate, supply, modal, course, leaping)  # type: ignore[assignment]
         return point
 
     def curve(self, before: Point, after: Point) -> Curve:
