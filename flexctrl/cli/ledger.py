@@ -50,6 +50,7 @@ def _data(found: Ledger) -> dict[str, object]:
 
 def _entry(e: Entry) -> dict[str, object]:
     base: dict[str, object] = {"name": e.name, "output_change": None, "cost_ratio": e.cost_ratio, "keep": e.keep}
+    base |= {"against_without": list(e.first)}
     if e.change is None or e.size is None:
         return {**base, "failure": e.failure}
     change = {"output_change": e.change.outputs_worst, "outputs": e.change.outputs, "poles_change": e.change.poles}

@@ -38,7 +38,8 @@ class Size:
         Of all force kernels, once over the machine.
     steps, newton_iterations : int
     work : float
-        Newton iterations × (instructions + nonzeros): a cost that does not depend on the clock.
+        Newton iterations (steps, of a method without them) × (instructions + nonzeros): a cost that does not depend
+        on the clock.
     """
 
     states: int
@@ -49,7 +50,7 @@ class Size:
 
     @property
     def work(self) -> float:
-        return float(self.newton_iterations) * (self.instructions + self.nonzeros)
+        return float(self.newton_iterations or self.steps) * (self.instructions + self.nonzeros)
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ class Entry:
         Whether the minimal set has it.
     failure : str
         Why the scene cannot do without it; empty if it can.
+    first : tuple of str
+        What cannot be without it (friction in a linear machine): left out before, and what the change is against.
     """
 
     name: str
@@ -77,6 +80,7 @@ class Entry:
     size: Size | None
     keep: bool
     failure: str = ""
+    first: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +171,8 @@ class Ledger:
         pole = f"{e.change.pole:.2g}" if e.change.poles > 0.0 else "–"
         cells = [f"{c:>9}" for c in (margins, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)]
         line = "  ".join([f"{e.name:<{wide}}", f"{outputs:>9}", f"{poles:>9}", f"{pole:>{_width('of pole')}}", *cells])
-        return line + ("  keep" if e.keep else "")
+        before = f"  (both without {', '.join(e.first)})" if e.first else ""
+        return line + ("  keep" if e.keep else "") + before
 
 
 def ledger(
@@ -242,15 +247,16 @@ class _Auditor:
         self.items = omissions(scene)
         self.done, self.expected = 0, 2 * len(self.items) + 5
         self.full = self._tried(scene)
+        self.bases: dict[tuple[str, ...], _Trial | str] = {(): self.full}
 
     def drawn_up(self) -> Ledger:
-        trials = {o.name: self._without([o]) for o in self.items}
+        trials = {o.name: self._alone(o) for o in self.items}
         gone = self._smallest(trials)
         minimal = self._without(gone) if gone else self.full
         assert isinstance(minimal, _Trial)
         names = {o.name for o in gone}
-        self._measure([*trials.values(), minimal])
-        entries = tuple(self._entry(o.name, trials[o.name], o.name not in names) for o in self.items)
+        self._measure([*self.bases.values(), *trials.values(), minimal])
+        entries = tuple(self._entry(o, trials[o.name], o.name not in names) for o in self.items)
         self.progress(1.0)
         return Ledger(
             self.full.scene.name,
@@ -260,7 +266,7 @@ class _Auditor:
             self.full.size,
             minimal.answer,
             change_between(self.full.answer, minimal.answer),
-            self._ratio(minimal),
+            self._ratio(minimal, self.full),
             minimal.size,
             self._noise,
             minimal.scene,
@@ -269,13 +275,24 @@ class _Auditor:
     def _smallest(self, trials: dict[str, _Trial | str]) -> list[Omission]:
         """What may go, all at once."""
         fit = [o for o in self.items if self._may_go(o, trials[o.name])]
+        able = {o.name for o in fit}
+        fit = [o for o in fit if able.issuperset(o.first)]
         fit.sort(key=lambda o: self._weight(trials[o.name]))
         while fit:
             together = self._without(fit)
             if isinstance(together, _Trial) and self._holds(together) and self._work(together) <= _DEARER:
                 return fit
             fit.pop()
+            left = {o.name for o in fit}
+            fit = [o for o in fit if left.issuperset(o.first)]
         return []
+
+    def _alone(self, omission: Omission) -> _Trial | str:
+        """The scene without one thing, and without what cannot be without it."""
+        before = [o for o in self.items if o.name in omission.first]
+        if omission.first not in self.bases:
+            self.bases[omission.first] = self._without(before)
+        return self._without([*before, omission])
 
     def _may_go(self, omission: Omission, trial: _Trial | str) -> bool:
         if not isinstance(trial, _Trial) or not self._holds(trial):
@@ -294,10 +311,12 @@ class _Auditor:
         change = change_between(self.full.answer, trial.answer)
         return change.outputs_worst <= self.tolerance and not change.margins > self.margins
 
-    def _entry(self, name: str, trial: _Trial | str, keep: bool) -> Entry:
-        if isinstance(trial, str):
-            return Entry(name, None, np.nan, None, True, trial)
-        return Entry(name, change_between(self.full.answer, trial.answer), self._ratio(trial), trial.size, keep)
+    def _entry(self, omission: Omission, trial: _Trial | str, keep: bool) -> Entry:
+        name, base = omission.name, self.bases[omission.first]
+        if isinstance(trial, str) or isinstance(base, str):
+            return Entry(name, None, np.nan, None, True, trial if isinstance(trial, str) else str(base))
+        change = change_between(base.answer, trial.answer)
+        return Entry(name, change, self._ratio(trial, base), trial.size, keep, first=omission.first)
 
     def _without(self, gone: Iterable[Omission]) -> _Trial | str:
         """Run the scene without some effects, or say why that cannot be done."""
@@ -328,9 +347,9 @@ class _Auditor:
             trial.again()
             self._tick()
 
-    def _ratio(self, trial: _Trial) -> float:
-        """Time of the full scene over that of another, each by its quickest run."""
-        return min(self.full.times) / min(trial.times)
+    def _ratio(self, trial: _Trial, base: _Trial) -> float:
+        """Time of a scene over that of a smaller one, each by its quickest run."""
+        return min(base.times) / min(trial.times)
 
     @property
     def _noise(self) -> float:

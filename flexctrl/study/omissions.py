@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol, TypeVar
@@ -17,10 +18,11 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.errors import ControllerError
+from flexctrl.errors import ControllerError, StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
-from flexctrl.structure.elements import Beam
+from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
+from flexctrl.structure.elements import Beam, Part, Rope, Spring
 from flexctrl.structure.structure import Structure
 
 __all__ = ["Omission", "Subject", "omissions"]
@@ -28,7 +30,14 @@ __all__ = ["Omission", "Subject", "omissions"]
 _STIFF = 1e3
 _RIGIDITIES = {"stretch": ("EA",), "torsion": ("GJ",), "bending": ("EI_y", "EI_z")}
 
+_DASHPOTS: dict[str, tuple[type, ...]] = {
+    "drive_damping": (RotaryDrive, LinearDrive),
+    "rope_damping": (Rope, Winch),
+    "spring_damping": (Spring,),
+}
+
 S = TypeVar("S", bound="Subject")
+P = TypeVar("P", bound=Part | Drive)
 
 
 class Subject(Protocol):
@@ -84,11 +93,14 @@ class Omission:
         Scene → the same without it.
     spares : bool
         Whether something is gone then, or only much stiffer.
+    first : tuple of str
+        What has to be left out before: effects that cannot be without it.
     """
 
     name: str
     without: Callable[[Subject], Subject]
     spares: bool = True
+    first: tuple[str, ...] = ()
 
 
 def omissions(scene: Subject) -> tuple[Omission, ...]:
@@ -96,7 +108,7 @@ def omissions(scene: Subject) -> tuple[Omission, ...]:
 
     Effects; flexibility part by part; stretch, torsion and bending of the beams (made a thousand times stiffer);
     large rotation (small motion about the loaded equilibrium instead) and geometric stiffness; each kind of
-    damping; the hardware round the controller.
+    damping, of effects and of parts; the hardware round the controller.
 
     Parameters
     ----------
@@ -108,9 +120,26 @@ def omissions(scene: Subject) -> tuple[Omission, ...]:
     tuple of Omission
     """
     found = [o for e in scene.effects for part in e.parts() for o in _of_effect(part, scene.structure)]
-    if any(d.damping for d in scene.structure.drives):
-        found.append(Omission("drive_damping", _undamped_drives))
-    return (*found, *_of_controller(scene.law))
+    parts = (*scene.structure.elements, *scene.structure.drives)
+    for name, kinds in _DASHPOTS.items():
+        if any(isinstance(p, kinds) and getattr(p, "damping", 0.0) for p in parts):
+            found.append(Omission(name, partial(_undamped, kinds)))
+    return (*(_after_what_needs_it(o, scene) for o in found), *_of_controller(scene.law))
+
+
+def _after_what_needs_it(omission: Omission, scene: Subject) -> Omission:
+    """An omission that knows the effects which refuse to be without it, such as friction in a linear machine."""
+    left = _flat(omission.without(scene))
+    needing = tuple(snake(type(e)) for e in left if not _bears(e, [other for other in left if other is not e]))
+    return replace(omission, first=needing) if needing else omission
+
+
+def _bears(effect: Effect, others: Sequence[Effect]) -> bool:
+    try:
+        effect.check_beside(others)
+    except StructureError:
+        return False
+    return True
 
 
 def _of_effect(effect: Effect, structure: Structure) -> list[Omission]:
@@ -196,21 +225,50 @@ def _without_share(kind: type[Effect], share: str, scene: Subject) -> Subject:
     return scene.with_(effects=changed)
 
 
-def _undamped_drives(scene: Subject) -> Subject:
-    return scene.with_(
-        structure=scene.structure.with_(drives=[replace(d, damping=0.0) for d in scene.structure.drives])
-    )
+def _undamped(kinds: tuple[type, ...], scene: Subject) -> Subject:
+    """Without the dampers of some kinds of parts."""
+    elements = [_still(e) if isinstance(e, kinds) else e for e in scene.structure.elements]
+    drives = [_still(d) if isinstance(d, kinds) else d for d in scene.structure.drives]
+    return scene.with_(structure=scene.structure.with_(elements=elements, drives=drives))
+
+
+def _still(part: P) -> P:
+    """A part without its damper; all else of it was checked when it was made."""
+    found = copy(part)
+    object.__setattr__(found, "damping", 0.0)
+    return found
 
 
 def _of_controller(law: Controller | None) -> list[Omission]:
+    kinds = list(dict.fromkeys(type(w) for w in _wrappers(law) if type(w).__module__ == Sampled.__module__))
     found = []
-    for kind in dict.fromkeys(type(w) for w in _wrappers(law) if type(w).__module__ == Sampled.__module__):
-        try:
-            _peeled(law, kind)
-        except ControllerError:  # what is wrapped round it cannot do without
-            continue
-        found.append(Omission(snake(kind), partial(_without_hardware, kind)))
+    for i, kind in enumerate(kinds):
+        first = _in_the_way(law, kind, kinds[:i])
+        if first is not None:
+            names = tuple(snake(other) for other in first)
+            found.append(Omission(snake(kind), partial(_without_hardware, kind), first=names))
     return found
+
+
+def _in_the_way(law: Any, kind: type[Wrapper], outer: Sequence[type[Wrapper]]) -> list[type[Wrapper]] | None:
+    """What is wrapped round one kind of hardware and cannot do without it; None if it cannot be left out at all."""
+    if not _can_do_without(law, [*outer, kind]):
+        return None
+    needed = list(outer)
+    for other in outer:
+        fewer = [o for o in needed if o is not other]
+        if _can_do_without(law, [*fewer, kind]):
+            needed = fewer
+    return needed
+
+
+def _can_do_without(law: Any, kinds: Sequence[type[Wrapper]]) -> bool:
+    try:
+        for kind in kinds:
+            law = _peeled(law, kind)
+    except ControllerError:
+        return False
+    return True
 
 
 def _without_hardware(kind: type[Wrapper], scene: Subject) -> Subject:

@@ -12,6 +12,8 @@ from flexctrl.errors import StructureError
 from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
 from flexctrl.study.answers import Answer, answer_of, change_between
+from flexctrl.study.ledger import Size
+from flexctrl.study.omissions import omissions
 
 
 def trolley(**changes) -> fc.Scene:
@@ -95,6 +97,112 @@ def test_leaving_out_flexibility_takes_states_away(drawn_up):
     assert drawn_up["shaft_elasticity"].size.states == full - 2
     assert drawn_up["rope_stretch"].size.states == full - 2
     assert drawn_up["saturated"].size == drawn_up.size
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """A trolley with friction and play, which no linear machine can have."""
+    scene = trolley()
+    rough = [fc.CoulombFriction({"travel_drive": 1e-3}), fc.Backlash({"travel_drive": 1e-4})]
+    return scene.with_(effects=[*scene.effects, *rough])
+
+
+@pytest.mark.slow
+def test_large_rotation_is_examined_without_what_cannot_be_linear(rubbing):
+    entry = fc.ledger(rubbing, 0.01)["large_rotation"]
+    assert entry.first == ("coulomb_friction", "backlash")
+    smooth = rubbing.with_(effects=rubbing.effects[:-2])
+    alone = change_between(*(answer_of(s, s.run()) for s in (smooth, omission(smooth, "large_rotation"))))
+    assert entry.change.outputs_worst == pytest.approx(alone.outputs_worst, rel=1e-6)
+    assert entry.size.instructions == 0
+
+
+def omission(scene, name):
+    return next(o for o in omissions(scene.with_(controller=scene.law)) if o.name == name).without(scene)
+
+
+def test_every_effect_of_a_machine_that_has_them_all_has_a_line():
+    """The list of the issue: what the machine has can be left out, one by one, and something is gone each time."""
+    beam = fc.Beam("boom", (0, 0, 0), (2, 0, 0), fc.Section.tube(fc.STEEL, 0.05, 0.004))
+    rope = fc.Rope("rope", beam.end, (2, 0, -1), EA=1e5, rhoA=0.5, elements=2, damping=10.0)
+    spring = fc.Spring("spring", beam.start, (0, 0, 3), stiffness=1e3, damping=1.0)
+    load, hook = fc.PointMass("load", (2, 0, -1), 5.0), fc.PointMass("hook", (0, 1, 3), 4.0)
+    crab = fc.PointMass("crab", (0, 1, 5), 10.0)
+    motor = fc.RotaryDrive("motor", beam.start, axis="z", stiffness=50.0, ratio=20.0, inertia=1e-3, damping=0.1)
+    winch = fc.Winch("winch", hook.node, crab.node, EA=1e5, radius=0.1, ratio=2.0, inertia=0.02)
+    structure = fc.Structure(
+        [beam, rope, spring, load, hook, crab],
+        [
+            fc.Support(beam.start, held="u v w rx ry"),
+            fc.Pin(beam.end, rope.start),
+            fc.Pin(rope.end, load.node),
+            fc.Support(crab.node),
+            fc.Support(spring.end),
+        ],
+        [motor, winch],
+        [fc.MotorTorque("torque", motor)],
+        [fc.DriveAngle("angle", "motor")],
+    )
+    effects = [
+        fc.Gravity(),
+        fc.Flexible(),
+        fc.RopeMass(),
+        fc.LargeRotation(),
+        fc.RayleighDamping(0.1, 1e-3),
+        fc.Backlash({"motor": 1e-3}),
+        fc.CoulombFriction({"motor": 0.05}),
+        fc.ViscousFriction({"motor": 0.05}),
+        fc.MotorLag({"motor": 0.01}),
+        fc.Wind({"load": 0.5}, (5, 0, 0)),
+    ]
+    law = fc.design.pid(0.5, 0.0, 0.1, measured="angle", rate=fc.design.FilteredRate(0.01), command="torque")
+    law = fc.Delayed(fc.Quantised(fc.Saturated(fc.Sampled(law, 0.01), {"torque": 2.0}), {"angle": 1e-4}), 1)
+    scene = fc.Scene(structure, effects, law, simulation=fc.Simulation(until=0.01))
+    scene = scene.with_(controller=scene.law)
+    found = {o.name: o for o in omissions(scene)}
+    assert set(found) >= {
+        "gravity",
+        "beam_bending",
+        "beam_stretch",
+        "beam_torsion",
+        "shaft_elasticity",
+        "rope_stretch_rope",
+        "rope_stretch_winch",
+        "rope_mass",
+        "large_rotation",
+        "geometric_stiffness",
+        "mass_damping",
+        "stiffness_damping",
+        "drive_damping",
+        "rope_damping",
+        "spring_damping",
+        "viscous_friction",
+        "coulomb_friction",
+        "backlash",
+        "motor_lag",
+        "wind",
+        "sampled",
+        "saturated",
+        "quantised",
+        "delayed",
+    }
+    assert found["sampled"].first == ("delayed",)  # a delay of whole samples cannot be without them
+    for name, each in found.items():
+        base = scene
+        for before in each.first:
+            base = found[before].without(base)
+        without, whole = each.without(base), (base.structure, base.effects, base.controller)
+        same = [
+            a is b or a == b
+            for a, b in zip(whole, (without.structure, without.effects, without.controller), strict=True)
+        ]
+        assert not all(same), name
+
+
+def test_the_work_of_exact_steps_is_counted():
+    """They need no iterations: their steps count."""
+    still = Size(states=4, nonzeros=8, instructions=0, steps=50, newton_iterations=0)
+    assert still.work == 400.0
 
 
 @pytest.mark.slow
