@@ -204,7 +204,8 @@ class Scene:
         if choice is None:
             return self
         full = self.with_(effects=[e for e in self.effects if e is not choice])
-        found = ledger(full, choice.tolerance).scene.with_(simulation=self.simulation)
+        found = ledger(full, choice.tolerance).scene
+        found = found.with_(simulation=replace(self._simulation, method=found.simulation.method))
         assert isinstance(found, Scene)
         return found
 

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.dynamics.exact import Exact
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.errors import FlexctrlError, StructureError, did_you_mean
 from flexctrl.study.answers import Answer, Change, answer_of, change_between
+from flexctrl.study.exactly import exactly, fewer_modes
 from flexctrl.study.omissions import Omission, Subject, omissions
 
 if TYPE_CHECKING:
@@ -132,6 +134,21 @@ class Ledger:
         return f"{factor:.1f} × {'faster' if self.speedup > 1.0 else 'slower'}"
 
     @property
+    def modes(self) -> int | None:
+        """How many vibrations the minimal set is run with; None if that is all there are."""
+        method = self.scene.simulation.method
+        return method.modes if isinstance(method, Exact) else None
+
+    @property
+    def _way(self) -> str:
+        """How the minimal set is run, if that is not how the scene is."""
+        if not isinstance(self.scene.simulation.method, Exact):
+            return ""
+        if self.modes is None:
+            return "; linear: integrated exactly"
+        return f"; linear: integrated exactly, free motion and {self.modes} vibration{'s' * (self.modes != 1)}"
+
+    @property
     def minimal_set(self) -> tuple[str, ...]:
         """Names of the effects that are kept."""
         return tuple(e.name for e in self.entries if e.keep)
@@ -161,7 +178,7 @@ class Ledger:
         kept = ", ".join(self.minimal_set) or "nothing"
         change, asked = _percent(self.minimal_change.outputs_worst), _percent(self.tolerance)
         size = f"{self.minimal_size.states} of {self.size.states} states"
-        lines += [f"kept: {kept}", f"outputs within {change} (asked: {asked}), {self.pace}, {size}"]
+        lines += [f"kept: {kept}", f"outputs within {change} (asked: {asked}), {self.pace}, {size}{self._way}"]
         return "\n".join(lines)
 
     def _line(self, e: Entry, wide: int) -> str:
@@ -187,7 +204,8 @@ def ledger(
     Every effect is left out in turn and the scene run again. What changes an output by no more than ``tolerance``
     is a candidate to go. All candidates are left out together; where they do more together than alone, they are
     taken back, the weightiest first, until the answer holds. An effect whose absence makes the run dearer stays, and
-    so does a way to give that saves nothing: beams that are stiffer keep their freedoms.
+    so does a way to give that saves nothing: beams that are stiffer keep their freedoms. What is linear without some
+    effect is integrated exactly, and the minimal set, where it is, with the fewest modes that keep the answer.
 
     Parameters
     ----------
@@ -254,6 +272,7 @@ class _Auditor:
         gone = self._smallest(trials)
         minimal = self._without(gone) if gone else self.full
         assert isinstance(minimal, _Trial)
+        minimal = self._reduced(minimal)
         names = {o.name for o in gone}
         self._measure([*self.bases.values(), *trials.values(), minimal])
         entries = tuple(self._entry(o, trials[o.name], o.name not in names) for o in self.items)
@@ -324,10 +343,19 @@ class _Auditor:
         try:
             for omission in gone:
                 scene = omission.without(scene)
-            return self._tried(scene)
+            return self._tried(exactly(scene))
         except FlexctrlError as error:
             self._tick()
             return str(error).splitlines()[0]
+
+    def _reduced(self, whole: _Trial) -> _Trial:
+        """With the fewest modes that hold, where equations are linear; poles and margins stay the machine's own."""
+        for scene in fewer_modes(whole.scene):
+            run, taken = _timed(scene)
+            trial = replace(whole, scene=scene, answer=replace(whole.answer, run=run), times=[taken])
+            if run.status is Status.FINISHED and self._holds(trial):
+                return trial
+        return whole
 
     def _tried(self, scene: Subject) -> _Trial:
         run, taken = _timed(scene)
