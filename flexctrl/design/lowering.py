@@ -18,7 +18,7 @@ from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
 from flexctrl.design.piecewise import Trajectory
 from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Pairs, Signal, Together, Tracking
-from flexctrl.kernels.kernel import Kernel
+from flexctrl.kernels.kernel import Backend, Kernel, Run
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -133,6 +133,25 @@ class Lowered:
     clocks: tuple[Signal, ...]
     states: int
     _kept: dict[tuple[int, int, float], np.ndarray] = field(default_factory=dict, repr=False)
+    _bound: dict[tuple[Any, ...], Run] = field(default_factory=dict, repr=False)
+
+    def bound(self, backend: Backend, gather: np.ndarray) -> Run:
+        """Return the kernel on some entries of a vector; kept with the law.
+
+        Parameters
+        ----------
+        backend : Backend
+        gather : numpy.ndarray of int, shape (n_in,)
+
+        Returns
+        -------
+        Run
+        """
+        key = (backend, *gather.tolist())
+        if key not in self._bound:
+            scatter = np.arange(self.kernel.n_out)
+            self._bound[key] = backend.bind(self.kernel, gather[None], self.values[None], scatter[None])
+        return self._bound[key]
 
     def now(self, t: float) -> np.ndarray:
         """Return what depends on time alone at an instant [s]."""

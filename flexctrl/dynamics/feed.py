@@ -105,8 +105,7 @@ class Feed:
         backend = getattr(self.model, "backend", None)
         if not isinstance(backend, Compiled) or self.lowered is None:
             return None
-        k = self.lowered.kernel
-        return backend.bind(k, np.arange(k.n_in)[None], self.lowered.values[None], np.arange(k.n_out)[None])
+        return self.lowered.bound(backend, np.arange(self.lowered.kernel.n_in))
 
     def _said(
         self, asked: Callable[[np.ndarray, np.ndarray], None], t: float, x: np.ndarray, y: np.ndarray

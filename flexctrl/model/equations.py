@@ -174,11 +174,17 @@ class SmallMotion:
         """Return ΦᵀKΦ of some motions."""
         return motions.T @ (self.matrices.K @ motions)
 
+    @cached_property
+    def _levers(self) -> sp.csr_matrix:
+        """Motion of the nodes per unit of each degree of freedom."""
+        motion = self.model.motion
+        return motion.jacobian(self.model.rest)[: motion.source_base]
+
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
         """Return the state after a step; what is shown moves to first order."""
         motion, rest = self.model.motion, self.model.rest
         q = state.q + step
-        raw = (motion.jacobian(rest) @ q)[: motion.source_base].reshape(-1, 6)
+        raw = (self._levers @ q).reshape(-1, 6)
         x, R = rest.x + raw[:, :3], exponential(raw[:, 3:]) @ rest.R
         return State(x, R, q, v, motion.unwound(x, R, state.driven), t, state.dry, motion.shown(rest.shown, q, R))
 

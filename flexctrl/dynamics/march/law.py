@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Law", "Sampling", "enter_inputs", "enter_leg", "no_law", "obeyed", "said"]
 
-_AHEAD = 1024
+_AHEAD = 4096
 
 
 @dataclass
@@ -117,7 +117,7 @@ class Sampling:
         commands = found.kernel.n_out - found.states
         work, answer = np.zeros(n + found.states + len(found.clocks)), np.zeros(found.kernel.n_out)
         gather = np.concatenate([self.feed.reads, n + np.arange(found.states + len(found.clocks))])
-        run = self.backend.bind(found.kernel, gather[None], found.values[None], np.arange(answer.size)[None])
+        run = found.bound(self.backend, gather)
         self.law = Law(
             outputs=n,
             inputs=m,

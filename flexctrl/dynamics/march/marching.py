@@ -52,7 +52,7 @@ _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed
 _MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
-_CAPACITY = 1024
+_CAPACITY, _SHELF = 4096, 1024
 _BYTES = 16e6
 _SPARE = 2
 
@@ -420,7 +420,7 @@ def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
     state, part, probes = _state_width(F), components(F.model), probes_of(F, method.weight)
-    shelf = int(min(_CAPACITY, max(1, _BYTES // (8 * state))))
+    shelf = int(min(_SHELF, max(1, _BYTES // (8 * state))))
     return March(
         flat=flat,
         gauges=F.gauges,

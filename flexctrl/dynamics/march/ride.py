@@ -31,7 +31,7 @@ __all__ = ["ride"]
 _NEAR = 1e-9
 _SECONDS = 0.1
 _FIRST = 8
-_MORE = 32.0
+_MORE = 256.0
 _SHARE = 0.2
 
 
