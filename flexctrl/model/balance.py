@@ -142,7 +142,7 @@ class Balance:
         Under loads the round-off of stiff pieces may hide them, so that nothing may give way to it either.
         """
         force = self.force(state)
-        if self.astray(state) or (np.abs(force) > self._round_off(state)).any():
+        if self.astray(state) or (np.abs(force) > self.round_off(state)).any():
             return False
         return not self._loaded or self._way(state, force) <= _STILL
 
@@ -151,8 +151,8 @@ class Balance:
         """Whether loads or weights are at work."""
         return bool(self.u.any()) or any(isinstance(e, Gravity | RotatingFrame) for e in self.model.effects)
 
-    def _round_off(self, state: State) -> np.ndarray:
-        """The largest forces on the free coordinates that may be rounding alone."""
+    def round_off(self, state: State) -> np.ndarray:
+        """Return the largest forces on the free coordinates that may be rounding alone."""
         return force_rounding(self.model, state, self.u)[self.free]
 
     def holds(self, state: State, K: sp.csr_matrix) -> bool:
@@ -182,7 +182,7 @@ class Balance:
         return not self._loaded or self._way(state, force) <= max(tolerance, _UNFELT)
 
     def _beyond(self, state: State, force: np.ndarray) -> np.ndarray:
-        return np.asarray(force - np.clip(force, *np.outer((-1.0, 1.0), self._round_off(state))))
+        return np.asarray(force - np.clip(force, *np.outer((-1.0, 1.0), self.round_off(state))))
 
     def _way(self, state: State, force: np.ndarray) -> float:
         """How far forces move the machine were all masses held by what is at work: in radians or sizes of it."""

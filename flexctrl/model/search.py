@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,8 @@ _TARGET, _SETTLED = 1e-12, 1e-9
 _REACH = 1.0
 _CONTRACTION = 0.6
 _SMALLEST_PART, _JUMP = 1e-4, 30.0
+_FREE_MOTIONS, _DUST, _TOO_FAR = 6, 8.0, 0.1
+_SPREAD = 100.0
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class Newton:
         self.balance, self.tolerance, self.reach = balance, tolerance, reach
         self.mixed = balance.model.forces.mixed if balance.model.large else None
         self._plan: Plan | None = None
+        self._left = np.zeros(0)
 
     def run(self, start: State, most: int, shift: float = 0.0, watch: bool = False) -> Found:
         """Search from a start; a positive ``shift`` (1/s²) adds masses to K and fades as the forces do.
@@ -94,6 +98,9 @@ class Newton:
                 continue
             size = balance.moved(step)
             share = min(1.0, self.reach / size) if size > 0.0 else 1.0
+            if shift and share < _TOO_FAR:
+                shift = 10.0 * max(shift, floor)
+                continue
             there = self._after(here, step, share, scale)
             if not there.left <= 1e3 * max(here.left, self.tolerance):
                 if not shift:
@@ -117,6 +124,11 @@ class Newton:
             # round-off in stiff pieces may hide how much nearer the last state is
             done = balance.settled(here.state, self.tolerance)
             best, least = (here.state, balance.residual(here.state)) if done else (best, least)
+        if not done and small and shift and balance.residual(here.state) <= _SPREAD * self.tolerance:
+            # free motions may have carried what is left from where it is round-off to heavier places
+            self._step(balance.slope(here.state), here, shift)
+            done = balance.relative(self._left, scale) <= self.tolerance
+            best, least = (here.state, balance.residual(here.state)) if done else (best, least)
         return Found(best, least, iteration, done, steady, contracting)
 
     def _step(self, K: sp.csr_matrix, here: _Iterate, shift: float) -> np.ndarray:
@@ -131,8 +143,40 @@ class Newton:
         matrix = matrix.tocsr()
         if self._plan is None or not self._plan.fits(matrix):
             self._plan = plan(matrix)
-        step[balance.free] = factorise(matrix, self._plan)(force)
+        solve = factorise(matrix, self._plan)
+        found, self._left = self._without_drift(matrix, solve, force, here, shift) if shift else (solve(force), force)
+        step[balance.free] = found
         return step
+
+    def _without_drift(
+        self,
+        matrix: sp.csr_matrix,
+        solve: Callable[[np.ndarray], np.ndarray],
+        force: np.ndarray,
+        here: _Iterate,
+        shift: float,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The step and the force less free motions that only the rounding of the forces pushes, one after the other.
+
+        The smaller the shift that alone holds them, the farther they would go: a slewing crane turns for ever.
+        """
+        inertia = self.balance.inertia[self.balance.free]
+        step, unsure = solve(force), None
+        for _ in range(_FREE_MOTIONS):
+            free = step
+            for _ in range(2):
+                free = solve(inertia * free)
+                free = free / max(np.abs(free).max(initial=0.0), 1e-300)
+            held = inertia * free
+            if free @ (matrix @ free) > 2.0 * shift * (held @ free):
+                return step, force
+            unsure = self.balance.round_off(here.state) if unsure is None else unsure
+            work = float(force @ free)
+            if abs(work) > _DUST * (unsure @ np.abs(free)):
+                return step, force
+            force = force - held * (work / float(held @ free))
+            step = solve(force)
+        return step, force
 
     def _after(self, here: _Iterate, step: np.ndarray, share: float, scale: float) -> _Iterate:
         """The next iterate after a share of a step: stresses go the same share of their way."""
