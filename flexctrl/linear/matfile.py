@@ -12,13 +12,31 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import LinearizationError
+from flexctrl.errors import LinearizationError, did_you_mean
 from flexctrl.linear.model import LinearModel, PartMatrices
 
 __all__ = ["Units", "load_mat", "load_units", "save_mat"]
 
 FORMAT = "flexctrl linear model 1"
 EQUATIONS = "M q'' + C q' + K q = B u, y = Cq q + Cv q' + D u"
+
+
+KNOWN_UNITS: dict[str, dict[str, float]] = {
+    "length": {
+        "m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "km": 1e3, "in": 0.0254, "ft": 0.3048,
+    },
+    "mass": {
+        "kg": 1.0, "g": 1e-3, "mg": 1e-6, "ug": 1e-9, "µg": 1e-9, "t": 1e3, "Mg": 1e3, "kt": 1e6, "lb": 0.45359237,
+        "slug": 14.593902937206364, "slinch": 175.12683524647636,
+    },
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0},
+    "force": {
+        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "µN": 1e-6, "nN": 1e-9, "kN": 1e3, "MN": 1e6, "GN": 1e9, "dyn": 1e-5,
+        "pdl": 0.138254954376, "lbf": 4.4482216152605, "kip": 4448.2216152605,
+    },
+    "angle": {"rad": 1.0},
+}  # fmt: skip
+"""Names of units by kind, and their sizes in SI."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +48,12 @@ class Units:
     length, mass, time, force : str
         Consistent ones: force = mass · length/time², e.g. ``Units("mm", "t", "s", "N")``.
     angle : str
+        ``"rad"``.
+
+    Raises
+    ------
+    LinearizationError
+        For a name that is no unit, or a force that is not that of the others.
     """
 
     length: str = "m"
@@ -39,10 +63,17 @@ class Units:
     angle: str = "rad"
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name = getattr(self, field.name)
-            if not isinstance(name, str) or not name or set(name) & {",", ";", ":"} or name != name.strip():
-                raise LinearizationError(f"Units: {field.name} = {name!r}; give the name of a unit, e.g. 'mm'")
+        for kind, known in KNOWN_UNITS.items():
+            name = getattr(self, kind)
+            if not isinstance(name, str) or name not in known:
+                hint = did_you_mean(name, known) if isinstance(name, str) else f"; known: {', '.join(known)}"
+                raise LinearizationError(f"Units: {kind} = {name!r} is no unit of {kind}{hint}")
+        length, mass, time, force = (KNOWN_UNITS[kind][getattr(self, kind)] for kind in KNOWN_UNITS if kind != "angle")
+        if abs(force / (mass * length / time**2) - 1.0) > 1e-6:
+            raise LinearizationError(
+                f"Units: {self.force} is not {self.mass}·{self.length}/{self.time}², so M q̈ and K q would not add; "
+                "give consistent units, e.g. Units('mm', 't', 's', 'N')"
+            )
 
     def __str__(self) -> str:
         return ", ".join(f"{field.name} {getattr(self, field.name)}" for field in fields(self))
@@ -63,6 +94,11 @@ def save_mat(linear: LinearModel, path: str | Path, units: Units = SI) -> None:
     path : str or pathlib.Path
     units : Units
         What the model's numbers are in, if the machine was not described in SI units.
+
+    Raises
+    ------
+    LinearizationError
+        If the file cannot be written there, or the units are none.
     """
     from scipy.io import savemat
 
@@ -80,7 +116,13 @@ def save_mat(linear: LinearModel, path: str | Path, units: Units = SI) -> None:
         "part_stiffness": _cell([_sparse(linear.parts[name].stiffness) for name in names]),
         "part_mass": _cell([_sparse(linear.parts[name].mass) for name in names]),
     }
-    savemat(str(path), content, format="5", oned_as="column")
+    try:
+        savemat(str(path), content, format="5", oned_as="column")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise LinearizationError(
+            f"save_mat: {path} cannot be written ({reason}); give a file in a folder that exists"
+        ) from error
 
 
 def load_mat(path: str | Path) -> LinearModel:

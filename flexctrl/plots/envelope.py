@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from flexctrl.errors import StructureError
 from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
 from flexctrl.study.envelope import Envelope
 
@@ -45,7 +46,16 @@ def plot_envelope(envelope: Envelope, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Raises
+    ------
+    StructureError
+        For something else than one envelope.
     """
+    if not isinstance(envelope, Envelope):
+        raise StructureError(
+            f"plot_envelope: {envelope!r} is no envelope; give one from validity_envelope, each with its own ax"
+        )
     ax = new_figure(6.0, 4.0).subplots() if ax is None else ax
     finite = [tried for tried in envelope.trials if np.isfinite(tried.error) and tried.error > 0.0]
     ax.loglog([x.amplitude for x in finite], [100.0 * x.error for x in finite], "o-", color=FLEXIBLE, markersize=3)

@@ -86,7 +86,7 @@ def plot_nyquist(
     ax.add_patch(Circle((0, 0), 1.0, fill=False, color=PALE, linewidth=1.0))
     if margins is not None:
         ax.add_patch(Circle((-1, 0), margins.modulus.value, fill=False, color=INK, linewidth=0.9, linestyle="--"))
-    shown = by_label(loops, "loop")
+    shown = by_label(loops, "loop", Loop)
     for number, (label, loop) in enumerate(shown.items()):
         values = loop_grid(loop)[1]
         ax.plot(values.real, values.imag, label=label, **line_style(number))
@@ -118,7 +118,7 @@ def plot_nichols(
     """
     ax = new_figure(6.4, 5.6).subplots() if ax is None else ax
     seen = [np.array([-180.0])]
-    shown = by_label(loops, "loop")
+    shown = by_label(loops, "loop", Loop)
     for number, (label, loop) in enumerate(shown.items()):
         values = loop_grid(loop)[1]
         size, angle = _decibel(values), degrees(values)
@@ -169,7 +169,7 @@ def plot_sensitivities(
     matplotlib.axes.Axes
     """
     ax = new_figure(6.4, 4.0).subplots() if ax is None else ax
-    shown = by_label(loops, "loop")
+    shown = by_label(loops, "loop", Loop)
     for number, (label, loop) in enumerate(shown.items()):
         omega, L = loop_grid(loop)
         prefix = f"{label}: " if len(shown) > 1 else ""

@@ -44,7 +44,7 @@ def plot_root_locus(
     matplotlib.axes.Axes
     """
     ax = new_figure(7.0, 5.6).subplots() if ax is None else ax
-    several = by_label(loci, "locus")
+    several = by_label(loci, "locus", RootLocus)
     shown = {label: locus.in_s() for label, locus in several.items()}
     for number, (label, locus) in enumerate(shown.items()):
         color = CYCLE[number % len(CYCLE)]

@@ -24,13 +24,15 @@ CYCLE = ("#1d4ed8", "#d9480f", "#3f7d58", "#7048a8", "#d4a106", "#22a7a0", "#d63
 """Line colours in order."""
 
 
-def by_label(given: Mapping[str, T] | T, kind: str) -> Mapping[str, T]:
+def by_label(given: Mapping[str, T] | T, kind: str, of: type | tuple[type, ...] = object) -> Mapping[str, T]:
     """Return what is to be drawn by label; one alone bears its own name, or that of its kind.
 
     Parameters
     ----------
     given : mapping of str to object, or object
     kind : str
+    of : type or tuple of types
+        What each of them is to be.
 
     Returns
     -------
@@ -39,11 +41,14 @@ def by_label(given: Mapping[str, T] | T, kind: str) -> Mapping[str, T]:
     Raises
     ------
     StructureError
-        For a list, or nothing at all.
+        For a list, nothing at all, or something of another type.
     """
     if isinstance(given, Mapping) and given:
+        for label, one in given.items():
+            if not isinstance(one, of):
+                raise StructureError(f"{label!r} is drawn as a {kind}, and is {one!r}; expected a {kind}")
         return given
-    if isinstance(given, Mapping | list | tuple) or given is None:
+    if isinstance(given, Mapping | list | tuple) or given is None or not isinstance(given, of):
         raise StructureError(
             f"nothing to draw by label in {given!r}; expected one {kind}, or a mapping of label to {kind}"
         )

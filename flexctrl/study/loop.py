@@ -244,6 +244,7 @@ class _Path:
 
     @classmethod
     def of_lti(cls, system: Any, input: str, output: str) -> _Path:
+        _refuse_unspecified(system, "plant")
         i = system.input_labels.index(_only(input, tuple(system.input_labels), "input"))
         j = system.output_labels.index(_only(output, tuple(system.output_labels), "output"))
         return cls.of_states(system.A, system.B[:, [i]], system.C[[j]], system.D[j : j + 1, i : i + 1], system.dt)
@@ -260,8 +261,14 @@ class _Path:
         import control
 
         if not isinstance(controller, control.LTI):
+            if not isinstance(controller, int | float | np.number) or not np.isfinite(controller):
+                raise StructureError(
+                    f"open_loop: controller = {controller!r}; expected a transfer function or state space of "
+                    "python-control, or a finite number (1.0 for the plant alone)"
+                )
             gain = np.array([[float(controller)]])
             return cls.of_states(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), gain, 0.0)
+        _refuse_unspecified(controller, "controller")
         if controller.ninputs != 1 or controller.noutputs != 1:
             raise StructureError("a loop is closed with one signal: give a controller with one input and one output")
         if isinstance(controller, control.TransferFunction):
@@ -287,6 +294,14 @@ class _Path:
             curve=lambda s: path.curve(s) + slope * s,
             find_zeros=lambda: np.roots(num),
             derivative=slope,
+        )
+
+
+def _refuse_unspecified(system: control.LTI, what: str) -> None:
+    if system.dt is True:
+        raise StructureError(
+            f"open_loop: the {what} is sampled with an unspecified sample time (dt=True): give it in seconds, "
+            "for example dt=0.01"
         )
 
 

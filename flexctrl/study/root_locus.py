@@ -179,7 +179,14 @@ def critical_gains(loop: Loop, locus: RootLocus | None = None) -> tuple[Critical
     -------
     tuple of CriticalGain
         One for each conjugate pair or real pole that crosses.
+
+    Raises
+    ------
+    StructureError
+        For a locus that is none.
     """
+    if locus is not None and not isinstance(locus, RootLocus):
+        raise StructureError(f"critical_gains: locus = {locus!r}; expected what root_locus(loop) returns, or nothing")
     locus = root_locus(loop) if locus is None else locus
     outside = _depth(locus.loci, loop.dt)
     # poles of an undamped machine run along the boundary and only tremble by their rounding
@@ -197,7 +204,13 @@ def critical_gains(loop: Loop, locus: RootLocus | None = None) -> tuple[Critical
 
 
 def _checked(gains: Sequence[float] | np.ndarray) -> np.ndarray:
-    k = np.asarray(gains, float)
+    try:
+        k = np.asarray(gains, float)
+    except (TypeError, ValueError) as error:
+        raise StructureError(
+            f"root_locus: gains = {gains!r}; expected ascending real numbers, e.g. [0.1, 1.0] (a complex gain is "
+            "a phase: put it into the controller)"
+        ) from error
     if k.ndim != 1 or not np.isfinite(k).all() or (k < 0).any() or (np.diff(k) <= 0).any():
         raise StructureError("gains must be ascending, finite and not negative")
     return k

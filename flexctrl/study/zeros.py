@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
-from flexctrl.errors import LinearizationError
+from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import unsymmetric
 from flexctrl.study.channel import Quadruple, channel_states
@@ -240,7 +240,11 @@ def sensor_choices(linear: LinearModel, below: float = np.inf) -> tuple[SensorCh
     ------
     LinearizationError
         If modes looked at flutter: their residues have no sign.
+    StructureError
+        If ``below`` is no positive number.
     """
+    if not isinstance(below, int | float | np.number) or not below > 0.0:
+        raise StructureError(f"sensor_choices: below = {below!r}; expected a positive angular frequency in rad/s")
     condensed = linear.condense()
     omega, right, left = _two_sided(condensed) if unsymmetric(condensed) else _one_sided(condensed)
     seen = omega <= below

@@ -55,8 +55,13 @@ class MomentMatching:
         Raises
         ------
         ReductionError
-            If the order holds no more than the rigid-body modes, or a point is a pole.
+            If the order holds no more than the rigid-body modes, a point is a pole, or the model has no signals.
         """
+        if not full.inputs and not full.outputs:
+            raise ReductionError(
+                "MomentMatching matches the response, and the model has neither inputs nor outputs: give the structure "
+                "some, or use ModalTruncation"
+            )
         rigid = rigid_basis(full)
         r = rigid.shape[1]
         if self.order <= r or not self.points:
