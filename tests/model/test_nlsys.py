@@ -279,3 +279,35 @@ def test_stiff_machines_run_with_an_implicit_method():
     )
     run = fc.simulate(model, until=1.0, start=rest.state, inputs={"push": 4.0}, tolerance=FINE, every=0.1)
     np.testing.assert_allclose(found.outputs.T, run.y, atol=1e-4)
+
+
+@pytest.mark.parametrize(("fast", "saved"), [(2e4, 5.0), (20.0, 0.5)])
+def test_the_integrator_fits_the_stiffest_motion(fast, saved):
+    """Two oscillators, a slow one under held samples and a fast one hardly touched: exact by the matrix exponential."""
+    from scipy.integrate import RK45
+    from scipy.linalg import expm
+
+    A = np.kron(np.diag([1.0, 0.0]), [[0.0, 1.0], [-9.0, -0.1]]) + np.kron(
+        np.diag([0.0, 1.0]), [[0.0, fast], [-fast, -0.2 * fast]]
+    )
+    B = np.array([[0.0], [1.0], [0.0], [1e-3]])
+    calls = [0]
+
+    def rate(t, x, u, params):
+        calls[0] += 1
+        return A @ x + B @ np.atleast_1d(u)
+
+    plant = ct.nlsys(rate, lambda t, x, u, params: x[:1], inputs=["u"], outputs=["y"], states=4)
+    law = ct.ss([], [], [], [[-2.0]], 0.05, inputs=["y"], outputs=["u"])
+    begin = np.array([1.0, 0.0, 0.0, 0.0])
+    step = expm(0.05 * np.block([[A, B], [np.zeros((1, 5))]]))
+    x = begin
+    for _ in range(10):
+        x = (step @ np.append(x, -2.0 * x[0]))[:4]
+    counts = []
+    for method in (None, RK45):
+        calls[0] = 0
+        found = sampled_response(plant, law, until=0.5, initial_state=begin, method=method)
+        np.testing.assert_allclose(found.states[:2, -1], x[:2], atol=1e-5)
+        counts.append(calls[0])
+    assert counts[1] > saved * counts[0]
