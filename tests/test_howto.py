@@ -25,6 +25,7 @@ PAGES_RUN = (
     "hoisting",
     "travelling",
     "long_runs",
+    "integrators",
 )
 BLOCK = re.compile(r"^```python\n(?P<code>.*?)^```$(?:\n\n```text\n(?P<shown>.*?)^```$)?", re.DOTALL | re.MULTILINE)
 

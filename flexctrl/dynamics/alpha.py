@@ -32,6 +32,7 @@ _TURNED = 0.02
 _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
+_LAST, _ROUND_OFF = 1e-15, 1e-13
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,8 @@ class Stepper:
             contraction = size / last if np.isfinite(last) else 0.0
             if not np.isfinite(size) or (contraction > 2.0 and iteration > 3) or self._astray(step - foreseen):
                 break
-            if size <= self.tolerance or (0.0 < contraction < 1.0 and size * contraction <= 0.5 * self.tolerance):
+            foretold = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * self.tolerance
+            if size <= self.tolerance or foretold or (contraction > _POOR and size <= _ROUND_OFF):
                 return self._finish(point, h, step, v, rate, worst)
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
@@ -312,7 +314,7 @@ class GeneralizedAlpha:
         return Fixed(self.step)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
-        newton = min(1e-6, max(1e-3 * tolerance.absolute, 1e-13))
+        newton = min(1e-6, max(1e-3 * tolerance.absolute, _LAST))
         return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
 
 
@@ -361,7 +363,7 @@ class AdaptiveAlpha:
         return Controlled(self.first_step, self.largest_step, steepness=3)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
-        newton = min(1e-8, max(1e-3 * tolerance.absolute, 1e-13))
+        newton = min(1e-8, max(1e-3 * tolerance.absolute, _LAST))
         return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
 
 

@@ -29,8 +29,8 @@ from flexctrl.model.state import State
 
 __all__ = ["Richardson"]
 
-_TIGHT = 1e-10
-"""What is left open by Newton's method must not show in the difference of two runs."""
+_TIGHT = 1e-12
+"""What Newton's method leaves open must not show in the difference of two runs: undamped, it adds up."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.midpoint import ConservingMidpoint
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Joining, Mark, Point, StepError, Stepper
@@ -144,14 +145,24 @@ class Journey:
                 where = f"at t = {self.point.state.t:.6g} s; look at the commands and at the start"
                 raise StepError(self.stepper.counts.worst, f"energies are beyond all numbers {where}")
             if nonsense := self.books.nonsense:
-                fixed = isinstance(self.plan.method.pace, Fixed)
-                remedy = "take smaller steps, or AdaptiveAlpha" if fixed else "give a smaller Tolerance"
-                where = f"at t = {self.point.state.t:.6g} s; {remedy}"
+                where = f"at t = {self.point.state.t:.6g} s; {self._remedy}"
                 raise StepError(self.stepper.counts.worst, f"{nonsense} {where}")
             if (now := time.perf_counter()) - self._told > 0.1:
                 self._told = now
                 self._report(now)
             interruption.check()
+
+    @property
+    def _remedy(self) -> str:
+        """What to do where steps of this length make energy."""
+        pace, method = self.plan.method.pace, self.plan.method
+        if not isinstance(pace, Fixed):
+            return "give a smaller Tolerance"
+        smaller = f"take steps smaller than {pace.step:g} s, or AdaptiveAlpha, which finds them"
+        motion, switches = self.plan.model.motion, self.plan.model.switches
+        if isinstance(method, ConservingMidpoint) or motion.flows.size or switches.names:
+            return smaller
+        return f"{smaller}, or ConservingMidpoint({pace.step:g}), which keeps energies of springs in such steps"
 
     def _report(self, now: float) -> None:
         self.plan.tell(self.point.state.t / self.plan.until)
@@ -228,10 +239,11 @@ class Journey:
         """A step of fixed length; where it does not converge, in halves."""
         try:
             after = self.stepper.step(self.point, h)
-        except StepError:
+        except StepError as failure:
             self.mark.rejected += 1
             if h < 2e-3 * self.mark.size or h < SMALLEST:
-                raise
+                why = f"{failure}, nor with any longer one up to {self.mark.size:.3g} s; take AdaptiveAlpha"
+                raise StepError(failure.worst, why) from failure
             return self._halved(h, stop)
         try:
             self._accept(after, stop)

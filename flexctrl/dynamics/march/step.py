@@ -23,6 +23,8 @@ _ASTRAY = 1.5
 _ITERATIONS = 12
 _TRUSTED = 8
 _HABIT = 0.002
+_ROUND_OFF = 1e-13
+"""Corrections below this that do not shrink any more are round-off."""
 
 
 def step(m: March) -> int:
@@ -167,7 +169,7 @@ def converged(m: March, size: float) -> bool:
     if m.contraction > 0.0:
         m.habit = max(m.contraction, max(m.habit, _HABIT))
         m.trusted = 0
-    if size <= m.tolerance:
+    if size <= m.tolerance or (m.contraction > _POOR and size <= _ROUND_OFF):
         return True
     if m.contraction > 0.0:
         return m.contraction < 1.0 and size * m.contraction <= 0.5 * m.tolerance
