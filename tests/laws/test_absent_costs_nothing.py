@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.effects.effect import Effect
 
 TUBE = fc.Section.tube(fc.STEEL, radius=0.05, thickness=0.004)
 
@@ -51,6 +52,12 @@ ADDED = [
     (fc.RopeMass(), 4, {"heavy_rope"}),
     (fc.RayleighDamping(alpha=0.1), 0, {"rigid_beam", "point", "rotary_drive"}),
     (fc.RotatingFrame((0.0, 0.0, 1.0)), 0, {"rigid_beam", "point"}),
+    (fc.ViscousFriction({"motor": 0.05}), 0, {"viscous_motor"}),
+    (fc.CoulombFriction({"motor": 0.05}), 0, {"dry_motor"}),
+    (fc.LuGreFriction({"motor": fc.LuGre(1e3, 0.05)}), 1, {"lugre_motor"}),
+    (fc.MotorLag({"motor": 0.05}), 1, {"motor_lag"}),
+    (fc.Backlash({"motor": 1e-3}), 0, set()),  # a rigid shaft has no spring to let go
+    (fc.ModalDamping(0.01), 0, set()),  # a matrix beside the kernels
 ]
 
 
@@ -61,6 +68,41 @@ def test_an_effect_adds_to_what_it_acts_on_and_to_nothing_else(effect, freedoms,
     assert more - n == freedoms
     grown = {kind for kind in after if after[kind] != before.get(kind, 0)}
     assert grown == touched
+
+
+def test_every_effect_there_is_is_counted():
+    """One that is added to the library is to be added here."""
+    known = {type(effect) for effect, _, _ in ADDED} | {type(e) for e in BARE}
+    composed = {fc.Flexible, fc.GeometricStiffness, fc.Automatic}  # of others; instead of another; a choice
+    public = {getattr(fc, name) for name in fc.__all__}
+    effects = {kind for kind in public if isinstance(kind, type) and issubclass(kind, Effect) and kind is not Effect}
+    assert effects - known - composed - {fc.RopeStretch} == set()
+
+
+def test_backlash_takes_the_place_of_a_spring():
+    n, _, before = counted(machine(), [*BARE, fc.ShaftElasticity()])
+    more, _, after = counted(machine(), [*BARE, fc.ShaftElasticity(), fc.Backlash({"motor": 1e-3})])
+    assert more == n
+    assert set(before) - set(after) == {"rotary_drive"}
+    assert set(after) - set(before) == {"loose_rotary"}
+    assert all(after[kind] == before[kind] for kind in set(after) & set(before))
+
+
+@pytest.mark.parametrize("stretches", [False, True])
+def test_a_winch_costs_itself_and_nothing_else(stretches):
+    """A hoist beside a boom: what either is made of alone."""
+    crab, hook = fc.PointMass("crab", (0, 1, 5), 10.0), fc.PointMass("hook", (0, 1, 3), 4.0)
+    winch = fc.Winch("winch", hook.node, crab.node, EA=1e5, radius=0.1, ratio=2.0, inertia=0.02)
+    effects = [*BARE, fc.Gravity(), *([fc.RopeStretch()] if stretches else [])]
+    alone = counted(fc.Structure([crab, hook], [fc.Support(crab.node)], [winch]), effects)
+    boom = machine(drives=False)
+    both = boom.with_(
+        elements=[*boom.elements, crab, hook], joints=[*boom.joints, fc.Support(crab.node)], drives=[winch]
+    )
+    n, nonzeros, kinds = counted(boom, effects)
+    n2, nonzeros2, kinds2 = counted(both, effects)
+    assert (n2, nonzeros2) == (n + alone[0], nonzeros + alone[1])
+    assert kinds2 == {kind: kinds.get(kind, 0) + alone[2].get(kind, 0) for kind in kinds | alone[2]}
 
 
 @pytest.mark.parametrize(
@@ -100,3 +142,4 @@ def test_zero_strength_is_absence():
     assert counted(machine(), effects) == counted(machine(), [*effects, fc.RayleighDamping(0.0, 0.0)])
     assert counted(machine(), effects) == counted(machine(), [*effects, fc.Backlash({"motor": 0.0})])
     assert counted(machine(), effects) == counted(machine(), [*effects, fc.Wind({"load": 0.0}, (10, 0, 0))])
+    assert counted(machine(), effects) == counted(machine(), [*effects, fc.ViscousFriction({"motor": 0.0})])

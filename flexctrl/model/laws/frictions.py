@@ -45,7 +45,7 @@ def friction_families(structure: Structure, effects: Sequence[Effect]) -> tuple[
     inner = len(structure.drives)
     for effect in effects:
         if isinstance(effect, ViscousFriction):
-            found += _rubbing(structure, "viscous", [(w, [c]) for w, c in effect.coefficients], None)
+            found += _rubbing(structure, "viscous", [(w, [c]) for w, c in effect.coefficients if c], None)
         elif isinstance(effect, CoulombFriction):
             found += _rubbing(structure, "dry", [(w, _dry(law)) for w, law in effect.laws], inner)
         elif isinstance(effect, LuGreFriction):
