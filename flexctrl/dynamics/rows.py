@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.frames import Frames
 from flexctrl.dynamics.record import Recorder
 from flexctrl.dynamics.steps import Fixed, Pace, Point
 from flexctrl.model.state import State
@@ -44,7 +45,7 @@ class Rows:
     recorder: Recorder
     curve: Callable[[Point, Point], Curve]
     count: int = 0
-    frames: list[State] = field(default_factory=list)
+    frames: Frames = field(default_factory=Frames)
 
     def here(self, point: Point, slack: float) -> None:
         """Write the row of a point, if one is due within some slack."""
@@ -63,7 +64,7 @@ class Rows:
         if not to_jump:
             self.here(after, near)
 
-    def among(self, start: State, times: np.ndarray, states: list[State], supply: Supply, to_jump: bool) -> None:
+    def among(self, start: State, times: np.ndarray, states: Sequence[State], supply: Supply, to_jump: bool) -> None:
         """Write the rows within many steps."""
         kept, near = len(times) - to_jump, _near(times[-1], times[0] - start.t)
         assert self.every is not None
@@ -86,14 +87,14 @@ class Rows:
     def due(self) -> tuple[float, float]:
         """Return when the next state for drawing is due, and their spacing."""
         spacing = self.until / _FRAMES * (1 - _NEAR)
-        return (self.frames[-1].t + spacing if self.frames else 0.0), spacing
+        return (self.frames.last + spacing if self.frames else 0.0), spacing
 
-    def ridden(self, start: State, table: np.ndarray, states: list[State], supply: Supply, to_jump: bool) -> None:
+    def ridden(self, start: State, table: np.ndarray, states: Sequence[State], supply: Supply, to_jump: bool) -> None:
         """Write the rows of many steps: times and outputs, and all states or those due for drawing."""
         times, kept = table[:, 0], len(table) - to_jump
         if self.every is not None and len(states) == len(table):
             return self.among(start, times, states, supply, to_jump)
-        self.frames += states
+        self.frames.take(states)
         chosen = table[:kept]
         if self.every is not None:
             near = _near(times[-1], times[0] - start.t)
@@ -103,7 +104,7 @@ class Rows:
         self.count += len(chosen)
         self.recorder.rows(chosen, supply.u)
 
-    def sampled(self, table: np.ndarray, commands: np.ndarray, states: list[State], slack: float) -> None:
+    def sampled(self, table: np.ndarray, commands: np.ndarray, states: Sequence[State], slack: float) -> None:
         """Write the rows of many steps with inputs of their own, and keep the states due for drawing."""
         if self.every is not None:
             times = table[:, 0]
@@ -113,7 +114,7 @@ class Rows:
             if len(states) == len(table):
                 states = [states[i] for i in chosen]
             table, commands = table[chosen], commands[chosen]
-        self.frames += states
+        self.frames.take(states)
         self.count += len(table)
         self.recorder.rows(table, commands)
 
@@ -139,7 +140,7 @@ class Rows:
 
     def frame(self, state: State) -> None:
         """Keep a state for drawing, if one is due."""
-        if not self.frames or state.t >= self.frames[-1].t + self.until / _FRAMES * (1 - 1e-9):
+        if not self.frames or state.t >= self.frames.last + self.until / _FRAMES * (1 - 1e-9):
             self.frames.append(state)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -198,7 +198,7 @@ class Run:
     u : numpy.ndarray, shape (m, inputs)
         Inputs in force from each instant on.
     final : State
-    frames : tuple of State
+    frames : sequence of State
         Some states along the way, evenly spread, for drawing.
     status : Status
     report : Report
@@ -219,7 +219,7 @@ class Run:
     y: np.ndarray
     u: np.ndarray
     final: State
-    frames: tuple[State, ...]
+    frames: Sequence[State] = field(repr=False)
     status: Status
     report: Report
     name: str

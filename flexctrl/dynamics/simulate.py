@@ -106,8 +106,9 @@ def simulate(
     if isinstance(model, LinearModel):
         plant, method = _plant(model, method, every or until / _ROWS)
         model = cast(Model, plant)
-    elif isinstance(start, State):
+    elif isinstance(start, State) and model.__dict__.get("_begun") is not start:
         check_state(model, start, "simulate: start")
+        model.__dict__["_begun"] = start
     feed = feed_of(model, controller, _base(model, start, inputs))
     spacing = every if record.every is None else record.every
     tell = progress or _untold
@@ -244,7 +245,7 @@ def _result(journey: Journey) -> Run:
         rows[:, 1 : 1 + width],
         rows[:, 1 + width :],
         state,
-        tuple(journey.rows.frames),
+        journey.rows.frames,
         journey.status,
         _report(journey),
         plan.model.structure.name,

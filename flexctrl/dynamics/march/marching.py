@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
 from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.frames import Later
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.law import Sampling, no_law
@@ -392,23 +394,27 @@ class Marcher:
             return SINGULAR
         return self._do(task)
 
-    def states(self) -> list[State]:
-        """Return the states kept in the last call."""
-        F, f, count = self.flattened, self.flattened.flat, self.march.kept
+    def states(self) -> Sequence[State]:
+        """Return the states kept in the last call; they are made when one is looked at."""
+        count, width = self.march.kept, self._state_width
         if not count:
-            return []
-        n, nodes, width = f.n, 12 * f.nodes, self._state_width
-        table = self.march.states[: count * width].reshape(count, width)
-        poses = table[:, :nodes].reshape(count, -1, 12)
-        x, R = poses[:, :, :3].copy(), poses[:, :, 3:].copy()
-        q, v = np.empty((2, count, n))
-        q[:, F.plan.order] = table[:, nodes : nodes + n]
-        v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
-        driven, shown = np.split(table[:, nodes + 2 * f.padded : width - 1].copy(), [f.drives], axis=1)
-        t = table[:, width - 1].tolist()
-        R = R.reshape(count, -1, 3, 3)
-        dry = self.model.rest.dry
-        return [State(x[i], R[i], q[i], v[i], driven[i], t[i], dry, shown[i]) for i in range(count)]
+            return ()
+        table = self.march.states[: count * width].reshape(count, width).copy()
+        return Later(count, float(table[-1, -1]), partial(_states, self.flattened, table))
+
+
+def _states(F: Flattened, table: np.ndarray) -> list[State]:
+    """The states that loops have written down, row by row."""
+    f, count, width = F.flat, *table.shape
+    n, nodes = f.n, 12 * f.nodes
+    poses = table[:, :nodes].reshape(count, -1, 12)
+    x, R = poses[:, :, :3].copy(), poses[:, :, 3:].copy().reshape(count, -1, 3, 3)
+    q, v = np.empty((2, count, n))
+    q[:, F.plan.order] = table[:, nodes : nodes + n]
+    v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
+    driven, shown = np.split(table[:, nodes + 2 * f.padded : width - 1].copy(), [f.drives], axis=1)
+    t, dry = table[:, width - 1].tolist(), F.model.rest.dry
+    return [State(x[i], R[i], q[i], v[i], driven[i], t[i], dry, shown[i]) for i in range(count)]
 
 
 def _state_width(F: Flattened) -> int:

@@ -1,0 +1,80 @@
+"""Sequences of states that are made when they are looked at: most runs are never drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import overload
+
+from flexctrl.model.state import State
+
+__all__ = ["Frames", "Later"]
+
+
+class _Made(Sequence[State]):
+    """States of which nothing but their number is known before one of them is looked at."""
+
+    @cached_property
+    def _states(self) -> list[State]:
+        raise NotImplementedError
+
+    @overload
+    def __getitem__(self, at: int) -> State: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> list[State]: ...
+
+    def __getitem__(self, at: int | slice) -> State | list[State]:
+        return self._states[at]
+
+    def __iter__(self) -> Iterator[State]:
+        return iter(self._states)
+
+
+class Later(_Made):
+    """States still to be made.
+
+    Parameters
+    ----------
+    count : int
+    last : float
+        Time of the last one [s].
+    make : callable
+        Makes them all.
+    """
+
+    def __init__(self, count: int, last: float, make: Callable[[], list[State]]) -> None:
+        self.size, self.last, self.make = count, last, make
+
+    def __len__(self) -> int:
+        return self.size
+
+    @cached_property
+    def _states(self) -> list[State]:
+        return self.make()
+
+
+class Frames(_Made):
+    """Some states of a run, in parts."""
+
+    def __init__(self) -> None:
+        self.parts: list[Sequence[State]] = []
+        self.last = -float("inf")
+
+    def append(self, state: State) -> None:
+        """Take up a state."""
+        self.take((state,))
+
+    def take(self, states: Sequence[State]) -> None:
+        """Take up states."""
+        if len(states):
+            self.parts.append(states)
+            self.last = states.last if isinstance(states, Later) else states[-1].t
+            self.__dict__.pop("_states", None)
+
+    def __len__(self) -> int:
+        return sum(map(len, self.parts))
+
+    @cached_property
+    def _states(self) -> list[State]:
+        return [state for part in self.parts for state in part]
