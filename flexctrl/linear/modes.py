@@ -361,7 +361,8 @@ def _sharpened(K: sp.csc_matrix, M: sp.csc_matrix, pairs: Eigenpairs) -> Eigenpa
     """Soft λ, which the rounding of φᵀ K φ blurs, as Rayleigh quotients with that in extended precision.
 
     The error of the vectors, which have an M-length of one, is in them squared (B. N. Parlett, The Symmetric
-    Eigenvalue Problem, 1998, § 4.6).
+    Eigenvalue Problem, 1998, § 4.6). In φᵀ M φ little cancels: the double sum has fourteen digits on meshes where
+    that of φᵀ K φ has none.
     """
     soft = ~pairs.rigid & (pairs.noise > BLURRED * np.abs(pairs.values))
     if not soft.any():

@@ -35,8 +35,11 @@ class PhysicalForm:
 
     For state feedback on physical coordinates; accurate only for small models. The double poles at 0 of rigid-body
     motion come out at ± the root of rounding, 1e-5 … 1e-3 rad/s for a steel frame, some of them on the unstable side:
-    no form in coordinates that hold both rigid and elastic motion can say 0 in floating point. `ModalForm` (the
-    default) separates them exactly.
+    no form in coordinates that hold both rigid and elastic motion can say 0 in floating point. An eigenvalue solver
+    answers for a matrix ε‖A‖ away (N. J. Higham, Accuracy and Stability, 2002, § 1.18), and a double zero moves by the
+    root of that: about √ε ω_max, however the states are scaled and even where A times the rigid motion is 0 to the
+    last bit. Free chains of 5 to 60 equal masses with such an A give 1e-5 rad/s for ω_max = 2·10³ and 1e-3 for
+    2.6·10⁵, scaled or not. `ModalForm` (the default) separates these poles exactly.
     """
 
 

@@ -12,6 +12,7 @@ from fixtures import structures as s
 from fixtures.random_models import dense_response
 
 from flexctrl.errors import LinearizationError
+from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import ModalForm, PhysicalForm
 
 needs_slycot = pytest.mark.skipif(not control.slycot_check(), reason="slycot is not installed")
@@ -156,3 +157,21 @@ def test_sparse_poles_of_a_free_chain_with_a_grounded_damper():
     for _ in range(n - 1):
         stiffness = stiffness / (1 + stiffness) + z * z
     assert abs(stiffness + 0.7 * z) < 1e-7 * abs(0.7 * z)
+
+
+@pytest.mark.parametrize("stiffness", [2.0**20, 2.0**34])
+@pytest.mark.parametrize("masses", [5, 60])
+def test_no_physical_form_says_zero_where_the_modal_form_does(masses, stiffness):
+    """A r = 0 to the last bit for the free motion r of a chain, and its double pole splits by the root of ε."""
+    K = stiffness * (2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1))
+    K[0, 0] = K[-1, -1] = stiffness
+    names = tuple(f"x{i}" for i in range(masses))
+    push, seen = np.eye(masses)[:, :1], np.eye(masses)[-1:]
+    none = 0.0 * seen, np.zeros((1, 1))
+    free = LinearModel(np.eye(masses), 0.0 * K, K, push, seen, *none, names, ("u",), ("y",))
+    physical, fastest = free.to_ss(PhysicalForm()), 2.0 * np.sqrt(stiffness)
+    moved = physical.A @ np.concatenate([np.ones(masses), np.zeros(masses)])
+    assert not moved.any()
+    assert 1e-9 < np.sort(np.abs(np.linalg.eigvals(physical.A)))[0] / fastest < 1e-7
+    assert (free.damped_poles()[:2] == 0.0).all()
+    assert np.sort(np.abs(np.linalg.eigvals(free.to_ss().A)))[1] == 0.0

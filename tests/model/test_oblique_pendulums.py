@@ -51,3 +51,17 @@ def test_a_swing_lost_in_rounding_is_refused_with_its_remedy():
     machine = fc.planar(fc.Structure([rod, bob], [fc.Support(rod.start, "u v w"), fc.Pin(rod.end, bob.node)]), "y")
     with pytest.raises(LinearizationError, match=r"lost in the rounding.*fewer elements, or a rigid part"):
         fc.linearize(fc.assemble(machine, EFFECTS))
+
+
+@pytest.mark.parametrize("elements", [60, 250])
+def test_the_kinetic_energy_of_its_modes_keeps_its_digits_in_double(elements):
+    """Where φᵀ K φ has none left; both sums against extended precision."""
+    linear = fc.linearize(fc.assemble(pendulum(0.6435, elements), EFFECTS))
+    slowest = linear.modes(1).shapes[:, 0]
+    lost = []
+    for A in (linear.M.tocoo(), linear.K.tocoo()):
+        terms = slowest.astype(np.longdouble)[A.row] * A.data * slowest[A.col]
+        exact = float(terms.sum())
+        lost.append(abs(float(slowest @ (A @ slowest)) - exact) / abs(exact))
+    assert lost[0] < 1e-13
+    assert lost[1] > 1e4 * lost[0]
