@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import overload
@@ -14,9 +15,13 @@ __all__ = ["Frames", "Later"]
 class _Made(Sequence[State]):
     """States of which nothing but their number is known before one of them is looked at."""
 
+    @abstractmethod
+    def made(self) -> list[State]:
+        """Make them."""
+
     @cached_property
     def _states(self) -> list[State]:
-        raise NotImplementedError
+        return self.made()
 
     @overload
     def __getitem__(self, at: int) -> State: ...
@@ -49,8 +54,8 @@ class Later(_Made):
     def __len__(self) -> int:
         return self.size
 
-    @cached_property
-    def _states(self) -> list[State]:
+    def made(self) -> list[State]:
+        """Make them."""
         return self.make()
 
 
@@ -75,6 +80,6 @@ class Frames(_Made):
     def __len__(self) -> int:
         return sum(map(len, self.parts))
 
-    @cached_property
-    def _states(self) -> list[State]:
+    def made(self) -> list[State]:
+        """Put the parts together."""
         return [state for part in self.parts for state in part]
