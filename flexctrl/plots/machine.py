@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
 
+from flexctrl.mechanics.clamped_modes import clamped_shapes
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
 from flexctrl.structure.drives import RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, Part, PointMass, RigidBody, Rope, Spring
@@ -44,10 +45,19 @@ class Pose(Protocol):
 
 @dataclass(frozen=True)
 class Drawn:
-    """The pose of a structure as it is drawn."""
+    """The pose of a structure as it is drawn.
+
+    Attributes
+    ----------
+    x, R : numpy.ndarray
+        Of the nodes.
+    bent : mapping of str to numpy.ndarray, shape (elements, 2, modes)
+        Amplitudes of the component modes of beams that have them, along y and z of each element [m].
+    """
 
     x: np.ndarray
     R: np.ndarray
+    bent: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @classmethod
     def of(cls, structure: Structure) -> Drawn:
@@ -72,7 +82,37 @@ def seen(structure: Structure, pose: Pose) -> Drawn:
     x = pose.x[:count].copy()
     for track in structure.tracks:
         x[track.gauge] = x[track.node]
-    return Drawn(x, pose.R[:count])
+    return Drawn(x, pose.R[:count], pose.bent if isinstance(pose, Drawn) else {})
+
+
+def bent_of(structure: Structure, coordinates: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:
+    """Return how component modes bend the beams that have them.
+
+    Parameters
+    ----------
+    structure : Structure
+    coordinates : sequence of str
+        Of the model.
+    values : numpy.ndarray, shape (n,)
+
+    Returns
+    -------
+    dict of str to numpy.ndarray, shape (elements, 2, modes)
+    """
+    value = dict(zip(coordinates, values.tolist(), strict=True))
+    found = {}
+    for beam in (e for e in structure.elements if isinstance(e, Beam)):
+        count = 0
+        while f"{beam.name}_0_y{count + 1}" in value:
+            count += 1
+        if count:
+            found[beam.name] = np.array(
+                [
+                    [[value[f"{beam.name}_{k}_{axis}{i + 1}"] for i in range(count)] for axis in "yz"]
+                    for k in range(beam.elements)
+                ]
+            )
+    return found
 
 
 def best_plane(structure: Structure, poses: Sequence[Pose] = ()) -> tuple[int, int] | None:
@@ -211,7 +251,7 @@ def draw_machine(
         tint = color(part) if callable(color) else color
         nodes = [structure.number(n) for n in part.nodes]
         if isinstance(part, Beam):
-            pen.line(_axis_curve(part, shown, nodes), color=tint, linewidth=width, solid_capstyle="round", zorder=2)
+            pen.line(axis_curve(part, shown, nodes), color=tint, linewidth=width, solid_capstyle="round", zorder=2)
             pen.mark(shown.x[nodes], marker="o", color=tint, markersize=2.2 + 0.4 * width, zorder=3)
         elif isinstance(part, Rope | Spring):
             curve = shown.x[nodes] if isinstance(part, Rope) else _zigzag(shown.x[nodes], structure.size)
@@ -230,8 +270,22 @@ def draw_machine(
     return ax
 
 
-def _axis_curve(beam: Beam, pose: Pose, nodes: Sequence[int], points: int = 12) -> np.ndarray:
-    """The deflected axis: cubics through the nodes along their turned axes."""
+def axis_curve(beam: Beam, pose: Drawn, nodes: Sequence[int], points: int = 12) -> np.ndarray:
+    """Return the deflected axis: cubics through the nodes along their turned axes, and what component modes add.
+
+    Parameters
+    ----------
+    beam : Beam
+    pose : Drawn
+    nodes : sequence of int
+        Numbers of the beam's nodes.
+    points : int
+        Of each element.
+
+    Returns
+    -------
+    numpy.ndarray, shape (elements · points, 3)
+    """
     s = np.linspace(0.0, 1.0, points)[:, None]
     h = (2 * s**3 - 3 * s**2 + 1, s**3 - 2 * s**2 + s, -2 * s**3 + 3 * s**2, s**3 - s**2)
     along = beam.axes[:, 0] * beam.length / beam.elements
@@ -239,6 +293,11 @@ def _axis_curve(beam: Beam, pose: Pose, nodes: Sequence[int], points: int = 12) 
         h[0] * pose.x[a] + h[1] * (pose.R[a] @ along) + h[2] * pose.x[b] + h[3] * (pose.R[b] @ along)
         for a, b in pairwise(nodes)
     ]
+    if beam.name in pose.bent:
+        shapes = clamped_shapes(pose.bent[beam.name].shape[2], s[:, 0])
+        for k, amplitudes in enumerate(pose.bent[beam.name]):
+            across = 0.5 * (pose.R[nodes[k]] + pose.R[nodes[k + 1]]) @ beam.axes[:, 1:]
+            pieces[k] = pieces[k] + (amplitudes @ shapes).T @ across.T
     return np.vstack(pieces)
 
 

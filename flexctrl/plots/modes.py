@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from flexctrl.linear.model import Place
 from flexctrl.linear.modes import Modes
 from flexctrl.mechanics.rotation import exponential
-from flexctrl.plots.machine import Drawn, add_machine_axes, best_plane, draw_deformed
+from flexctrl.plots.machine import Drawn, add_machine_axes, bent_of, best_plane, draw_deformed
 from flexctrl.plots.style import CYCLE, INK, PALE, new_figure, tidy
 
 _MOST_PARTS = 8
@@ -35,12 +35,17 @@ def mode_pose(place: Place, shape: np.ndarray, fraction: float = 0.12) -> Drawn:
     Drawn
     """
     model, at = place.model, place.state
-    moved = model.rates(at.with_(v=place.basis @ shape))[: model.motion.source_base].reshape(-1, 6)
-    largest = np.abs(moved[:, :3]).max(initial=0.0) or np.abs(moved[:, 3:]).max(initial=0.0) * model.structure.size
+    v = place.basis @ shape
+    moved = model.rates(at.with_(v=v))[: model.motion.source_base].reshape(-1, 6)
+    bent = bent_of(model.structure, model.coordinates, v)
+    swings = [np.abs(moved[:, :3]).max(initial=0.0), *(np.abs(a).max(initial=0.0) for a in bent.values())]
+    largest = max(swings) or np.abs(moved[:, 3:]).max(initial=0.0) * model.structure.size
     scale = fraction * model.structure.size / largest if largest else 0.0
     turn = scale * moved[:, 3:]
     turn *= min(1.0, 0.6 / max(float(np.abs(turn).max(initial=0.0)), 1e-300))
-    return Drawn(at.x + scale * moved[:, :3], exponential(turn) @ at.R)
+    still = bent_of(model.structure, model.coordinates, at.q)
+    bent = {name: still[name] + scale * swing for name, swing in bent.items()}
+    return Drawn(at.x + scale * moved[:, :3], exponential(turn) @ at.R, bent)
 
 
 def mode_label(modes: Modes, k: int) -> str:

@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 
 from flexctrl.linear.modes import Modes
-from flexctrl.plots.machine import seen
+from flexctrl.plots.machine import Drawn, Pose, axis_curve, bent_of, seen
 from flexctrl.plots.modes import mode_label, mode_pose
+from flexctrl.structure.elements import Beam
 from flexctrl.structure.structure import Structure
 
 __all__ = ["animation"]
+
+_ALONG = 9
 
 
 def animation(structure: Structure, modes: Modes) -> dict[str, Any]:
@@ -26,15 +29,40 @@ def animation(structure: Structure, modes: Modes) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``rest``: points of every node; ``lines``: node numbers, a list a part; ``modes``: label and displacements.
+        ``rest``: points of every node and along the axes of beams; ``lines``: numbers of points, a list a part;
+        ``modes``: label and displacements.
     """
     place = modes.place
     assert place is not None
-    rest = seen(structure, place.state).x
-    lines = [[structure.number(node) for node in part.nodes] for part in structure.elements]
-    poses = [seen(structure, mode_pose(place, modes.shapes[:, k])) for k in range(len(modes))]
-    shapes = [{"label": mode_label(modes, k), "moved": _rounded(pose.x - rest)} for k, pose in enumerate(poses)]
-    return {"rest": _rounded(rest), "lines": lines, "modes": shapes}
+    still = bent_of(structure, place.model.coordinates, place.state.q)
+    rest = _points(structure, Drawn(place.state.x, place.state.R, still))
+    poses = [_points(structure, mode_pose(place, modes.shapes[:, k])) for k in range(len(modes))]
+    shapes = [{"label": mode_label(modes, k), "moved": _rounded(pose - rest)} for k, pose in enumerate(poses)]
+    return {"rest": _rounded(rest), "lines": _lines(structure), "modes": shapes}
+
+
+def _points(structure: Structure, pose: Pose) -> np.ndarray:
+    """The nodes, then the axes of the beams as they bend."""
+    drawn = seen(structure, pose)
+    curves = [axis_curve(b, drawn, [structure.number(n) for n in b.nodes], _ALONG) for b in _beams(structure)]
+    return np.vstack([drawn.x, *curves])
+
+
+def _lines(structure: Structure) -> list[list[int]]:
+    """Numbers of points, part by part."""
+    first, found = len(structure.nodes), []
+    for part in structure.elements:
+        if isinstance(part, Beam):
+            count = part.elements * _ALONG
+            found.append(list(range(first, first + count)))
+            first += count
+        else:
+            found.append([structure.number(node) for node in part.nodes])
+    return found
+
+
+def _beams(structure: Structure) -> list[Beam]:
+    return [e for e in structure.elements if isinstance(e, Beam)]
 
 
 def _rounded(values: np.ndarray) -> list[list[float]]:

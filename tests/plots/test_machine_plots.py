@@ -125,3 +125,25 @@ def test_how_far_a_trolley_has_travelled_is_drawn_nowhere():
     assert points[:, 0].min() >= 0.0
     assert np.allclose(points[:, 1], 5.0)
     assert "4, 5" in written(ax)
+
+
+def test_a_beam_of_component_modes_is_drawn_bent():
+    """One element, clamped at both ends: its nodes stand still, its first mode is φ₁ along the whole axis."""
+    from flexctrl.mechanics.clamped_modes import clamped_shapes
+    from flexctrl.plots.machine import axis_curve
+    from flexctrl.plots.modes import mode_pose
+    from flexctrl.report.modes import animation
+
+    beam = fc.Beam("beam", (0, 0, 0), (2, 0, 0), fc.Section.tube(fc.STEEL, 0.05, 0.004))
+    structure = fc.Structure([beam], [fc.Support(beam.start), fc.Support(beam.end)])
+    model = fc.assemble(structure, [fc.ComponentModes(2), fc.LargeRotation()])
+    modes = fc.linearize(model, at=fc.equilibrium(model)).modes()
+    curve = axis_curve(beam, mode_pose(modes.place, modes.shapes[:, 0]), [0, 1], points=21)
+    across = curve[:, 1:] @ np.linalg.svd(curve[:, 1:])[2][0]
+    expected = clamped_shapes(1, np.linspace(0.0, 1.0, 21))[0]
+    cosine = abs(across @ expected) / np.linalg.norm(across) / np.linalg.norm(expected)
+    assert cosine > 0.9999
+    assert np.abs(across).max() == pytest.approx(0.12 * structure.size * np.abs(expected).max(), rel=0.05)
+    moved = np.array(animation(structure, modes)["modes"][0]["moved"])
+    assert np.abs(moved[:2]).max() == 0.0
+    assert np.abs(moved[2:]).max() > 0.05
