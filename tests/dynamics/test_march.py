@@ -114,6 +114,22 @@ def test_states_within_a_run_are_the_same(pace, monkeypatch):
         assert np.allclose(a.at(t).state.x, b.at(t).state.x, rtol=0.0, atol=1e-9)
 
 
+def test_a_start_elsewhere_has_the_accelerations_of_its_own_state():
+    """A stepper that has been on the way starts anew in another state under the same inputs."""
+    model = fc.assemble(TREES["tree3"], EFFECTS)
+    feed = feed_of(model, None, np.ones(len(model.inputs)))
+    stepper = fc.GeneralizedAlpha(1e-3).stepper(model, feed, fc.Tolerance())
+    assert isinstance(stepper, MarchingStepper)
+    supply = feed.first(model.rest)
+    point = stepper.start(model.rest, supply, 1e-3)
+    for _ in range(20):
+        point = stepper.step(point, 1e-3)
+    thrown = model.rest.with_(v=np.random.default_rng(2).normal(size=model.n))
+    for state in (thrown, point.state, model.rest):
+        found, right = (s.start(state, supply, 1e-3).rate for s in (stepper, stepper.plain))
+        assert np.abs(found - right).max() < 1e-6 * np.abs(right).max()
+
+
 @dataclass(frozen=True)
 class Brake:
     """Pushes against the travel, sampled; its state counts the samples, its command stops at times."""

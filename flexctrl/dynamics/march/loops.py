@@ -447,7 +447,7 @@ def jump(m: March) -> int:
         status = massed(m)
         if status != DONE:
             return status
-    if m.attempt == 1 or not small(m):
+    if m.attempt == 1 or m.unsure == 1 or not small(m):
         status = solved_for(m)
         if status != DONE:
             return status

@@ -181,9 +181,9 @@ class March:
         What share of accelerations the mass got wrong when that was last looked at (−1: not yet known), and in how many
         jumps of the inputs it was only believed.
     newton, factorisations, weighings, worst : int
-    losing, asking, watching, jumping : int
+    losing, asking, watching, jumping, unsure : int
         Whether power is dissipated; whether tangents are asked for; whether steps end before corners;
-        whether inputs jump before the next step.
+        whether inputs jump before the next step; whether accelerations are not known yet.
     keeping, due, spacing, kept, shelf : int, float
         Whether all states are kept, or only those that are due: when the next one is, and their spacing; how many
         there are, and how many there is room for.
@@ -281,6 +281,7 @@ class March:
     losing: int = 0
     watching: int = 0
     jumping: int = 0
+    unsure: int = 0
     keeping: int = 1
     due: float = 0.0
     spacing: float = 0.0

@@ -84,12 +84,19 @@ class MarchingStepper:
         """
         zero = np.zeros(self.plain.model.n)
         self.enter(AlphaPoint(state, zero, supply, zero, zero))
-        if self.marcher.jump(supply.u) != DONE:
+        self.marcher.march.unsure = 1  # no rates are known that a change of the inputs could be added to
+        status = self.marcher.jump(supply.u)
+        self.marcher.march.unsure = 0
+        if status != DONE:
+            self._here = None
             return self.plain.start(state, supply, step)
         return self.leave(supply)
 
     def renew(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
-        """Return a point under other inputs: the true accelerations jump; the method's own keep their lead on them."""
+        """Return a point under other inputs: the true accelerations jump; the method's own keep their lead on them.
+
+        The point's rates are those of its state under its inputs: what changes them beside the inputs starts anew.
+        """
         self.enter(point)
         if self.marcher.jump(supply.u) == DONE:
             return self.leave(supply)
