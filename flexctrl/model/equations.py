@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.mixed import Excess
+from flexctrl.model.motion import DENSE_UP_TO
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -175,10 +176,17 @@ class SmallMotion:
         return motions.T @ (self.matrices.K @ motions)
 
     @cached_property
-    def _levers(self) -> sp.csr_matrix:
+    def _plain(self) -> tuple[np.ndarray | sp.spmatrix, ...]:
+        """K, C and M, as arrays while these are quicker."""
+        m = self.matrices
+        return tuple(A.toarray() if self.model.n <= DENSE_UP_TO else A for A in (m.K, m.C, m.M))
+
+    @cached_property
+    def _levers(self) -> np.ndarray | sp.csr_matrix:
         """Motion of the nodes per unit of each degree of freedom."""
         motion = self.model.motion
-        return motion.jacobian(self.model.rest)[: motion.source_base]
+        levers = motion.jacobian(self.model.rest)[: motion.source_base]
+        return levers.toarray() if self.model.n <= DENSE_UP_TO else levers
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
         """Return the state after a step; what is shown moves to first order."""
@@ -190,6 +198,6 @@ class SmallMotion:
 
     def energy(self, state: State) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""
-        m, q, v = self.matrices, state.q, state.v
-        stored = 0.5 * float(q @ (m.K @ q)) - float(m.load @ q)
-        return 0.5 * float(v @ (m.M @ v)), stored, float(v @ (m.C @ v))
+        (K, C, M), q, v = self._plain, state.q, state.v
+        stored = 0.5 * float(q @ (K @ q)) - float(self.matrices.load @ q)
+        return 0.5 * float(v @ (M @ v)), stored, float(v @ (C @ v))

@@ -12,7 +12,7 @@ from flexctrl.kernels.native import Reals
 from flexctrl.model.flat.flat import keep, load, place, pull
 from flexctrl.model.gauges import show
 
-__all__ = ["back", "glide", "land", "leap"]
+__all__ = ["back", "glide", "land", "leap", "level"]
 
 _ALIKE = 1e-9
 _STRAIGHT = 1e-9
@@ -238,8 +238,7 @@ def land(m: March) -> None:
     """Bring degrees of freedom and nodes to where the modal state is."""
     f = m.flat
     e = m.leap
-    product(e.size, f.padded, e.state, e.places, f.q)  # not by a step from where it was: to the bit the same always
-    product(e.size, f.padded, e.state, e.rates, f.v)
+    level(m)
     for i in range(0, f.padded, 8):
         put(f.step[i:], 0.0 * eight(f.step[i:]))
         put(m.v[i:], eight(f.v[i:]))
@@ -251,6 +250,13 @@ def land(m: March) -> None:
     for i in range(0, f.padded, 8):
         put(m.pulled[i:], eight(f.force[i:]))
     e.aloft = 0
+
+
+def level(m: March) -> None:
+    """Bring degrees of freedom to where the modal state is; not by a step: to the bit the same always."""
+    e = m.leap
+    product(e.size, m.flat.padded, e.state, e.places, m.flat.q)
+    product(e.size, m.flat.padded, e.state, e.rates, m.flat.v)
 
 
 def unfold(m: March) -> None:

@@ -8,7 +8,7 @@ from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import in_doubt, settled
 from flexctrl.dynamics.march.corners import passes
-from flexctrl.dynamics.march.gliding import back, glide, land, leap
+from flexctrl.dynamics.march.gliding import back, glide, land, leap, level
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
@@ -188,14 +188,12 @@ def glided(m: March) -> int:
         status = glide(m)
         if status != DONE:
             return status
-        due = drawn_now(m)
-        if due or m.t >= m.due:
-            land(m)
-        if due:
-            drive(m.flat)
+        if drawn_now(m):
+            level(m)
             energy(m.flat)
             draw(m)
         if m.t >= m.due:
+            land(m)
             shelve(m)
     return DONE
 
