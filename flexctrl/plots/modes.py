@@ -42,7 +42,7 @@ def mode_pose(place: Place, shape: np.ndarray, fraction: float = 0.12) -> Drawn:
     largest = max(swings) or np.abs(moved[:, 3:]).max(initial=0.0) * model.structure.size
     scale = fraction * model.structure.size / largest if largest else 0.0
     turn = scale * moved[:, 3:]
-    turn *= min(1.0, 0.6 / max(float(np.abs(turn).max(initial=0.0)), 1e-300))
+    turn /= np.maximum(1.0, np.linalg.norm(turn, axis=1, keepdims=True))  # node by node, or none fits its chord
     still = bent_of(model.structure, model.coordinates, at.q)
     bent = {name: still[name] + scale * swing for name, swing in bent.items()}
     return Drawn(at.x + scale * moved[:, :3], exponential(turn) @ at.R, bent)
