@@ -143,7 +143,7 @@ def test_free_play(record):
 
 @pytest.mark.slow
 def test_a_hundred_periods_of_free_play(record):
-    """The same as long as B18 asks: four corners a period, told by the run itself; the steps keep the springs' energy."""
+    """The same for as long as B18 asks: four corners a period, told by the run itself; steps keep the energy."""
     model = block(1e4, [fc.Backlash({"spring": 0.02})])
     period, start = 2.0 * np.pi / 100.0 + 2.0 * 0.02, model.rest.with_(v=np.ones(model.n))
     run = fc.simulate(model, start=start, until=100.6 * period, method=fc.GeneralizedAlpha(2e-4, rho=1.0), every=0.01)
