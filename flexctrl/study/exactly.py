@@ -29,7 +29,8 @@ def exactly(scene: Subject) -> Subject:
         The scene itself where it cannot.
     """
     held = scene.law is None or scene.law.sample_time > 0.0
-    if scene.model.large or scene.model.switches.names or not held or isinstance(scene.simulation.method, Exact):
+    model = scene.model
+    if model.large or not model.n or model.switches.names or not held or isinstance(scene.simulation.method, Exact):
         return scene
     if any(callable(load) for load in scene.loads.values()) and scene.law is None:
         return scene

@@ -126,7 +126,8 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     method, tolerance = scene.simulation.method or AdaptiveAlpha(), scene.simulation.tolerance
     found = [(s.fidelity.value, s) for s in sweep(scene, meshes=(1,), methods=[(method, tolerance)])]
     exact = Exact(spacing_of(scene))
-    named = [(n, replace(s, method=exact) if s.fidelity is Fidelity.LINEAR else s) for n, s in found]
+    fewest = dict(reversed(found))  # component modes of the lowest order
+    named = [(n, replace(s, method=exact) if s.fidelity is Fidelity.LINEAR else s) for n, s in reversed(fewest.items())]
     return (*named, ("refined", Setting(Fidelity.FULL, _FINER, *_finer(method, tolerance))))
 
 

@@ -204,8 +204,8 @@ def ledger(
     Every effect is left out in turn and the scene run again. What changes an output by no more than ``tolerance``
     is a candidate to go. All candidates are left out together; where they do more together than alone, they are
     taken back, the weightiest first, until the answer holds. An effect whose absence makes the run dearer stays, and
-    so does a way to give that saves nothing: beams that are stiffer keep their freedoms. What is linear without some
-    effect is integrated exactly, and the minimal set, where it is, with the fewest modes that keep the answer.
+    so does a way to give that saves nothing: beams that are stiffer keep their freedoms. Where the minimal set is
+    linear it is integrated exactly, with the fewest modes that keep the answer.
 
     Parameters
     ----------
@@ -343,16 +343,19 @@ class _Auditor:
         try:
             for omission in gone:
                 scene = omission.without(scene)
-            return self._tried(exactly(scene))
+            return self._tried(scene)
         except FlexctrlError as error:
             self._tick()
             return str(error).splitlines()[0]
 
     def _reduced(self, whole: _Trial) -> _Trial:
-        """With the fewest modes that hold, where equations are linear; poles and margins stay the machine's own."""
-        for scene in fewer_modes(whole.scene):
+        """Integrated exactly, with the fewest modes that hold, where that can be; poles and margins stay the same."""
+        exact = exactly(whole.scene)
+        if exact is whole.scene:
+            return whole
+        for scene in (*fewer_modes(exact), exact):
             run, taken = _timed(scene)
-            trial = replace(whole, scene=scene, answer=replace(whole.answer, run=run), times=[taken])
+            trial = _Trial(scene, replace(whole.answer, run=run), _size(scene, run), [taken])
             if run.status is Status.FINISHED and self._holds(trial):
                 return trial
         return whole

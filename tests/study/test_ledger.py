@@ -121,6 +121,19 @@ def omission(scene, name):
     return next(o for o in omissions(scene.with_(controller=scene.law)) if o.name == name).without(scene)
 
 
+def test_a_linear_minimal_set_is_integrated_exactly_with_no_more_modes_than_it_needs(scene, drawn_up):
+    """Half as many would not do; poles and margins are the machine's own."""
+    method = drawn_up.scene.simulation.method
+    assert "large_rotation" not in drawn_up.minimal_set
+    assert isinstance(method, fc.Exact)
+    assert drawn_up.modes == method.modes == 1
+    assert "integrated exactly, free motion and 1 vibration" in str(drawn_up)
+    assert drawn_up.minimal_change.outputs_worst <= 0.01
+    strict = fc.ledger(scene, 1e-9)
+    assert strict.modes is None
+    assert "exactly" not in str(strict)
+
+
 def test_every_effect_of_a_machine_that_has_them_all_has_a_line():
     """The list of the issue: what the machine has can be left out, one by one, and something is gone each time."""
     beam = fc.Beam("boom", (0, 0, 0), (2, 0, 0), fc.Section.tube(fc.STEEL, 0.05, 0.004))
@@ -270,6 +283,6 @@ def test_what_cannot_be_left_out_is_kept_with_the_reason():
 def test_automatic_picks_the_minimal_set(scene, drawn_up):
     chosen = scene.with_(effects=[*scene.effects, fc.Automatic(0.01)])
     assert chosen.settled.effects == drawn_up.scene.effects
-    assert chosen.settled.simulation == scene.simulation
+    assert chosen.settled.simulation == replace(scene.simulation, method=drawn_up.scene.simulation.method)
     assert scene.settled is scene
     assert chosen.model.effects == scene.model.effects  # by itself it adds nothing
