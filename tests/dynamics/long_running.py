@@ -1,9 +1,12 @@
-"""Machines of the tests of long runs, and what these do in a process: ``python long_running.py TASK …``."""
+"""Machines of the tests of long runs, and what these do in a process: ``python long_running.py PARENT TASK …``."""
 
 from __future__ import annotations
 
+import os
 import resource
+import signal
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -183,5 +186,18 @@ def chain(folder: str, elements: str) -> None:
     print(run.status.name, run.report.steps, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6)
 
 
+def as_child(parent: int) -> None:
+    """Heed Ctrl-C, though a shell may have started the parent without, and do not outlive the parent."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    threading.Thread(target=_while_there, args=(parent,), daemon=True).start()
+
+
+def _while_there(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)
+
+
 if __name__ == "__main__":
-    globals()[sys.argv[1]](*sys.argv[2:])
+    as_child(int(sys.argv[1]))
+    globals()[sys.argv[2]](*sys.argv[3:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -19,7 +20,7 @@ UNTIL = 0.4
 
 
 def process(*task: object) -> subprocess.Popen[str]:
-    words = [sys.executable, str(HERE / "long_running.py"), *map(str, task)]
+    words = [sys.executable, str(HERE / "long_running.py"), str(os.getpid()), *map(str, task)]
     return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -73,6 +74,39 @@ def test_a_second_ctrl_c_does_not_wait_for_the_controller(tmp_path):
     assert 0.0 <= float(last) <= 0.51
 
 
+ORPHAN = """
+import os, subprocess, sys, time
+from pathlib import Path
+child = subprocess.Popen([sys.executable, {program!r}, str(os.getpid()), "forever", {folder!r}])
+print(child.pid, flush=True)
+while not Path({folder!r}, "begun").exists():
+    time.sleep(0.02)
+"""
+
+
+@pytest.mark.slow
+def test_a_run_whose_parent_is_gone_ends(tmp_path):
+    """A suite that is killed leaves nothing behind that runs for ever."""
+    parent = ORPHAN.format(program=str(HERE / "long_running.py"), folder=str(tmp_path))
+    with subprocess.Popen([sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        orphan = int(child.stdout.readline())
+        child.stdout.read()  # to the end: the orphan writes there too
+    assert _gone(orphan)
+
+
+def _gone(pid: int) -> bool:
+    for _ in range(200):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+            return True
+        time.sleep(0.02)
+    return False
+
+
 SCENE = """
 import sys
 from pathlib import Path
@@ -96,7 +130,8 @@ scene = fc.Scene(model.structure, effects=list(model.effects), controller=Tellin
 def test_ctrl_c_on_the_command_line_writes_what_there_is(tmp_path):
     scene, flag, out = tmp_path / "scene.py", tmp_path / "begun", tmp_path / "out"
     scene.write_text(SCENE.format(here=str(HERE), flag=str(flag)))
-    code = "import sys; from flexctrl.cli import main; sys.exit(main(sys.argv[1:]))"
+    begin = f"import sys; sys.path.insert(0, {str(HERE)!r}); from long_running import as_child; as_child({os.getpid()})"
+    code = f"{begin}; from flexctrl.cli import main; sys.exit(main(sys.argv[1:]))"
     words = [sys.executable, "-c", code, "run", str(scene), "--out", str(out)]
     child = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait_for(flag)
