@@ -41,6 +41,8 @@ class Kernel:
         Symbols that belong to the item.
     outputs : casadi.SX, n_out × 1
         Expressions of both; structural zeros are allowed.
+    replaces : bool
+        Whether outputs replace what is in r, where no two items may write to one place, rather than being added to it.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class Kernel:
     inputs: ca.SX
     params: ca.SX
     outputs: ca.SX
+    replaces: bool = False
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
@@ -267,11 +270,13 @@ class Compiled:
             If a table does not fit, or the kernel has an operation that cannot be compiled.
         """
         from flexctrl.kernels.llvm import CompiledRun, best_lanes, compile_kernel
+        from flexctrl.kernels.llvm_ir import chunks_of
 
         tables = Tables.of(kernel, gather, scatter)
         lanes = self.lanes or best_lanes(len(tables.gather))
         level = 2 if kernel.instructions <= self.optimize_up_to else 0
-        return CompiledRun.of(kernel, compile_kernel(kernel, lanes, level), tables, params)
+        chunks = chunks_of(tables.gather, lanes), chunks_of(tables.scatter, lanes) if kernel.replaces else ()
+        return CompiledRun.of(kernel, compile_kernel(kernel, lanes, level, *chunks), tables, params)
 
 
 def best_backend() -> Backend:

@@ -1,9 +1,10 @@
 """Kernels as machine code: compiled with llvmlite, called through ctypes.
 
 The code of a kernel is ``void run(const int64 *tables, const double *z, double *r)`` with
-``tables`` = {number of items, address of gather (int32), of the parameters, of scatter (int32)}, and
-``void call(const int64 *frame)`` with ``frame`` = {tables, z, r}. It keeps no state: threads may share it.
-Parameters are stored by blocks of items, lane next to lane: (blocks, n_par, lanes).
+``tables`` = {number of items, address of gather (int32), of the parameters, of scatter (int32), of the places of
+each block's parameters (int64)}, and ``void call(const int64 *frame)`` with ``frame`` = {tables, z, r}. It keeps
+no state: threads may share it. Parameters are stored by blocks of items, lane next to lane: (n_par, lanes) each, and
+once where blocks have the same; so is gather: (blocks, chunks and single entries, lanes).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import numpy as np
 
 from flexctrl.kernels.kernel import FLOAT, Kernel, Tables, parameter_table
 from flexctrl.kernels.llvm_cache import stored
-from flexctrl.kernels.llvm_ir import LIBRARY, translate
+from flexctrl.kernels.llvm_ir import LIBRARY, row_order, translate
 
 _lock = threading.Lock()
 _codes: dict[str, Code] = {}
@@ -35,7 +36,8 @@ _PASSES = (
     "dead_code_elimination",
 )
 """What loops need that are written with vectors already: a tenth of the time that LLVM's own choice takes."""
-_known: WeakKeyDictionary[Kernel, dict[tuple[int, int], Code]] = WeakKeyDictionary()
+_Chunks = tuple[int, ...]
+_known: WeakKeyDictionary[Kernel, dict[tuple[int, int, _Chunks, _Chunks], Code]] = WeakKeyDictionary()
 _RUN = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 _start: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
@@ -49,6 +51,8 @@ class Code:
     ----------
     lanes : int
         Items computed at once.
+    chunks, written : tuple of int
+        First entries of what it reads and of what it writes as vectors.
     run_address, call_address : int
         Where the two functions start; valid while this object lives.
     library : object
@@ -56,6 +60,8 @@ class Code:
     """
 
     lanes: int
+    chunks: tuple[int, ...]
+    written: tuple[int, ...]
     run_address: int
     call_address: int
     library: object
@@ -85,7 +91,7 @@ def best_lanes(n: int) -> int:
     return 4 if features.get("avx") else 2
 
 
-def compile_kernel(kernel: Kernel, lanes: int, level: int) -> Code:
+def compile_kernel(kernel: Kernel, lanes: int, level: int, chunks: _Chunks = (), written: _Chunks = ()) -> Code:
     """Return the machine code of a kernel, compiled once per process for equal content.
 
     Parameters
@@ -94,6 +100,8 @@ def compile_kernel(kernel: Kernel, lanes: int, level: int) -> Code:
     lanes : int
     level : int
         LLVM's optimisation of the code it generates, 0 to 3.
+    chunks, written : tuple of int
+        First entries of what is read and written as vectors; see `chunks_of`.
 
     Raises
     ------
@@ -102,17 +110,18 @@ def compile_kernel(kernel: Kernel, lanes: int, level: int) -> Code:
     """
     with _lock:
         known = _known.setdefault(kernel, {})
-        if (lanes, level) not in known:
-            known[lanes, level] = _load(translate(kernel, lanes), lanes, level)
-        return known[lanes, level]
+        kind = (lanes, level, chunks, written)
+        if kind not in known:
+            known[kind] = _load(translate(kernel, lanes, chunks, written), *kind)
+        return known[kind]
 
 
-def _load(assembly: str, lanes: int, level: int) -> Code:
+def _load(assembly: str, lanes: int, level: int, chunks: _Chunks, written: _Chunks) -> Code:
     """Link the object code of an assembly text, unless the same text has been."""
-    key = f"{level} {assembly}"
+    key = f"{level} {chunks} {written} {assembly}"
     if key not in _codes:
         library = link(assembly, level, ("run", "call"))
-        _codes[key] = Code(lanes, library["run"], library["call"], library)
+        _codes[key] = Code(lanes, chunks, written, library["run"], library["call"], library)
     return _codes[key]
 
 
@@ -203,19 +212,21 @@ class CompiledRun:
     kernel : Kernel
     code : Code
     tables : Tables
-    order : ndarray of int, (blocks, lanes)
-        Which item is computed where; idle lanes of the last block repeat the last item.
-    blocks : ndarray, (blocks, n_par, lanes)
+    gather, scatter : ndarray of int32, (blocks, chunks and single entries, lanes) and (n, chunks and single entries)
+        What the code reads of the tables.
+    blocks, places : ndarray, (different blocks, n_par, lanes) and int64 (blocks,)
         The parameters as the code reads them.
-    block : ndarray of int64, (4,)
+    block : ndarray of int64, (5,)
         The ``tables`` argument of the code.
     """
 
     kernel: Kernel
     code: Code
     tables: Tables
-    order: np.ndarray
+    gather: np.ndarray
+    scatter: np.ndarray
     blocks: np.ndarray
+    places: np.ndarray
     block: np.ndarray
     _last: ClassVar[tuple[Any, Any, int, int]] = (None, None, 0, 0)
 
@@ -224,9 +235,12 @@ class CompiledRun:
         """Lay out the tables for the code."""
         n, lanes = len(tables.gather), code.lanes
         order = np.minimum(np.arange(-(-n // lanes) * lanes).reshape(-1, lanes), n - 1)
-        blocks = _blocked(parameter_table(kernel, params, n), order)
-        addresses = [table.ctypes.data for table in (tables.gather, blocks, tables.scatter)]
-        return cls(kernel, code, tables, order, blocks, np.array([n, *addresses], dtype=np.int64))
+        gather = _blocked(tables.gather[:, row_order(kernel.n_in, lanes, code.chunks)[0]], order)
+        scatter = np.ascontiguousarray(tables.scatter[:, row_order(kernel.n_out, lanes, code.written)[0]])
+        blocks, places = _shared(_blocked(parameter_table(kernel, params, n), order))
+        addresses = [table.ctypes.data for table in (gather, blocks, scatter, places)]
+        block = np.array([n, *addresses], dtype=np.int64)
+        return cls(kernel, code, tables, gather, scatter, blocks, places, block)
 
     @property
     def address(self) -> int:
@@ -262,10 +276,7 @@ class CompiledRun:
 
     def with_params(self, params: np.ndarray) -> CompiledRun:
         """Return the same run with other parameters, (n, n_par)."""
-        blocks = _blocked(parameter_table(self.kernel, params, len(self.tables.gather)), self.order)
-        block = self.block.copy()
-        block[2] = blocks.ctypes.data
-        return CompiledRun(self.kernel, self.code, self.tables, self.order, blocks, block)
+        return CompiledRun.of(self.kernel, self.code, self.tables, params)
 
     def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
         """Return the run on these two arrays, checked once; it keeps them alive."""
@@ -281,6 +292,14 @@ class _Fixed(partial):
     owners: tuple[object, ...]
 
 
-def _blocked(params: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Parameters by blocks, lane next to lane."""
-    return np.ascontiguousarray(params.take(order, axis=0).transpose(0, 2, 1))
+def _blocked(rows: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Rows of items by blocks, lane next to lane."""
+    return np.ascontiguousarray(rows.take(order, axis=0).transpose(0, 2, 1))
+
+
+def _shared(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Different blocks only, and where that of each block begins."""
+    known: dict[bytes, int] = {}
+    numbers = [known.setdefault(block.tobytes(), len(known)) for block in blocks]
+    first = np.unique(np.array(numbers, dtype=np.int64), return_index=True)[1]
+    return blocks[first], np.array(numbers, dtype=np.int64) * (blocks[0].size if len(blocks) else 0)

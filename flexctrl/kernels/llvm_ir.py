@@ -2,8 +2,9 @@
 
 The assembly defines ``void run(tables, z, r)`` and ``void call(frame)``, described in `llvm`. A block
 of items is gathered into a scratch matrix (entries by lanes), computed in straight-line vector code,
-and added into r one item after the other. Idle lanes of the last block repeat the last item and are
-not added.
+and added into r one item after the other. Entries that lie side by side in z, as many as there are lanes,
+are a chunk: read as vectors, one an item, and turned into the matrix' rows in registers; likewise what is
+written and not added. Idle lanes of the last block repeat the last item and are not added.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache, partial
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from flexctrl.errors import KernelError
 from flexctrl.kernels import llvm_math
@@ -49,24 +52,26 @@ define void @run(ptr %tables, ptr %z, ptr %r) {{
   %params = load ptr, ptr %tables.params
   %tables.scatter = getelementptr i64, ptr %tables, i64 3
   %scatter = load ptr, ptr %tables.scatter
-  %last = sub i64 %n, 1
+  %tables.places = getelementptr i64, ptr %tables, i64 4
+  %places = load ptr, ptr %tables.places
   %some = icmp sgt i64 %n, 0
   br i1 %some, label %block, label %done
 block:
   %first = phi i64 [0, %0], [%following, %block.end]
-  %block.params = mul i64 %first, {n_par}
+  %number = phi i64 [0, %0], [%number.next, %block.end]
+  %block.place = getelementptr i64, ptr %places, i64 %number
+  %block.params = load i64, ptr %block.place
   %p = getelementptr double, ptr %params, i64 %block.params
+  %block.table = mul i64 %number, {table}
+  %g = getelementptr i32, ptr %gather, i64 %block.table
   %left = sub i64 %n, %first
   %partial = icmp slt i64 %left, {lanes}
   %busy = select i1 %partial, i64 %left, i64 {lanes}
+{chunks}
   br label %read
 read:
   %read.lane = phi i64 [0, %block], [%read.lane.next, %read.end]
-  %read.wanted = add i64 %first, %read.lane
-  %read.idle = icmp sgt i64 %read.wanted, %last
-  %read.item = select i1 %read.idle, i64 %last, i64 %read.wanted
-  %read.row = mul i64 %read.item, {n_in}
-  %g = getelementptr i32, ptr %gather, i64 %read.row
+  %gl = getelementptr i32, ptr %g, i64 %read.lane
   %xl = getelementptr double, ptr %x, i64 %read.lane
 {read}
   %read.lane.next = add i64 %read.lane, 1
@@ -74,19 +79,24 @@ read:
   br i1 %read.more, label %read, label %body
 body:
 {body}
+{written}
   br label %add
 add:
   %add.lane = phi i64 [0, %{end}], [%add.lane.next, %add.end]
   %add.item = add i64 %first, %add.lane
-  %add.row = mul i64 %add.item, {n_out}
+  %add.row = mul i64 %add.item, {targets}
   %s = getelementptr i32, ptr %scatter, i64 %add.row
   %yl = getelementptr double, ptr %y, i64 %add.lane
+{put}
+  br label %add.more.entries
+add.more.entries:
 {add}
   %add.lane.next = add i64 %add.lane, 1
   %add.more = icmp slt i64 %add.lane.next, %busy
   br i1 %add.more, label %add, label %block.end
 block.end:
   %following = add i64 %first, {lanes}
+  %number.next = add i64 %number, 1
   %more = icmp slt i64 %following, %n
   br i1 %more, label %block, label %done
 done:
@@ -96,29 +106,68 @@ done:
 """
 
 _READ = """\
-  %gi{k} = getelementptr i32, ptr %g, i64 %read.e{k}
+  %gt{k} = add i64 %read.e{k}, {chunks}
+  %ga{k} = mul i64 %gt{k}, {lanes}
+  %gi{k} = getelementptr i32, ptr %gl, i64 %ga{k}
   %gs{k} = load i32, ptr %gi{k}
   %gw{k} = zext i32 %gs{k} to i64
   %gz{k} = getelementptr double, ptr %z, i64 %gw{k}
   %gv{k} = load double, ptr %gz{k}
-  %gx{k} = mul i64 %read.e{k}, {lanes}
-  %ga{k} = getelementptr double, ptr %xl, i64 %gx{k}
-  store double %gv{k}, ptr %ga{k}"""
+  %gr{k} = add i64 %read.e{k}, {before}
+  %gx{k} = mul i64 %gr{k}, {lanes}
+  %gp{k} = getelementptr double, ptr %xl, i64 %gx{k}
+  store double %gv{k}, ptr %gp{k}"""
 
 _ADD = """\
-  %si{k} = getelementptr i32, ptr %s, i64 %add.e{k}
+  %st{k} = add i64 %add.e{k}, {chunks}
+  %si{k} = getelementptr i32, ptr %s, i64 %st{k}
   %ss{k} = load i32, ptr %si{k}
   %sw{k} = zext i32 %ss{k} to i64
   %sr{k} = getelementptr double, ptr %r, i64 %sw{k}
-  %so{k} = load double, ptr %sr{k}
-  %sy{k} = mul i64 %add.e{k}, {lanes}
+  %sx{k} = add i64 %add.e{k}, {before}
+  %sy{k} = mul i64 %sx{k}, {lanes}
   %sa{k} = getelementptr double, ptr %yl, i64 %sy{k}
   %sv{k} = load double, ptr %sa{k}
-  %sn{k} = fadd double %so{k}, %sv{k}
-  store double %sn{k}, ptr %sr{k}"""
+{sum}
+  store double %{total}{k}, ptr %sr{k}"""
+
+_SUM = """\
+  %so{k} = load double, ptr %sr{k}
+  %sn{k} = fadd double %so{k}, %sv{k}"""
+
+_PUT = """\
+  %pi{k} = getelementptr i32, ptr %s, i64 {k}
+  %ps{k} = load i32, ptr %pi{k}
+  %pw{k} = zext i32 %ps{k} to i64
+  %pr{k} = getelementptr double, ptr %r, i64 %pw{k}
+  %pl{k} = add i64 %add.lane, {row}
+  %py{k} = getelementptr {real}, ptr %y, i64 %pl{k}
+  %pv{k} = load {real}, ptr %py{k}, align 8
+  store {real} %pv{k}, ptr %pr{k}, align 8"""
 
 
-def translate(kernel: Kernel, lanes: int) -> str:
+def chunks_of(gather: np.ndarray, lanes: int) -> tuple[int, ...]:
+    """Return the first columns of the chunks of a table: as many columns as lanes that count on in every item."""
+    joined = (np.diff(gather, axis=1) == 1).all(axis=0)
+    found, k = [], 0
+    while lanes > 1 and k + lanes <= gather.shape[1]:
+        whole = bool(joined[k : k + lanes - 1].all())
+        found += [k] * whole
+        k += lanes if whole else 1
+    return tuple(found)
+
+
+def row_order(n_in: int, lanes: int, chunks: tuple[int, ...]) -> tuple[list[int], list[int]]:
+    """Return the columns that index tables keep, and the entries of an item in the order of the scratch matrix.
+
+    Chunks come first, and of each the first column only.
+    """
+    inside = [k + i for k in chunks for i in range(lanes)]
+    alone = sorted(set(range(n_in)) - set(inside))
+    return [*chunks, *alone], inside + alone
+
+
+def translate(kernel: Kernel, lanes: int, chunks: tuple[int, ...] = (), written: tuple[int, ...] = ()) -> str:
     """Return the LLVM assembly of a kernel.
 
     Parameters
@@ -126,6 +175,8 @@ def translate(kernel: Kernel, lanes: int) -> str:
     kernel : Kernel
     lanes : int
         Items computed at once.
+    chunks, written : tuple of int
+        First entries of its chunks, of inputs and of outputs; these only where it replaces what is there.
 
     Returns
     -------
@@ -138,7 +189,11 @@ def translate(kernel: Kernel, lanes: int) -> str:
         If the kernel has an operation that is not supported; names it.
     """
     w = Writer(lanes, "body")
-    _write_body(w, kernel)
+    kept, order = row_order(kernel.n_in, lanes, chunks)
+    targets, results = row_order(kernel.n_out, lanes, written)
+    _write_body(w, kernel, *({entry: row for row, entry in enumerate(rows)} for rows in (order, results)))
+    entry = _ADD.replace("{sum}", "" if kernel.replaces else _SUM).replace("{total}", "sv" if kernel.replaces else "sn")
+    single = {name: len(table) - len(found) for name, table, found in (("x", kept, chunks), ("y", targets, written))}
     return _MODULE.format(
         helpers="\n".join(w.helpers.values()),
         body="\n".join(w.lines),
@@ -146,25 +201,80 @@ def translate(kernel: Kernel, lanes: int) -> str:
         real=w.real,
         lanes=lanes,
         n_in=kernel.n_in,
-        n_par=kernel.n_par,
+        table=lanes * len(kept),
         n_out=kernel.n_out,
-        read=_rows("read", kernel.n_in, lanes, _READ),
-        add=_rows("add", kernel.n_out, lanes, _ADD),
+        targets=len(targets),
+        chunks="\n".join(line for k in range(len(chunks)) for line in _chunk(k, lanes)),
+        read=_rows("read", single["x"], _READ, lanes=lanes, chunks=len(chunks), before=lanes * len(chunks)),
+        written="\n".join(line for k in range(len(written)) for line in _lanes_of(k, lanes)),
+        put="\n".join(_PUT.format(k=k, row=lanes * k, real=w.real) for k in range(len(written))),
+        add=_rows("add", single["y"], entry, lanes=lanes, chunks=len(written), before=lanes * len(written)),
     )
 
 
-def _rows(name: str, count: int, lanes: int, entry: str) -> str:
+def _chunk(number: int, lanes: int) -> list[str]:
+    """Assembly that reads a chunk: a vector for each lane, made into rows of x."""
+    name, real, lines = f"%c{number}", f"<{lanes} x double>", []
+    for i in range(lanes):
+        at = f"{name}.{i}"
+        lines += [
+            f"  {at}.i = getelementptr i32, ptr %g, i64 {number * lanes + i}",
+            f"  {at}.s = load i32, ptr {at}.i",
+            f"  {at}.w = zext i32 {at}.s to i64",
+            f"  {at}.z = getelementptr double, ptr %z, i64 {at}.w",
+            f"  {at}.1 = load {real}, ptr {at}.z, align 8",
+        ]
+    return [*lines, *_transposed(name, lanes), *_stored(name, number, lanes, "x")]
+
+
+def _lanes_of(number: int, lanes: int) -> list[str]:
+    """Assembly that makes rows of y, a chunk, into a vector for each lane in their place."""
+    name, real, lines = f"%d{number}", f"<{lanes} x double>", []
+    for i in range(lanes):
+        lines += [
+            f"  {name}.{i}.y = getelementptr {real}, ptr %y, i64 {number * lanes + i}",
+            f"  {name}.{i}.1 = load {real}, ptr {name}.{i}.y, align 8",
+        ]
+    return [*lines, *_transposed(name, lanes), *_stored(name, number, lanes, "y")]
+
+
+def _transposed(name: str, lanes: int) -> list[str]:
+    """Assembly that exchanges rows and columns of a square of vectors, halves by halves."""
+    real, lines, half = f"<{lanes} x double>", [], 1
+    while half < lanes:
+        for i in (i for i in range(lanes) if not i & half):
+            pair = f"{real} {name}.{i}.{half}, {real} {name}.{i + half}.{half}"
+            for row, shift in ((i, 0), (i + half, half)):
+                picks = [j + shift if not j & half else lanes + j - half + shift for j in range(lanes)]
+                mask = ", ".join(f"i32 {j}" for j in picks)
+                lines.append(f"  {name}.{row}.{2 * half} = shufflevector {pair}, <{lanes} x i32> <{mask}>")
+        half *= 2
+    return lines
+
+
+def _stored(name: str, number: int, lanes: int, matrix: str) -> list[str]:
+    real, lines = f"<{lanes} x double>", []
+    for i in range(lanes):
+        lines += [
+            f"  {name}.{i}.to = getelementptr {real}, ptr %{matrix}, i64 {number * lanes + i}",
+            f"  store {real} {name}.{i}.{lanes}, ptr {name}.{i}.to, align 8",
+        ]
+    return lines
+
+
+def _rows(name: str, count: int, entry: str, **numbers: int) -> str:
     """Assembly that does an entry's work for all entries of a table row, several in one turn of a loop."""
     if count == 0:
         return f"  br label %{name}.end\n{name}.end:"
     turn = max(k for k in range(1, min(count, 64) + 1) if count % k == 0)
+    start = f"{name}.more.entries" if name == "add" else name
     lines = [
         f"  br label %{name}.entries\n{name}.entries:",
-        f"  %{name}.e0 = phi i64 [0, %{name}], [%{name}.next, %{name}.entries]",
+        f"  %{name}.e0 = phi i64 [0, %{start}], [%{name}.next, %{name}.entries]",
     ]
     for k in range(turn):
         lines += [f"  %{name}.e{k} = add i64 %{name}.e0, {k}"] if k else []
-        lines.append(entry.format(k=k, lanes=lanes))
+        lines.append(entry.format(k=k, **numbers))
     lines += [
         f"  %{name}.next = add i64 %{name}.e0, {turn}",
         f"  %{name}.again = icmp slt i64 %{name}.next, {count}",
@@ -173,10 +283,10 @@ def _rows(name: str, count: int, lanes: int, entry: str) -> str:
     return "\n".join(lines)
 
 
-def _write_body(w: Writer, kernel: Kernel) -> None:
-    """Follow the virtual machine's instructions; its registers hold names of values."""
+def _write_body(w: Writer, kernel: Kernel, x_rows: dict[int, int], y_rows: dict[int, int]) -> None:
+    """Follow the virtual machine's instructions; its registers hold names of values. Rows: of entries in x and y."""
     f = kernel.function()
-    special, operations = _special(), _operations()
+    special, operations = _special(x_rows, y_rows), _operations()
     registers: dict[int, str] = {}
     for k in range(f.n_instructions()):
         code = f.instruction_id(k)
@@ -193,14 +303,14 @@ def _write_body(w: Writer, kernel: Kernel) -> None:
             )
 
 
-def _input(w: Writer, f: ca.Function, k: int, registers: dict[int, str]) -> None:
+def _input(rows: dict[int, int], w: Writer, f: ca.Function, k: int, registers: dict[int, str]) -> None:
     argument, entry = f.instruction_input(k)
-    place = w.value(f"getelementptr {w.real}, ptr %{'xp'[argument]}, i64 {entry}")
+    place = w.value(f"getelementptr {w.real}, ptr %{'xp'[argument]}, i64 {entry if argument else rows[entry]}")
     registers[f.instruction_output(k)[0]] = w.value(f"load {w.real}, ptr {place}, align 8")
 
 
-def _output(w: Writer, f: ca.Function, k: int, registers: dict[int, str]) -> None:
-    place = w.value(f"getelementptr {w.real}, ptr %y, i64 {f.instruction_output(k)[1]}")
+def _output(rows: dict[int, int], w: Writer, f: ca.Function, k: int, registers: dict[int, str]) -> None:
+    place = w.value(f"getelementptr {w.real}, ptr %y, i64 {rows[f.instruction_output(k)[1]]}")
     w.lines.append(f"  store {w.real} {registers[f.instruction_input(k)[0]]}, ptr {place}, align 8")
 
 
@@ -208,11 +318,10 @@ def _constant(w: Writer, f: ca.Function, k: int, registers: dict[int, str]) -> N
     registers[f.instruction_output(k)[0]] = w.constant(f.instruction_constant(k))
 
 
-@cache
-def _special() -> dict[int, Callable[[Writer, ca.Function, int, dict[int, str]], None]]:
+def _special(x_rows: dict[int, int], y_rows: dict[int, int]) -> dict[int, Callable[..., None]]:
     import casadi as ca
 
-    return {ca.OP_INPUT: _input, ca.OP_OUTPUT: _output, ca.OP_CONST: _constant}
+    return {ca.OP_INPUT: partial(_input, x_rows), ca.OP_OUTPUT: partial(_output, y_rows), ca.OP_CONST: _constant}
 
 
 def _not(w: Writer, a: str) -> str:

@@ -74,4 +74,7 @@ class VMRun:
         if inputs.size:
             z.take(self.gather, out=inputs, mode="clip")  # in range already; "raise" would copy
         evaluate()
-        np.add.at(r, self.scatter, outputs)
+        if self.kernel.replaces:
+            r[self.scatter] = outputs
+        else:
+            np.add.at(r, self.scatter, outputs)

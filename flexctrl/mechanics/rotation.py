@@ -70,7 +70,7 @@ def turn_kernel() -> Kernel:
     from flexctrl.kernels.kernel import Kernel
 
     rows, theta = ca.SX.sym("R", 9), ca.SX.sym("theta", 3)
-    return Kernel("turn", ca.vertcat(rows, theta), ca.SX.sym("p", 0), turned_rows(rows, theta))
+    return Kernel("turn", ca.vertcat(rows, theta), ca.SX.sym("p", 0), turned_rows(rows, theta), replaces=True)
 
 
 def turned_rows(rows: ca.SX, theta: ca.SX) -> ca.SX:

@@ -238,7 +238,7 @@ def bytes_an_element(elements: int) -> float:
     """What an iteration reads or writes for each element: workspace, factors, tables of the forces."""
     F = flatten(chain_model(elements, SWINGS["easy"]))
     f, fronts = F.flat, F.plan.fronts
-    tables = sum(a.nbytes for run in f.forces for a in (run.tables.gather, run.tables.scatter, run.blocks))
+    tables = sum(a.nbytes for run in f.forces for a in (run.gather, run.tables.scatter, run.blocks, run.places))
     return (tables + 8 * (f.size + f.padded + fronts.below + fronts.right)) / elements
 
 

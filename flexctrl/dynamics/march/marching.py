@@ -49,7 +49,7 @@ from flexctrl.model.state import State
 
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
-_SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
+_SHARE, _KEEPING = 1e-2, 1e-4  # where nothing is damped, what Newton's method leaves adds up
 _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed")
 _MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6

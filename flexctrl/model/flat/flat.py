@@ -43,12 +43,14 @@ class Flat:
         Sums of the degrees of freedom at the start of the step.
     driven, found : Reals
         Driven coordinates at the start of the step, and at its end (*).
+    whole : Wholes
+        Nodes whose six degrees of freedom are their own and follow each other, and the first of these.
     moved, turned, linked : Wholes
-        Nodes that move and that turn by degrees of freedom of their own, and those of the linkage.
+        Other nodes that move and that turn by degrees of freedom of their own, and those of the linkage.
     cells : Wholes
         Degree of freedom of each of a node's six.
     slots, sources : Wholes
-        Velocities among the slots, and the degrees of freedom they are.
+        Velocities of other nodes among the slots, and the degrees of freedom they are.
     shafts, rigid, rotary : Wholes
         Degrees of freedom of source angles, then of modes; which shafts are rigid; which joints turn.
     ratios : Reals
@@ -74,8 +76,10 @@ class Flat:
     padded: int
     size: int
     nodes: int
+    wholes: int
     moving: int
     turning: int
+    turns: int
     linking: int
     rates: int
     drives: int
@@ -98,6 +102,7 @@ class Flat:
     q: Reals
     driven: Reals
     found: Reals
+    whole: Wholes
     moved: Wholes
     turned: Wholes
     linked: Wholes
@@ -134,14 +139,19 @@ def load(f: Flat) -> None:
 
 def place(f: Flat) -> None:
     """Put the nodes where the step takes them."""
+    for k in range(f.wholes):
+        x = f.pose[_POSE * f.whole[2 * k] :]
+        step = f.step[f.whole[2 * k + 1] :]
+        slot = f.z[NODE_SLOT * f.whole[2 * k] :]
+        slot[0] = x[0] + step[0]
+        slot[1] = x[1] + step[1]
+        slot[2] = x[2] + step[2]
     for k in range(f.moving):
         i = f.moved[k]
         for j in range(3):
             f.z[NODE_SLOT * i + j] = f.pose[_POSE * i + j] + f.step[f.cells[6 * i + j]]
-    for k in range(f.turning):
-        clear(9, f.z[NODE_SLOT * f.turned[k] + 3 :])
-    if f.turning > 0:
-        f.turn[0](f.z, f.z)
+    for k in range(f.turns):
+        f.turn[k](f.z, f.z)
     if f.shifting > 0:
         clear(f.shifting, f.shift)
         f.shifts[0](f.z, f.z)
@@ -179,6 +189,10 @@ def wind(f: Flat) -> None:
 
 def drive(f: Flat) -> None:
     """Give nodes and drives the rates and accelerations of the step's end."""
+    for k in range(f.wholes):
+        slot = f.z[NODE_SLOT * f.whole[2 * k] + _POSE :]
+        six(f.v[f.whole[2 * k + 1] :], slot)
+        six(f.rate[f.whole[2 * k + 1] :], slot[6:])
     for k in range(f.rates):
         f.z[f.slots[k]] = f.v[f.sources[k]]
         f.z[f.slots[k] + 6] = f.rate[f.sources[k]]
@@ -191,6 +205,16 @@ def drive(f: Flat) -> None:
             clear(_POSE, f.z[NODE_SLOT * f.linked[k] + _POSE :])
         f.linkage[1](f.z, f.z)
         f.linkage[2](f.z, f.z)
+
+
+def six(x: Reals, y: Reals) -> None:
+    """Copy the first six entries."""
+    y[0] = x[0]
+    y[1] = x[1]
+    y[2] = x[2]
+    y[3] = x[3]
+    y[4] = x[4]
+    y[5] = x[5]
 
 
 def push(f: Flat) -> None:
@@ -243,6 +267,10 @@ def energy(f: Flat) -> None:
 
 def keep(f: Flat) -> None:
     """Take the end of the step as the start of the next."""
+    for k in range(f.wholes):
+        i = f.whole[2 * k]
+        six(f.z[NODE_SLOT * i :], f.pose[_POSE * i :])
+        six(f.z[NODE_SLOT * i + 6 :], f.pose[_POSE * i + 6 :])
     for k in range(f.moving):
         i = f.moved[k]
         for j in range(3):

@@ -211,12 +211,20 @@ class Layout:
         return own, moved, turned
 
     @cached_property
+    def _whole(self) -> np.ndarray:
+        """Nodes whose six degrees of freedom are their own and follow each other."""
+        own = self._own[0]
+        cells = self.position[self.motion.place[own]]
+        return own[(np.diff(cells, axis=1) == 1).all(axis=1) & (cells[:, -1] < self.motion.n)]
+
+    @cached_property
     def _tables(self) -> dict[str, Any]:
-        m, (own, moved, turned) = self.motion, self._own
+        m, (own, moved, turned) = self.motion, (np.setdiff1d(nodes, self._whole) for nodes in self._own)
         cells = self.position[m.place[own]]
         nodes, freedoms = np.nonzero(cells < m.n)
         loads = self.model.signals.loads.tocoo()
         return {
+            "whole": np.column_stack([self._whole, self.position[m.place[self._whole, 0]]]).ravel(),
             "moved": moved,
             "turned": turned,
             "linked": np.zeros(0, dtype=int) if m.plain else m.nodes,
@@ -241,8 +249,10 @@ class Layout:
             "padded": self.padded,
             "size": self.length,
             "nodes": len(m.place),
+            "wholes": len(self._whole),
             "moving": len(tables["moved"]),
             "turning": len(tables["turned"]),
+            "turns": len(self._runs["turn"]),
             "linking": len(tables["linked"]),
             "rates": len(tables["slots"]),
             "drives": len(m.drives),
