@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from math import factorial
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 
 from flexctrl.linear.statespace import FirstOrder
@@ -72,13 +71,15 @@ def response(first: FirstOrder, t: float, h: float) -> tuple[sp.csr_matrix, np.n
 
 def _chain(A: np.ndarray, B: np.ndarray, t: float, h: float) -> tuple[np.ndarray, list[np.ndarray]]:
     """Exponentials of many systems with a chain of integrators before the inputs (Van Loan 1978)."""
+    from scipy.linalg import expm
+
     count, n, m = B.shape
     whole = np.zeros((count, n + _POWERS * m, n + _POWERS * m))
     whole[:, :n, :n], whole[:, :n, n : n + m] = A * t, B * t
     for k in range(_POWERS - 1):
         rows, columns = slice(n + k * m, n + (k + 1) * m), slice(n + (k + 1) * m, n + (k + 2) * m)
         whole[:, rows, columns] = np.eye(m)
-    E = la.expm(whole)
+    E = expm(whole)
     share = t / h
     shapes = [factorial(k) * share**k * E[:, :n, n + k * m : n + (k + 1) * m] for k in range(_POWERS)]
     return E[:, :n, :n], shapes

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from flexctrl.model.model import Model
 
@@ -63,9 +62,17 @@ def _components(model: Model) -> np.ndarray:
     for rows in (family.scatter(motion.source_base) for family in model.forces.families):
         ends.append((n + rows.ravel(), n + np.repeat(rows[:, 0], rows.shape[1])))
     first, last = (np.concatenate(side) for side in zip(*ends, strict=True))
-    size = n + motion.raw
-    links = sp.coo_matrix((np.ones(first.size), (first, last)), shape=(size, size))
-    return np.unique(connected_components(links, directed=False)[1][:n], return_inverse=True)[1]
+    return np.unique(_joined(first, last, n + motion.raw)[:n], return_inverse=True)[1]
+
+
+def _joined(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
+    """The first of all that links join each with. As scipy.sparse.csgraph does it, whose import takes longer."""
+    lead = np.arange(n)
+    while ((a := lead[one]) != (b := lead[other])).any():
+        np.minimum.at(lead, np.maximum(a, b), np.minimum(a, b))
+        while ((further := lead[lead]) != lead).any():
+            lead = further
+    return lead
 
 
 def farthest(model: Model, moved: np.ndarray) -> np.ndarray:

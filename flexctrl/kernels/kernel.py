@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 FLOAT = np.dtype(np.float64)
 _INDEX_LIMIT = 2**31
+_LARGE = 6000
 _OLDEST_LLVMLITE = (0, 45)
 
 
@@ -85,8 +86,10 @@ class Kernel:
     def _function(self) -> ca.Function:
         import casadi as ca
 
-        outputs = ca.densify(self.outputs)
-        return ca.Function(self.name, [self.inputs, self.params], [outputs], {"cse": True, "allow_free": True})
+        io = self.name, [self.inputs, self.params], [ca.densify(self.outputs)]
+        plain = ca.Function(*io, {"allow_free": True})
+        # in large ones, looking for what is common takes long and finds little
+        return plain if plain.n_instructions() > _LARGE else ca.Function(*io, {"cse": True, "allow_free": True})
 
     def function(self) -> ca.Function:
         """Return the casadi function (inputs, params) → outputs, dense; built once."""
@@ -250,7 +253,7 @@ class Compiled:
     """
 
     lanes: int = 0
-    optimize_up_to: int = 6000
+    optimize_up_to: int = _LARGE
 
     def __post_init__(self) -> None:
         if not can_compile():

@@ -150,7 +150,6 @@ def link(assembly: str, level: int, exported: tuple[str, ...], passes: bool = Fa
 
 def _object_code(assembly: str, level: int, passes: bool) -> bytes:
     module = binding.parse_assembly(assembly)
-    module.verify()
     machine = _machine(level)
     if passes:
         builder = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from flexctrl.kernels.kernel import FLOAT, Run
 from flexctrl.kernels.native_ir import Translation
 from flexctrl.kernels.native_types import DECLARATIONS, RUNS, SCALARS, record_fields
 
-__all__ = ["Packed", "Reals", "Runs", "Wholes", "assembly", "compiled"]
+__all__ = ["Packed", "Reals", "Runs", "Wholes", "assembly", "compiled", "seldom"]
 
 Reals: TypeAlias = np.ndarray
 """A vector of floats."""
@@ -29,6 +29,7 @@ Wholes: TypeAlias = np.ndarray
 Runs: TypeAlias = Sequence[Run]
 """Compiled kernels bound to their tables, called as ``runs[i](z, r)``."""
 
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 _WHOLE = np.dtype(np.int64)
 _libraries: list[object] = []  # owners of the memory of what `compiled` returns, which keeps it for good
 _ENTRY = """\
@@ -128,6 +129,12 @@ class _Bound(partial):
     """A call on the raw address of a record, and who owns the memory there."""
 
     owner: Packed
+
+
+def seldom(function: _Function) -> _Function:
+    """Mark a function in which little time is spent: it is compiled in a hurry, without optimisation."""
+    vars(function)["seldom"] = True
+    return function
 
 
 def assembly(function: Callable[..., int]) -> str:

@@ -39,7 +39,8 @@ class Translation(Expressions):
         self._body(tree.body)
         self._put(f"ret {llvm_type(self.result)} {ZERO[llvm_type(self.result)]}")
         slots = [f"  {slot.text} = alloca {llvm_type(slot.type)}" for slot in self.slots.values()]
-        top = f"define internal {llvm_type(self.result)} @{self.function.__name__}({', '.join(heads)}) {{"
+        hurry = " noinline optnone" if hasattr(self.function, "seldom") else ""
+        top = f"define internal {llvm_type(self.result)} @{self.function.__name__}({', '.join(heads)}){hurry} {{"
         return "\n".join([top, *slots, *self.lines, "}"])
 
     def _go(self, label: str) -> None:
@@ -133,9 +134,9 @@ class Translation(Expressions):
 
 @cache
 def _definitions(file: str) -> dict[int, ast.FunctionDef]:
-    """Return the functions of a file by the lines in which they begin, decorators included."""
+    """Return the functions of a file, none within others, by the lines in which they begin, decorators included."""
     tree = ast.parse("".join(linecache.getlines(file)))
-    found = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    found = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     return {min([node.lineno, *(d.lineno for d in node.decorator_list)]): node for node in found}
 
 

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 
 __all__ = ["clean_mass", "clean_stiffness"]
@@ -80,6 +79,8 @@ def clean_stiffness(K: sp.csc_matrix, noise: np.ndarray, groups: Groups) -> sp.c
 
 def _without(nulls: list[tuple[np.ndarray, np.ndarray]], A: sp.csc_matrix) -> sp.csc_matrix:
     """Return Wᵀ A W with W = 0 along some directions (columns) of some coordinates, and 1 across them."""
+    import scipy.linalg as la
+
     if not nulls:
         return A
     W = sp.lil_matrix(sp.identity(A.shape[0]))

@@ -20,7 +20,6 @@ from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equations import Small
 from flexctrl.model.equilibrium import equilibrium
 from flexctrl.model.laws.frictions import inner_freedoms
-from flexctrl.model.linearize import linearize
 from flexctrl.model.linkages.mobility import motion_of
 from flexctrl.model.model import Model
 from flexctrl.structure.cut import cut_ropes
@@ -133,6 +132,8 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
     """Return the model of small motion about the equilibrium under the machine's own weight."""
     others = [e for e in parts if not isinstance(e, GeometricStiffness)]
     large = assemble(structure, [*others, LargeRotation()], backend)
+    from flexctrl.model.linearize import linearize  # brings all that modes need
+
     linear = linearize(large, at=(found := equilibrium(large)))
     still = np.zeros(large.n)
     rest = replace(found.state, q=still, v=still)
@@ -144,6 +145,8 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
 
 def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:
     """Return M Φ diag(2 ζ ω) Φᵀ M with the flexible modes about the equilibrium under the model's own weight."""
+    from flexctrl.model.linearize import linearize  # brings all that modes need
+
     linear = linearize(model)
     modes = linear.modes(None if isinstance(damping.ratios, float) else len(damping.ratios) + linear.modes().rigid)
     shapes, omega = modes.shapes[:, modes.rigid :], modes.omega[modes.rigid :]

@@ -11,11 +11,9 @@ import numpy as np
 
 from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.balance import Balance
-from flexctrl.model.certify import whole_body
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
 from flexctrl.model.search import Found, Newton, follow
-from flexctrl.model.stability import leaving
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -69,6 +67,8 @@ class Rest:
             neither mass nor stiffness, or where massless freedoms are damped.
         """
         held = (self.model.coordinate(name) for name in self.held)
+        from flexctrl.model.stability import leaving  # brings all that modes need
+
         return leaving(Balance(self.model, self.inputs, {i: float(self.state.q[i]) for i in held}), self.state)
 
     @property
@@ -207,6 +207,8 @@ def _pushed_freely(balance: Balance, state: State) -> list[str]:
     stiff = float(np.abs(K.data).max()) if K.nnz else 1.0
     names = tuple(model.coordinates[i] for i in balance.free)
     pushed = []
+    from flexctrl.model.certify import whole_body  # brings all that modes need
+
     for name, motion in whole_body(names, model.motion, state):
         size = float(np.abs(motion / balance.unit[balance.free]).max())
         resisted = np.abs(K @ motion).max(initial=0.0) > 1e-6 * stiff * size

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import lsmr
 
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
@@ -223,6 +222,8 @@ def _least(A: sp.csr_matrix, b: np.ndarray) -> np.ndarray:
     """The shortest solution of least squares."""
     if not A.nnz:
         return np.zeros(A.shape[1])
+    from scipy.sparse.linalg import lsmr
+
     return np.asarray(lsmr(A, b, atol=1e-15, btol=1e-15, conlim=0.0, maxiter=20 * min(A.shape))[0])
 
 

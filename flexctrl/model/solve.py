@@ -1,4 +1,7 @@
-"""Linear solves: dense while small, banded after reverse Cuthill–McKee, sparse LU where the band is wide."""
+"""Linear solves: dense while small, banded after reverse Cuthill–McKee, sparse LU where the band is wide.
+
+What solves is imported where it is needed: it takes longer than a short march, which does not.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import lapack
-from scipy.sparse.csgraph import reverse_cuthill_mckee
-from scipy.sparse.linalg import splu
 
 from flexctrl.errors import SingularMatrixError
 
@@ -55,6 +55,8 @@ def plan(A: sp.csr_matrix) -> Plan:
     empty = np.zeros(0, dtype=int)
     if n <= _DENSE_UP_TO:
         return Plan(A.indptr, A.indices, empty, 0, empty)
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
     order = reverse_cuthill_mckee(A, symmetric_mode=False)
     back = np.empty(n, dtype=int)
     back[order] = np.arange(n)
@@ -97,6 +99,8 @@ def factorise(A: sp.spmatrix, known: Plan | None = None) -> Solve:
 def _dense(A: np.ndarray) -> Solve:
     if not A.size:
         return lambda b: b
+    from scipy.linalg import lapack
+
     lu, pivots, info = lapack.dgetrf(A)
     if info:
         raise SingularMatrixError(info - 1)
@@ -104,6 +108,8 @@ def _dense(A: np.ndarray) -> Solve:
 
 
 def _banded(A: sp.csr_matrix, known: Plan) -> Solve:
+    from scipy.linalg import lapack
+
     n, band, order = A.shape[0], known.band, known.order
     storage = np.bincount(known.places, weights=A.data, minlength=n * (3 * band + 1))
     lu, pivots, info = lapack.dgbtrf(storage.reshape(n, -1).T, band, band, overwrite_ab=True)
@@ -119,6 +125,8 @@ def _banded(A: sp.csr_matrix, known: Plan) -> Solve:
 
 
 def _sparse(A: sp.csr_matrix) -> Solve:
+    from scipy.sparse.linalg import splu
+
     try:
         return splu(A.tocsc()).solve
     except RuntimeError:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.kernels.native import Reals, Runs, Wholes
+from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.flat.flat import Flat, clear, drive
 from flexctrl.model.flat.layout import Flattened
 from flexctrl.model.laws.kinds import NODE_SLOT
@@ -74,6 +74,7 @@ def closing_of(F: Flattened) -> Closing:
     return Closing(loops, free, cells.size, (look,), found, work, cells, np.zeros(cells.size), most)
 
 
+@seldom
 def settled(c: Closing, f: Flat) -> None:
     """Take up the rates of a state that has been entered."""
     drive(f)
@@ -81,6 +82,7 @@ def settled(c: Closing, f: Flat) -> None:
         c.speeds[i] = f.z[c.cells[i]]
 
 
+@seldom
 def in_doubt(c: Closing, f: Flat, h: float) -> bool:
     """Tell whether a loop may be at a dead point after the step under way, or is not closed; take up its rates."""
     clear(c.loops * (1 + c.free + c.loops), c.found)
@@ -98,6 +100,7 @@ def in_doubt(c: Closing, f: Flat, h: float) -> bool:
     return doubt
 
 
+@seldom
 def locking(c: Closing) -> bool:
     """Tell whether dependent freedoms move far with the others: work that out, by elimination."""
     n = c.loops
@@ -117,6 +120,7 @@ def locking(c: Closing) -> bool:
     return far(c)
 
 
+@seldom
 def eliminated(c: Closing, k: int) -> bool:
     """Eliminate the dependent freedom k from the rows after it; tell whether its pivot is no small one."""
     n = c.loops
@@ -139,6 +143,7 @@ def eliminated(c: Closing, k: int) -> bool:
     return True
 
 
+@seldom
 def far(c: Closing) -> bool:
     """Tell whether some freedom moves the dependent ones much further than the loop by itself."""
     n = c.loops
@@ -154,6 +159,7 @@ def far(c: Closing) -> bool:
     return False
 
 
+@seldom
 def sent_back(c: Closing, f: Flat, h: float) -> bool:
     """Tell whether parts that move at full speed have turned back over the step, more than they were pulled."""
     fastest = 0.0

@@ -8,7 +8,7 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.corners import within
 from flexctrl.dynamics.march.record import CORNER, DONE, WANTS_TANGENT, March
 from flexctrl.kernels.eights import eight, larger, put, total
-from flexctrl.kernels.native import Reals
+from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import keep, load, place, pull
 from flexctrl.model.gauges import show
 
@@ -57,6 +57,7 @@ def glide(m: March) -> int:
     return DONE
 
 
+@seldom
 def spin(m: March) -> None:
     """Turn the nodes whose rotations are shown."""
     e = m.leap
@@ -65,6 +66,7 @@ def spin(m: March) -> None:
         about(e.sight[first + 3 * k :], e.upright[9 * k :], m.flat.z[e.spun[k] :])
 
 
+@seldom
 def about(theta: Reals, before: Reals, after: Reals) -> None:
     """Turn a rotation by a rotation vector (Rodrigues)."""
     square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
@@ -82,6 +84,7 @@ def about(theta: Reals, before: Reals, after: Reals) -> None:
         after[6 + j] = z + once * (theta[0] * y - theta[1] * x) + twice * (theta[2] * along - square * z)
 
 
+@seldom
 def sees_corner(m: March) -> bool:
     """Tell whether the step passes a corner of a line's law of force."""
     c = m.corners
@@ -95,6 +98,7 @@ def sees_corner(m: March) -> bool:
     return False
 
 
+@seldom
 def back(m: March) -> None:
     """Undo a step."""
     e = m.leap
@@ -103,6 +107,7 @@ def back(m: March) -> None:
     e.lost = 0.0
 
 
+@seldom
 def way(m: March, j: int) -> float:
     """Return the way of an input: what its work is done along."""
     f = m.flat
@@ -170,6 +175,7 @@ def lost_apart(m: March) -> float:
     return found
 
 
+@seldom
 def lost(m: March) -> float:
     """Return the energy dissipated over the step that is about to be taken.
 
@@ -234,6 +240,7 @@ def product(count: int, length: int, weights: Reals, rows: Reals, out: Reals) ->
         i += 8
 
 
+@seldom
 def land(m: March) -> None:
     """Bring degrees of freedom and nodes to where the modal state is."""
     f = m.flat
@@ -252,6 +259,7 @@ def land(m: March) -> None:
     e.aloft = 0
 
 
+@seldom
 def level(m: March) -> None:
     """Bring degrees of freedom to where the modal state is; not by a step: to the bit the same always."""
     e = m.leap
@@ -259,6 +267,7 @@ def level(m: March) -> None:
     product(e.size, m.flat.padded, e.state, e.rates, m.flat.v)
 
 
+@seldom
 def unfold(m: March) -> None:
     """Work out the step and the rates from the modal state."""
     f = m.flat
@@ -269,6 +278,7 @@ def unfold(m: March) -> None:
         put(f.step[i:], eight(f.step[i:]) - eight(f.q[i:]))
 
 
+@seldom
 def leap(m: March) -> int:
     """Take a step that is placed and entered as others are, or ask for its tables."""
     if abs(m.h - m.leap.h) > _ALIKE * m.h:

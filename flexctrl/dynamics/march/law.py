@@ -10,7 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.kernels.kernel import Compiled
-from flexctrl.kernels.native import Reals, Runs, Wholes
+from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.flat.flat import clear
 
 if TYPE_CHECKING:
@@ -168,6 +168,7 @@ def _until_one_fails(found: Lowered, times: np.ndarray) -> np.ndarray:
     return np.array(rows).reshape(-1, len(found.clocks))
 
 
+@seldom
 def said(law: Law, y: Reals) -> bool:
     """Ask the law at a sample; tell whether what it says, left in ``answer``, are numbers."""
     own = law.work[law.outputs :]
@@ -184,6 +185,7 @@ def said(law: Law, y: Reals) -> bool:
     return math.isfinite(total)
 
 
+@seldom
 def obeyed(law: Law) -> bool:
     """Put what the law has said in force; tell whether inputs change."""
     own = law.work[law.outputs :]
@@ -201,6 +203,7 @@ def obeyed(law: Law) -> bool:
     return changed
 
 
+@seldom
 def enter_leg(law: Law, steps: int) -> None:
     """Write down a leg."""
     row = law.told[(3 + law.inputs + law.states) * law.legs :]
@@ -214,6 +217,7 @@ def enter_leg(law: Law, steps: int) -> None:
     law.legs += 1
 
 
+@seldom
 def enter_inputs(law: Law, first: int, last: int) -> None:
     """Write down the inputs in force from the ends of some steps on."""
     for k in range(first, last):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.dynamics.march.pairs import pairs_of
 from flexctrl.dynamics.march.record import Leap
-from flexctrl.dynamics.modal_equations import ModalEquations
-from flexctrl.dynamics.propagator import Propagator
-from flexctrl.dynamics.quadratic import Turnover
 from flexctrl.model.flat.layout import Flattened
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.modal_equations import ModalEquations
+    from flexctrl.dynamics.propagator import Propagator
+    from flexctrl.dynamics.quadratic import Turnover
 
 __all__ = ["Leaps", "Tables"]
 

@@ -33,7 +33,7 @@ from flexctrl.dynamics.march.record import (
 )
 from flexctrl.dynamics.march.step import blended, refactored, sloped, step, to_rate, to_v
 from flexctrl.kernels.eights import eight, larger, largest, put, total
-from flexctrl.kernels.native import Reals
+from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import clear, drive, energy, keep, load, place, pull, push
 from flexctrl.model.flat.fronts import factor
 from flexctrl.model.gauges import read
@@ -54,6 +54,7 @@ _TRUSTED = 8
 _MASSLESS = 1e-14
 
 
+@seldom
 def run(m: March) -> int:
     """Do the task that is set."""
     status = task(m)
@@ -62,6 +63,7 @@ def run(m: March) -> int:
     return status
 
 
+@seldom
 def task(m: March) -> int:
     """Do it, maybe on modal states alone."""
     if m.task == FIXED:
@@ -79,6 +81,7 @@ def task(m: March) -> int:
     return refactored(m) if m.task == REFACTOR else weighed(m)
 
 
+@seldom
 def made_again(m: March) -> int:
     """Make a matrix again in the workspace in which it was made."""
     if m.task == WEIGHED:
@@ -88,6 +91,7 @@ def made_again(m: March) -> int:
     return refactored(m)
 
 
+@seldom
 def sampled(m: March) -> int:
     """Go from sample to sample of the law as long as there is room, and as it says numbers."""
     law = m.law
@@ -118,6 +122,7 @@ def sampled(m: March) -> int:
         enter_inputs(law, m.done - 1, m.done)
 
 
+@seldom
 def set_out(m: March, law: Law) -> bool:
     """Set out for the next sample; tell whether there is room."""
     m.stop = float(law.passed + 1) * law.period
@@ -142,6 +147,7 @@ def set_out(m: March, law: Law) -> bool:
     return True
 
 
+@seldom
 def hurried(m: March) -> int:
     """Let the inputs jump if they are to, then take steps of controlled error."""
     if m.jumping == 1:
@@ -152,6 +158,7 @@ def hurried(m: March) -> int:
     return controlled(m)
 
 
+@seldom
 def fixed(m: March) -> int:
     """Take steps of one length until all wanted are done or no state can be kept; or one needs a tangent or fails.
 
@@ -181,6 +188,7 @@ def fixed(m: March) -> int:
     return DONE
 
 
+@seldom
 def glided(m: March) -> int:
     """Take exact steps of one length on modal states alone, but where a state is to be kept."""
     m.jumping = 0
@@ -198,6 +206,7 @@ def glided(m: March) -> int:
     return DONE
 
 
+@seldom
 def controlled(m: March) -> int:
     """Take steps of controlled error until all wanted are done, the stop is reached or the end would be passed."""
     again = False
@@ -237,6 +246,7 @@ def controlled(m: March) -> int:
     return DONE
 
 
+@seldom
 def fitted(h: float, left: float) -> float:
     """Return a step that ends at the stop or leaves room for another."""
     if h > 0.99 * left:
@@ -244,6 +254,7 @@ def fitted(h: float, left: float) -> float:
     return 0.5 * left if h > 0.5 * left else h
 
 
+@seldom
 def growth(error: float) -> float:
     """Return by what a step may be longer for an error of 1: it grows with the cube."""
     return math.pow(max(error, 1e-9), -1.0 / 3.0)
@@ -319,6 +330,7 @@ def follow(m: March) -> None:
         m.farthest[m.part[i]] = max(m.farthest[m.part[i]], way + 1.0 - max(way, 1.0))
 
 
+@seldom
 def tighten(m: March, still: float, onward: float) -> None:
     """Choose Newton's tolerance for the next step.
 
@@ -329,6 +341,7 @@ def tighten(m: March, still: float, onward: float) -> None:
     m.tolerance = min(max(m.least, m.share * m.error * smooth), m.loosest)
 
 
+@seldom
 def lean(m: March, shared: float, square: float) -> None:
     """Choose the share of the last change of accelerations that the next one is expected to be."""
     m.lean = min(1.0, max(-1.0, shared / square)) if square > 0.0 else 1.0
@@ -361,12 +374,14 @@ def enter(m: March) -> None:
         draw(m)
 
 
+@seldom
 def drawn_now(m: March) -> bool:
     """Count a step; tell whether the balance is to be drawn after it."""
     m.entered += 1
     return m.drawing == 1 and (m.entered < OFTEN or m.entered % OFTEN == 0)
 
 
+@seldom
 def draw(m: March) -> None:
     """Draw the balance; as `Books.close` does."""
     kinetic = m.flat.books[0]
@@ -378,6 +393,7 @@ def draw(m: March) -> None:
     m.turnover = max(m.turnover, max(turned, swung))
 
 
+@seldom
 def note(m: March) -> None:
     """Write down outputs and, where it is wanted, the state."""
     f = m.flat
@@ -413,6 +429,7 @@ def copy(n: int, x: Reals, y: Reals) -> None:
         y[i] = x[i]
 
 
+@seldom
 def settle(m: March) -> int:
     """Take up the state that has been entered: loads, and what outputs read."""
     f = m.flat
@@ -428,6 +445,7 @@ def settle(m: March) -> int:
     return DONE
 
 
+@seldom
 def jump(m: March) -> int:
     """Let the accelerations follow a jump of the inputs: solve for them with the mass, kept as tangents are.
 
@@ -458,6 +476,7 @@ def jump(m: March) -> int:
     return DONE
 
 
+@seldom
 def spent(m: March) -> bool:
     """Tell whether the mass was believed in as long as it may, and making it takes less than looking at it again."""
     return m.asking == 0 and m.probes.groups == 0 and m.believed >= _TRUSTED
@@ -484,6 +503,7 @@ def small(m: March) -> bool:
     return False
 
 
+@seldom
 def solved_for(m: March) -> int:
     """Solve for the accelerations, once more with the mass made anew if need be."""
     while not balanced(m):
@@ -499,6 +519,7 @@ def solved_for(m: March) -> int:
     return DONE
 
 
+@seldom
 def massed(m: March) -> int:
     """Make the mass for the present shape, or ask for it."""
     if m.asking == 1:
@@ -508,6 +529,7 @@ def massed(m: March) -> int:
     return weighed(m)
 
 
+@seldom
 def balanced(m: March) -> bool:
     """Solve for the accelerations as exactly as steps are; tell whether the mass, of another shape maybe, was good."""
     f = m.flat
@@ -548,6 +570,7 @@ def added(m: March) -> float:
     return largest(most) if math.isfinite(total(sums)) else math.nan
 
 
+@seldom
 def largest_rate(m: March) -> float:
     """Return the size of the largest acceleration."""
     size = 0.0 * eight(m.weight)
@@ -556,6 +579,7 @@ def largest_rate(m: March) -> float:
     return largest(size)
 
 
+@seldom
 def weighed(m: March) -> int:
     """Factorise the mass that has been filled in for the present shape."""
     f = m.flat

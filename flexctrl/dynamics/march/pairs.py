@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg as la
 
-from flexctrl.linear.statespace import FirstOrder
+if TYPE_CHECKING:
+    from flexctrl.linear.statespace import FirstOrder
 
 __all__ = ["Pairs", "pairs_of"]
 
@@ -43,6 +44,8 @@ def pairs_of(first: FirstOrder) -> Pairs:
     Blocks of more than two states are written in eigenvectors, real and imaginary parts of each, and what stands
     still or drifts in a basis of its own, where that is well conditioned.
     """
+    import scipy.linalg as la
+
     n = len(first.A)
     basis, lengths = np.eye(n), []
     for block in first.blocks:
@@ -61,6 +64,8 @@ def pairs_of(first: FirstOrder) -> Pairs:
 
 def _apart(A: np.ndarray) -> np.ndarray | None:
     """A basis in which A is blocks of two; None if it is badly conditioned."""
+    import scipy.linalg as la
+
     values, vectors = la.eig(A)
     small = _STILL * float(np.abs(values).max())
     still = np.abs(values) <= small

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.kernels.eights import eight, put
-from flexctrl.kernels.native import Reals, Wholes
+from flexctrl.kernels.native import Reals, Wholes, seldom
 from flexctrl.model.flat.flat import Flat, clear, drive, place, push
 from flexctrl.model.flat.layout import Flattened
 
@@ -101,6 +101,7 @@ def _grouped(F: Flattened) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.
     )
 
 
+@seldom
 def probe(p: Probes, f: Flat, on_place: float, on_rate: float, on_acceleration: float, entries: Reals) -> None:
     """Fill in the slope of the forces for motions that add these times an increment."""
     clear(f.entries, entries)

@@ -12,6 +12,7 @@ from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
+from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import drive, place, push, tangent
 from flexctrl.model.flat.fronts import factor
 
@@ -27,6 +28,7 @@ _ROUND_OFF = 1e-13
 """Corrections below this that do not shrink any more are round-off."""
 
 
+@seldom
 def step(m: March) -> int:
     """Solve a step, once more with tangents made anew if need be; after `refactored` it goes on where it was."""
     while True:
@@ -66,6 +68,7 @@ def blended(m: March, rate: Eight, before: Eight, own: Eight) -> Eight:
     return ((1.0 - m.alpha_f) * rate + m.alpha_f * before - m.alpha_m * own) * (1.0 / (1.0 - m.alpha_m))
 
 
+@seldom
 def newton(m: March) -> int:
     """Iterate until the step is solved."""
     f = m.flat
@@ -106,6 +109,7 @@ def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) ->
         tangent(m.flat, on_place, on_rate, on_acceleration, m.entries)
 
 
+@seldom
 def foremost(m: March) -> int:
     """Return the degree of freedom with the largest correction in the last iteration, or one that is not finite."""
     f = m.flat
@@ -115,16 +119,19 @@ def foremost(m: March) -> int:
     return 0
 
 
+@seldom
 def to_v(m: March) -> float:
     """Return what an increment of the step adds to the rates at its end."""
     return m.gamma / (m.h * m.beta)
 
 
+@seldom
 def to_rate(m: March) -> float:
     """Return what an increment of the step adds to the accelerations at its end."""
     return (1.0 - m.alpha_m) / (m.h * m.h * m.beta * (1.0 - m.alpha_f))
 
 
+@seldom
 def reckon(m: March) -> None:
     """Enter the iterations of a step in the account of the tangent."""
     m.served += 1
@@ -132,6 +139,7 @@ def reckon(m: March) -> None:
     m.lately = m.iteration + 1.0
 
 
+@seldom
 def stale(m: March) -> bool:
     """Tell whether the tangent is of another step length or of another shape, or no longer worth keeping.
 
@@ -143,6 +151,7 @@ def stale(m: March) -> bool:
     return turned_too_far(m.axes, m.tangent, m.flat, _TURNED)
 
 
+@seldom
 def refactored(m: March) -> int:
     """Factorise the tangent that has been filled in for the present end of the step."""
     where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
@@ -160,6 +169,7 @@ def refactored(m: March) -> int:
     return DONE
 
 
+@seldom
 def converged(m: March, size: float) -> bool:
     """Tell whether a correction of this size was the last that is needed.
 

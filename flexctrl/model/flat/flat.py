@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 from flexctrl.kernels.eights import eight, put
-from flexctrl.kernels.native import Reals, Runs, Wholes
+from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = ["Flat", "clear", "drive", "energy", "keep", "load", "place", "pull", "push", "tangent"]
@@ -171,6 +171,7 @@ def clear(n: int, x: Reals) -> None:
         x[i] = 0.0
 
 
+@seldom
 def wind(f: Flat) -> None:
     """Find the driven coordinates, with the whole turns that bring them next to those before the step."""
     clear(f.drives, f.found)
@@ -226,6 +227,7 @@ def push(f: Flat) -> None:
         f.linkage[3](f.z, f.z)
 
 
+@seldom
 def pull(f: Flat) -> None:
     """Sum up the forces of the inputs alone."""
     press(f)
@@ -248,6 +250,7 @@ def press(f: Flat) -> None:
             f.force[at[2 + i]] += f.u[at[0]] * along
 
 
+@seldom
 def tangent(f: Flat, on_place: float, on_rate: float, on_acceleration: float, entries: Reals) -> None:
     """Fill in the slope of the forces for motions that add these times an increment."""
     f.seeds[0] = on_place
@@ -258,6 +261,7 @@ def tangent(f: Flat, on_place: float, on_rate: float, on_acceleration: float, en
         f.tangents[k](f.z, entries)
 
 
+@seldom
 def energy(f: Flat) -> None:
     """Work out the energies and the dissipated power of the slots."""
     clear(3, f.books)

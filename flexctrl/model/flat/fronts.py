@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 from flexctrl.errors import KernelError
 from flexctrl.kernels.eights import eight, put
-from flexctrl.kernels.native import Reals, Wholes
+from flexctrl.kernels.native import Reals, Wholes, seldom
 
 __all__ = ["Fronts", "Plan", "factor", "plan_of", "solve"]
 
@@ -216,6 +216,7 @@ def _laid_out(n: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
     return found
 
 
+@seldom
 def factor(f: Fronts, entries: Reals, diagonal: Reals, down: Reals, up: Reals) -> int:
     """Factorise the matrix in ``entries``, which are used up; return the unknown whose pivot vanishes, or −1.
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import qr
 
 from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
@@ -243,6 +242,8 @@ def _independent(A: np.ndarray, tolerance: float) -> list[int]:
     """Return columns of A that span all of them, the largest first (QR with column pivoting)."""
     if not A.size:
         return []
+    from scipy.linalg import qr
+
     _, R, order = qr(A, mode="economic", pivoting=True)
     rank = int(np.count_nonzero(np.abs(np.diag(R)) > tolerance))
     return sorted(int(i) for i in order[:rank])

@@ -7,8 +7,6 @@ from contextlib import suppress
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import brentq
-from scipy.sparse.linalg import splu
 
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.paths.course import Course, Direction, Station
@@ -52,6 +50,8 @@ def reached(course: Course, start: Station, length: float, gauge: Gauge) -> tupl
 
     if value(0.0) * value(length) > 0.0:
         return known[length], length
+    from scipy.optimize import brentq
+
     with suppress(SingularMatrixError):
         brentq(value, 0.0, length, xtol=1e-12 * max(length, 1e-6), rtol=8.9e-16, maxiter=60)
     best = min((at for at in known if at), key=lambda at: abs(gauge(known[at])))
@@ -60,6 +60,8 @@ def reached(course: Course, start: Station, length: float, gauge: Gauge) -> tupl
 
 def softest(course: Course, station: Station) -> np.ndarray:
     """Return the displacement of the free coordinates that the machine resists least, of length one."""
+    from scipy.sparse.linalg import splu
+
     K = course.stiffness(station.state, station.factor)
     K = (0.5 * (K + K.T)).tocsc()
     scale = 1.0 / np.sqrt(course.weight)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 ZERO_PIVOT = 1e-13
 """Pivots of a matrix scaled to a unit diagonal that count as zero."""
@@ -36,6 +34,8 @@ def pivots(A: sp.spmatrix, terms: sp.spmatrix | None, side: float) -> np.ndarray
     numpy.ndarray, shape (n,)
         NaN throughout if the matrix cannot be factorised without exchanging rows.
     """
+    from scipy.sparse.linalg import splu
+
     if not A.shape[0] or not np.isfinite(A.data).all():
         return np.full(A.shape[0], np.nan)
     sizes = abs(A) if terms is None else terms
@@ -87,6 +87,8 @@ def turned(A: sp.spmatrix) -> int:
     -------
     int
     """
+    from scipy.sparse.linalg import splu
+
     A = sp.csc_matrix(A)
     if not A.nnz or abs(A - A.T).max() <= SKEW * np.abs(A.data).max():
         return negative_pivots(A)
@@ -100,6 +102,8 @@ def turned(A: sp.spmatrix) -> int:
 
 def _exchanges(order: np.ndarray) -> int:
     """How many exchanges of two make a permutation, but for an even number."""
+    from scipy.sparse.csgraph import connected_components
+
     n = order.size
     cycles = connected_components(sp.csr_matrix((np.ones(n), (np.arange(n), order)), (n, n)), directed=False)[0]
     return n - int(cycles)
