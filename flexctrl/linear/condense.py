@@ -16,7 +16,8 @@ from flexctrl.linear.banded import Band, band_of
 from flexctrl.linear.eigen import coordinate_scales
 from flexctrl.linear.massless import DENSE_BLOCK, Massless, as_dense, massless, pivots, solved
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.pattern import asymmetry, congruent, mirror, symmetric
+from flexctrl.linear.pattern import aligned, asymmetry, congruent, mirror, symmetric
+from flexctrl.linear.proportional import Proportional, proportional
 from flexctrl.linear.words import motions_in_words
 
 __all__ = ["Audit", "Freedom", "Scaled", "audit", "condense", "scaled", "scaled_any", "static_map", "static_response"]
@@ -107,6 +108,16 @@ class Scaled:
     def mass(self) -> sp.csc_matrix:
         """The symmetric part of M."""
         return symmetric(self.model.M, self._across)[0]
+
+    @cached_property
+    def matched(self) -> tuple[sp.csc_matrix, ...]:
+        """M, C and K on one pattern."""
+        return aligned(self.model.M, self.model.C, self.model.K)
+
+    @cached_property
+    def proportional(self) -> Proportional:
+        """What of C is proportional to M and K."""
+        return proportional(*self.matched)
 
     @cached_property
     def _across(self) -> np.ndarray | None:

@@ -12,7 +12,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled, static_response
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, ROUND_OFF, Modes, refuse_unsymmetric
-from flexctrl.linear.pattern import aligned, symmetric
+from flexctrl.linear.pattern import symmetric, with_entries
 
 __all__ = ["ModalSystem", "Relaxation", "modal_damping", "modal_system", "proper", "rayleigh"]
 
@@ -107,7 +107,7 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
     chosen = even._every_mode if modes is None else modes
     direct = static_response(base)
     feedthrough, jump = base.model.D + base.model.Cq @ direct, base.model.Cv @ direct
-    fit = rayleigh(base.model)
+    fit = rayleigh(base)
     if fit is not None:
         damping = np.diag(fit[0] + fit[1] * chosen.omega_squared)
         relaxation = _relaxation(base, chosen, fit[1])
@@ -120,28 +120,21 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
     return ModalSystem(chosen, damping, circulatory, relaxation, feedthrough, jump, classical)
 
 
-def rayleigh(model: LinearModel) -> tuple[float, float] | None:
+def rayleigh(base: Scaled) -> tuple[float, float] | None:
     """(α, β) if C = α M + β K to rounding, else None.
 
     Parameters
     ----------
-    model : LinearModel
-        Scaled.
+    base : Scaled
 
     Returns
     -------
     tuple of two floats, or None
     """
-    if not np.any(model.C.data):
+    if not np.any(base.model.C.data):
         return 0.0, 0.0
-    m, c, k = (A.data for A in aligned(model.M, model.C, model.K))
-    size = np.array([np.abs(m).max(initial=0.0) or 1.0, np.abs(k).max(initial=0.0) or 1.0])
-    fit = np.linalg.lstsq(np.stack([m, k], axis=1) / size, c, rcond=None)[0] / size
-    miss = np.abs(c - fit[0] * m - fit[1] * k)
-    if (miss > 1e-13 * np.abs(c).max()).any():
-        return None
-    fit[np.abs(fit * size) < 1e-15 * np.abs(c).max()] = 0.0
-    return float(fit[0]), float(fit[1])
+    found = base.proportional
+    return None if found.rest.any() else (found.alpha, found.beta)
 
 
 def modal_damping(C: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
@@ -157,7 +150,7 @@ def modal_damping(C: sp.spmatrix, shapes: np.ndarray) -> np.ndarray:
     numpy.ndarray, shape (k, k)
     """
     full = shapes.T @ (C @ shapes)
-    noise = 100.0 * EPS * (np.abs(shapes).T @ (abs(C) @ np.abs(shapes)))
+    noise = 100.0 * EPS * (np.abs(shapes).T @ (with_entries(C, np.abs(C.data)) @ np.abs(shapes)))
     own = np.sqrt(np.abs(np.diag(full)))
     small = np.abs(full) <= np.maximum(noise, 1e-11 * np.outer(own, own))
     np.fill_diagonal(small, np.abs(np.diag(full)) <= np.diag(noise))

@@ -7,12 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
+from flexctrl.kernels.kernel import can_compile
+from flexctrl.kernels.native import Packed
 from flexctrl.linear.direct import infinite
+from flexctrl.linear.modal_loops import Summing, add_modes
 from flexctrl.linear.modes import Modes
 
 __all__ = ["ModalSum", "divided", "modal_sum", "outer", "pole_sum"]
 
 CACHED = 8192
+MANY, FEW = 8192, 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +54,19 @@ class ModalSum:
         """d · moving."""
         return self.damping[:, None] * self.moving
 
+    @cached_property
+    def _shares(self) -> np.ndarray:
+        """still and, if anything is seen of velocities, moving beside it."""
+        return np.ascontiguousarray(np.hstack([self.still, self.moving]) if self.moves else self.still)
+
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Shape (N, n_outputs · n_inputs)."""
         if s.real.any():
             turning = s[:, None] ** 2 + self.values + self.damping * s[:, None]
             return divided(self.still, self.moving, s, turning, "a mode")
+        quick = self._compiled(s.imag) if self._worth_compiling(s.size) else None
+        if quick is not None:
+            return quick
         result = np.empty((s.size, self.still.shape[1]), dtype=complex)
         # pieces that stay in the cache: three times faster than all at once
         step = max(1, min(s.size, CACHED // max(1, self.values.size)))
@@ -63,6 +75,38 @@ class ModalSum:
             piece = s.imag[i : i + step, None]
             self._on_the_axis(piece, result[i : i + step], room[:, : len(piece)])
         return result
+
+    def _worth_compiling(self, points: int) -> bool:
+        return points * self.values.size > MANY and self.still.shape[1] <= FEW and can_compile()
+
+    def _compiled(self, omega: np.ndarray) -> np.ndarray | None:
+        """On the imaginary axis in compiled loops; None where that meets a pole."""
+        points, shares = -(-omega.size // 8) * 8, self._shares
+        at = np.empty(points)
+        at[: omega.size], at[omega.size :] = omega, omega[-1]
+        real, imag = np.empty((2, shares.shape[1], points))
+        summing = Summing(
+            points=points,
+            terms=len(shares),
+            channels=shares.shape[1],
+            omega=np.ascontiguousarray(self.omega),
+            growth_squared=np.ascontiguousarray(self.growth_squared),
+            damping=np.ascontiguousarray(self.damping),
+            still=shares.ravel(),
+            at=at,
+            real=real.ravel(),
+            imag=imag.ravel(),
+        )
+        Packed(summing).bound(add_modes)()
+        if not (np.isfinite(real).all() and np.isfinite(imag).all()):
+            return None
+        count = self.still.shape[1]
+        found = np.empty((count, omega.size), dtype=complex)
+        found.real, found.imag = real[:count, : omega.size], imag[:count, : omega.size]
+        if self.moves:
+            found.real -= omega * imag[count:, : omega.size]
+            found.imag += omega * real[count:, : omega.size]
+        return found.T
 
     def _on_the_axis(self, omega: np.ndarray, result: np.ndarray, room: np.ndarray) -> None:
         """With 1/(g + i d ω) = (g - i d ω)/(g² + d² ω²); g = (ω_i - ω)(ω_i + ω) keeps the difference to a near pole."""

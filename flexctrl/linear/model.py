@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
@@ -383,10 +383,17 @@ class LinearModel:
     @cached_property
     def _coupled(self) -> Callable[[np.ndarray], np.ndarray]:
         from flexctrl.linear.coupled import coupled_transfer
-        from flexctrl.linear.refined import refined_transfer
+        from flexctrl.linear.dashpots import dashpots_of
+        from flexctrl.linear.refined import modal_state, refined_transfer, refinement
 
-        rough = coupled_transfer(self._modal)
-        return rough if self._scaled.massless.every.shape[1] else refined_transfer(self, self._modal, rough)
+        system = self._modal
+        if self._scaled.massless.every.shape[1]:
+            return coupled_transfer(system)
+        dashpots = dashpots_of(self, system)
+        fine = refinement(self, system, modal_state(system) if dashpots is None else dashpots.state)
+        plain = cache(lambda: coupled_transfer(system))
+        rough = plain() if dashpots is None else dashpots.transfer(plain, fine)
+        return rough if fine is None else refined_transfer(system, rough, fine)
 
 
 def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, int]) -> None:

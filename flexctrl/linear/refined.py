@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,21 +12,25 @@ import scipy.sparse as sp
 from flexctrl.linear.modal import ModalSystem
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
+from flexctrl.linear.pattern import with_entries
 from flexctrl.linear.resolvent import cached_resolvent
 from flexctrl.linear.statespace import first_order
 
-__all__ = ["refined_transfer"]
+__all__ = ["State", "modal_state", "refined_transfer", "refinement"]
 
 CHUNK = 256
 LONG = np.longdouble
 FINER = 0.01
 SETTLED = 1e-8
 ENOUGH, PROBES = 3e-10, 12
+APART = 1e-6
+
+Response: TypeAlias = Callable[[np.ndarray], np.ndarray]
+State: TypeAlias = Callable[[np.ndarray], Callable[[np.ndarray], np.ndarray]]
+"""s, shape (N,) ↦ (loads ↦ displacements, both of shape (n, m, N))."""
 
 
-def refined_transfer(
-    linear: LinearModel, system: ModalSystem, rough: Callable[[np.ndarray], np.ndarray]
-) -> Callable[[np.ndarray], np.ndarray]:
+def refinement(linear: LinearModel, system: ModalSystem, state: State) -> Response | None:
     """H(s) by modal coordinates, then a step or two of iterative refinement against K + s C + s² M itself.
 
     The modes of a machine with soft and stiff directions carry the rounding of the stiff ones, and so does every
@@ -38,41 +44,62 @@ def refined_transfer(
         Without massless freedoms.
     system : ModalSystem
         Of the same model.
-    rough : callable
-        H(s) without refinement: for s = 0, and where a machine has no extended precision.
+    state : State
+        By the modal equations.
+
+    Returns
+    -------
+    callable or None
+        s of shape (N,), none of them 0, to H of shape (n_outputs, n_inputs, N); None where a machine has no extended
+        precision.
+    """
+    if np.finfo(LONG).eps > FINER * np.finfo(float).eps:
+        return None
+    residual = _residual(linear, system.modes)
+    loads, moves = np.asarray(linear.B, complex)[:, :, None], np.any(linear.Cv)
+
+    def seen(q: np.ndarray, s: np.ndarray) -> np.ndarray:
+        return _times(linear.Cq, q) + s * _times(linear.Cv, q) if moves else _times(linear.Cq, q)
+
+    def moving(s: np.ndarray) -> np.ndarray:
+        solve = state(s)
+        q = solve(np.broadcast_to(loads, (*loads.shape[:2], s.size)))
+        step = solve(residual(q, s))
+        y, more = seen(q, s), seen(step, s)
+        far = (np.abs(more) > SETTLED * np.abs(y)).any(axis=(0, 1))
+        y += more
+        if far.any():
+            q = q[..., far] + step[..., far]
+            y[..., far] += seen(state(s[far])(residual(q, s[far])), s[far])
+        return y + linear.D[:, :, None]
+
+    return lambda s: np.concatenate([moving(s[i : i + CHUNK]) for i in range(0, s.size, CHUNK)], axis=-1)
+
+
+def refined_transfer(system: ModalSystem, rough: Response, fine: Response) -> Response:
+    """The rough evaluator if it needs no refinement: right to 3e-10 at a dozen frequencies spread over the modes.
+
+    Parameters
+    ----------
+    system : ModalSystem
+    rough, fine : callable
+        H(s) by modal coordinates, and what `refinement` makes of it.
 
     Returns
     -------
     callable
-        s of shape (N,) to H of shape (n_outputs, n_inputs, N); the rough one if it needs no refinement: right to 3e-10
-        in every channel at a dozen frequencies spread over the modes.
+        s of shape (N,) to H of shape (n_outputs, n_inputs, N).
     """
-    if np.finfo(LONG).eps > FINER * np.finfo(float).eps:
-        return rough
-    state, residual = _state(system), _residual(linear, system.modes)
-    loads = np.asarray(linear.B, complex)[:, :, None]
-
-    def moving(s: np.ndarray) -> np.ndarray:
-        q = state(np.repeat(loads, s.size, axis=2), s)
-        step = state(residual(q, s), s)
-        q = q + step
-        far = (np.abs(step) > SETTLED * np.abs(q)).any(axis=(0, 1))
-        if far.any():
-            q[..., far] += state(residual(q[..., far], s[far]), s[far])
-        return _times(linear.Cq, q) + s * _times(linear.Cv, q) + linear.D[:, :, None]
-
     probes = 1j * _probes(system)
-    fine = moving(probes)
-    if (np.abs(rough(probes) - fine) <= ENOUGH * np.abs(fine)).all():
+    exact = fine(probes)
+    if (np.abs(rough(probes) - exact) <= ENOUGH * np.abs(exact)).all():
         return rough
 
     def evaluate(s: np.ndarray) -> np.ndarray:
         s = np.asarray(s, dtype=complex)
-        values = rough(s)
-        places = np.flatnonzero(s != 0.0)
-        for i in range(0, places.size, CHUNK):
-            piece = places[i : i + CHUNK]
-            values[..., piece] = moving(s[piece])
+        values, places = rough(s), np.flatnonzero(s != 0.0)
+        if places.size:
+            values[..., places] = fine(s[places])
         return values
 
     return evaluate
@@ -80,10 +107,11 @@ def refined_transfer(
 
 def _probes(system: ModalSystem) -> np.ndarray:
     """Frequencies between those of some modes, and beyond them on both sides [rad/s]."""
-    omega = np.unique(system.modes.omega[system.modes.omega > 0.0])
+    omega = system.modes.omega[system.modes.omega > 0.0]
     if not omega.size:
         return np.ones(1)
-    some = omega[np.unique(np.linspace(0, omega.size - 1, PROBES).astype(int))]
+    omega = omega[np.append(True, np.diff(omega) > APART * omega[1:])]
+    some = omega[[*range(0, omega.size - 1, max(1, omega.size // (PROBES - 1))), -1]]
     return np.concatenate([[0.1 * some[0]], np.sqrt(some[:-1] * some[1:]), [2.0 * some[-1]]])
 
 
@@ -97,40 +125,58 @@ def _residual(linear: LinearModel, modes: Modes) -> Callable[[np.ndarray, np.nda
 
     K resists these by its rounding, which at low frequencies is more than their inertia.
     """
-    K, C, M = (sp.csr_matrix(A).astype(LONG) for A in (linear.K, linear.C, linear.M))
+    K, C, M = (_long(A) for A in (linear.K, linear.C, linear.M))
     B = linear.B[:, :, None]
     rigid = modes.shapes[:, modes.unstable : modes.unstable + modes.rigid].astype(LONG)
     momenta = M @ rigid
 
+    def elastic(x: np.ndarray) -> np.ndarray:
+        if not rigid.shape[1]:
+            return np.asarray(K @ x)
+        force = K @ (x - rigid @ (momenta.T @ x))
+        return np.asarray(force - momenta @ (rigid.T @ force))
+
     def residual(q: np.ndarray, s: np.ndarray) -> np.ndarray:
-        n = len(q)
-        parts = np.hstack([q.real.reshape(n, -1), q.imag.reshape(n, -1)]).astype(LONG)
-
-        def joined(both: np.ndarray) -> np.ndarray:
-            both = both.reshape(n, 2, *q.shape[1:])
-            return np.asarray(both[:, 0] + 1j * both[:, 1])
-
-        elastic = K @ (parts - rigid @ (momenta.T @ parts))
-        elastic = joined(elastic - momenta @ (rigid.T @ elastic))
-        long = s.astype(np.clongdouble)
-        return np.asarray(B - elastic - long * (joined(C @ parts) + long * joined(M @ parts)), dtype=complex)
+        n, both = len(q), (2, *q.shape[1:])
+        parts = np.stack([q.real, q.imag], axis=1, dtype=LONG).reshape(n, -1)
+        stiff, drag, inert = (a.reshape(n, *both) for a in (elastic(parts), C @ parts, M @ parts))
+        u, w = s.real.astype(LONG), s.imag.astype(LONG)
+        # (u + iw)(drag + (u + iw) inert), real and imaginary parts apart
+        a, b = drag[:, 0] + u * inert[:, 0] - w * inert[:, 1], drag[:, 1] + u * inert[:, 1] + w * inert[:, 0]
+        result = np.empty(q.shape, complex)
+        result.real, result.imag = B - stiff[:, 0] - (u * a - w * b), -(stiff[:, 1] + (u * b + w * a))
+        return result
 
     return residual
 
 
-def _state(system: ModalSystem) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """(loads, s) ↦ displacements, both of shape (n, m, N), through the modal first-order form."""
+def _long(A: sp.spmatrix) -> sp.csc_matrix:
+    A = A if isinstance(A, sp.csc_matrix) else sp.csc_matrix(A)
+    return with_entries(A, A.data.astype(LONG))
+
+
+def modal_state(system: ModalSystem) -> State:
+    """Displacements under loads through the modal first-order form.
+
+    Parameters
+    ----------
+    system : ModalSystem
+
+    Returns
+    -------
+    State
+    """
     modes, A = system.modes, first_order(system).A
     size = np.sqrt(np.abs(modes.omega_squared))
     shapes = modes.shapes / np.where(size > 0.0, size, 1.0)
     solve = _solver(A)
 
-    def state(loads: np.ndarray, s: np.ndarray) -> np.ndarray:
+    def moved(s: np.ndarray, loads: np.ndarray) -> np.ndarray:
         push = np.zeros((len(A), *loads.shape[1:]), complex)
         push[1 : 2 * len(modes) : 2] = _times(modes.shapes.T, loads)
         return _times(shapes, solve(push, s)[0 : 2 * len(modes) : 2])
 
-    return state
+    return lambda s: partial(moved, s)
 
 
 def _solver(A: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:

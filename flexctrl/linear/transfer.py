@@ -73,7 +73,7 @@ def routed(linear: LinearModel, top: float) -> tuple[Transfer, bool]:
             return modal_transfer(system), True
         if len(system.modes) <= COUPLED:
             return linear._coupled, True
-    fit = rayleigh(base.model)
+    fit = rayleigh(base)
     reach, most = (FURTHER, MOST_COUPLED) if fit is None else (2.0, MOST_MODES)
     count = _modes_below(base, (reach * top) ** 2)
     if base.stiffness[1] > UNSYMMETRIC:
