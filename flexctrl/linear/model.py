@@ -390,8 +390,8 @@ class LinearModel:
         if self._scaled.massless.every.shape[1]:
             return coupled_transfer(system)
         dashpots = dashpots_of(self, system)
-        fine = refinement(self, system, modal_state(system) if dashpots is None else dashpots.state)
         plain = cache(lambda: coupled_transfer(system))
+        fine = refinement(self, system, modal_state(system) if dashpots is None else dashpots.state, plain)
         rough = plain() if dashpots is None else dashpots.transfer(plain, fine)
         return rough if fine is None else refined_transfer(system, rough, fine)
 

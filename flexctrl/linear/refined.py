@@ -21,7 +21,7 @@ __all__ = ["State", "modal_state", "refined_transfer", "refinement"]
 CHUNK = 256
 LONG = np.longdouble
 FINER = 0.01
-SETTLED = 1e-8
+SETTLED, LOST = 1e-8, 1e-6
 ENOUGH, PROBES = 3e-10, 12
 APART = 1e-6
 
@@ -30,7 +30,9 @@ State: TypeAlias = Callable[[np.ndarray], Callable[[np.ndarray], np.ndarray]]
 """s, shape (N,) ↦ (loads ↦ displacements, both of shape (n, m, N))."""
 
 
-def refinement(linear: LinearModel, system: ModalSystem, state: State) -> Response | None:
+def refinement(
+    linear: LinearModel, system: ModalSystem, state: State, plain: Callable[[], Response]
+) -> Response | None:
     """H(s) by modal coordinates, then a step or two of iterative refinement against K + s C + s² M itself.
 
     The modes of a machine with soft and stiff directions carry the rounding of the stiff ones, and so does every
@@ -46,6 +48,8 @@ def refinement(linear: LinearModel, system: ModalSystem, state: State) -> Respon
         Of the same model.
     state : State
         By the modal equations.
+    plain : callable
+        Makes an evaluator for where that leads nowhere.
 
     Returns
     -------
@@ -70,7 +74,11 @@ def refinement(linear: LinearModel, system: ModalSystem, state: State) -> Respon
         y += more
         if far.any():
             q = q[..., far] + step[..., far]
-            y[..., far] += seen(state(s[far])(residual(q, s[far])), s[far])
+            last = seen(state(s[far])(residual(q, s[far])), s[far])
+            y[..., far] += last
+            lost = np.flatnonzero(far)[~(np.abs(last) <= LOST * np.abs(y[..., far])).all(axis=(0, 1))]
+            if lost.size:
+                y[..., lost] = plain()(s[lost]) - linear.D[:, :, None]
         return y + linear.D[:, :, None]
 
     return lambda s: np.concatenate([moving(s[i : i + CHUNK]) for i in range(0, s.size, CHUNK)], axis=-1)
