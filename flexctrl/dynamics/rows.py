@@ -131,7 +131,8 @@ class Rows:
         rows = self.recorder.table()
         if not len(rows) or rows[-1, 0] < state.t - 1e-12 * self.until:
             self._write(state, u)
-        return self.recorder.table()
+            rows = self.recorder.table()
+        return rows
 
     def _write(self, state: State, u: np.ndarray) -> None:
         self.count += 1
