@@ -68,7 +68,8 @@ def coordinate_scales(M: Matrix, C: Matrix, K: Matrix) -> np.ndarray:
     """
     m, c, k = (np.abs(A.diagonal()) for A in (M, C, K))
     both = (m > 0) & (k > 0)
-    w2 = float(np.median(k[both] / m[both])) if both.any() else 1.0
+    ratios = np.sort(k[both] / m[both])
+    w2 = float(0.5 * (ratios[(ratios.size - 1) // 2] + ratios[ratios.size // 2])) if ratios.size else 1.0
     d = k + w2 * m + np.sqrt(w2) * c
     return np.ldexp(1.0, -np.round(0.5 * np.log2(np.where(d > 0, d, 1.0))).astype(int))
 

@@ -80,10 +80,10 @@ def responses() -> list[dict[str, Any]]:
     rows = []
     for damping, linear in (("proportional", plain), ("with dashpots", dragged(plain, 5.0))):
         system = linear.to_ss()
-        warm = best_of(15, lambda linear=linear: linear.frequency_response(omega))
-        cold = best_of(40, lambda linear=linear: fresh(linear).frequency_response(omega))
-        models = iter([linearised(linear) for _ in range(15)])
-        first = best_of(15, lambda models=models: next(models).frequency_response(omega))
+        warm = best_of(100, lambda linear=linear: linear.frequency_response(omega))
+        cold = best_of(100, lambda linear=linear: fresh(linear).frequency_response(omega))
+        models = iter([linearised(linear) for _ in range(100)])
+        first = best_of(100, lambda models=models: next(models).frequency_response(omega))
         for slicot in (True, False):
             with _slicot(slicot):
                 theirs = best_of(3, lambda system=system: control.frequency_response(system, omega))
@@ -122,7 +122,7 @@ def eigenmodes() -> list[dict[str, Any]]:
     linear = girder(41)
     rows = []
     for count in (10, 20):
-        ours = best_of(25, lambda count=count: fresh(linear).modes(count))
+        ours = best_of(100, lambda count=count: fresh(linear).modes(count))
         known = linear.modes(count).omega_squared
         for route, job in _others(linear, count).items():
             theirs, values = best_of(3, job), np.sort(job())[:count]
