@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 FLOAT = np.dtype(np.float64)
 _INDEX_LIMIT = 2**31
 _LARGE = 6000
+_FEW = 64
 _OLDEST_LLVMLITE = (0, 45)
 
 
@@ -44,6 +45,8 @@ class Kernel:
         Expressions of both; structural zeros are allowed.
     replaces : bool
         Whether outputs replace what is in r, where no two items may write to one place, rather than being added to it.
+    seldom : bool
+        Whether little time is spent in it: for few items it is compiled in a hurry, without optimisation.
 
     Raises
     ------
@@ -56,6 +59,7 @@ class Kernel:
     params: ca.SX
     outputs: ca.SX
     replaces: bool = False
+    seldom: bool = False
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
@@ -277,7 +281,8 @@ class Compiled:
 
         tables = Tables.of(kernel, gather, scatter)
         lanes = self.lanes or best_lanes(len(tables.gather))
-        level = 2 if kernel.instructions <= self.optimize_up_to else 0
+        hurried = kernel.seldom and len(tables.gather) <= _FEW
+        level = 0 if hurried or kernel.instructions > self.optimize_up_to else 2
         chunks = chunks_of(tables.gather, lanes), chunks_of(tables.scatter, lanes) if kernel.replaces else ()
         return CompiledRun.of(kernel, compile_kernel(kernel, lanes, level, *chunks), tables, params)
 

@@ -294,7 +294,7 @@ import numpy, casadi
 libraries, before = time.perf_counter(), time.process_time()
 import flexctrl as fc
 imported = time.perf_counter()
-import scipy.sparse, scipy.linalg, scipy.sparse.linalg, scipy.sparse.csgraph, llvmlite.binding
+import scipy.sparse, llvmlite.binding  # all that the rest loads of these
 others = time.process_time() - before
 model = fc.assemble(fc.cranes.ceiling_crane(), [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
 run = fc.simulate(model, until=0.05, inputs={"push": 500.0}, method=fc.GeneralizedAlpha(1e-4))

@@ -103,7 +103,7 @@ class Kernels:
         still = ca.substitute(shares.force, velocities, ca.SX.zeros(velocities.numel()))
         power = ca.dot(still - shares.force, self._raw_rates(symbols)) if shares.lost is None else shares.lost
         return _kernel(
-            f"{self.kind.name}_energy", symbols, parameters, ca.vertcat(shares.kinetic, shares.stored, power)
+            f"{self.kind.name}_energy", symbols, parameters, ca.vertcat(shares.kinetic, shares.stored, power), True
         )
 
     @cached_property
@@ -202,10 +202,10 @@ def _node_motion(slot: ca.SX, d: ca.SX, seeds: ca.SX) -> NodeMotion:
     )
 
 
-def _kernel(name: str, inputs: ca.SX, parameters: ca.SX, outputs: ca.SX) -> Kernel:
+def _kernel(name: str, inputs: ca.SX, parameters: ca.SX, outputs: ca.SX, seldom: bool = False) -> Kernel:
     import casadi as ca
 
-    return Kernel(name, inputs, parameters, ca.densify(outputs))
+    return Kernel(name, inputs, parameters, ca.densify(outputs), seldom=seldom)
 
 
 @cache
