@@ -32,11 +32,11 @@ COUPLED = 250
 def transfer(linear: LinearModel, top: float) -> Transfer:
     """The evaluator that suits the model.
 
-    Up to 1000 freedoms with classical damping: poles and residues of all modes. Up to 250 with damping that
-    couples the modes: a Schur form of the modal equations. Larger ones with Rayleigh or no damping: the modes
-    up to twice `top`, and the others by a power series that converges at least as 4⁻ʲ. With any other damping: a
-    projection whose error is estimated at each s. With follower loads, or hundreds of modes below `top`: one sparse
-    factorisation for each s.
+    Up to 1000 freedoms with classical damping: poles and residues of all modes. Up to 250 with a few dashpots beside
+    it: a correction of low rank to that sum; with other damping that couples the modes: their eigenvectors or a Schur
+    form. Larger ones with Rayleigh or no damping: the modes up to twice `top`, and the others by a power series that
+    converges at least as 4⁻ʲ. With any other damping: a projection whose error is estimated at each s. With follower
+    loads, or hundreds of modes below `top`: one sparse factorisation for each s.
 
     Parameters
     ----------
