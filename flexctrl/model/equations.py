@@ -194,7 +194,8 @@ class SmallMotion:
         q = state.q + step
         raw = (self._levers @ q).reshape(-1, 6)
         x, R = rest.x + raw[:, :3], exponential(raw[:, 3:]) @ rest.R
-        return State(x, R, q, v, motion.unwound(x, R, state.driven), t, state.dry, motion.shown(rest.shown, q, R))
+        driven = motion.unwound(x, R, motion.wound(state, step, rest))
+        return State(x, R, q, v, driven, t, state.dry, motion.shown(rest.shown, q, R))
 
     def energy(self, state: State) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""

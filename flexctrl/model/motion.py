@@ -32,6 +32,9 @@ _FULL = 0.1
 _UNEXPLAINED = 5.0
 _BRANCHES = 1e-9
 
+FAST = 0.5
+"""Steps of freedoms above which driven angles may turn by more than half a turn [rad]."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -197,7 +200,7 @@ class Motion:
             x[self.nodes] = pose.reshape(-1, 12)[:, :3]
             R[self.nodes] = orthonormal(pose.reshape(-1, 4, 3)[:, 1:])
         shown = self.shown(state.shown, step, R)
-        return State(x, R, state.q + step, v, self.unwound(x, R, state.driven), t, state.dry, shown)
+        return State(x, R, state.q + step, v, self.unwound(x, R, self.wound(state, step)), t, state.dry, shown)
 
     def shown(self, before: np.ndarray, step: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Return the angles of outputs after a step to rotations R, from those before."""
@@ -231,12 +234,23 @@ class Motion:
         gather = np.hstack([rows, 9 * len(nodes) + 3 * nodes + np.arange(3)])
         return self.backend.bind(turn_kernel(), gather, np.zeros((len(nodes), 0)), rows)
 
-    def unwound(self, x: np.ndarray, R: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return the driven coordinates of a pose, with the whole turns that bring them next to those before."""
+    def wound(self, state: State, step: np.ndarray, at: State | None = None) -> np.ndarray:
+        """Return about what the driven coordinates are after a step, its levers being those of the state or of another.
+
+        Steps of any length turn what they turn: the pose alone does not tell whole turns.
+        """
+        own = step[self.linked]
+        if not self.rotary.any() or np.abs(own).max(initial=0.0) < FAST:
+            return state.driven
+        levers = at or state
+        return state.driven + self.linkage.wound(self._pose(levers.x, levers.R), own)
+
+    def unwound(self, x: np.ndarray, R: np.ndarray, about: np.ndarray) -> np.ndarray:
+        """Return the driven coordinates of a pose, with the whole turns that bring them next to what they are about."""
         if not self.drives:
-            return before
+            return about
         driven = self.linkage.driven(self._pose(x, R))
-        return driven + 2.0 * np.pi * np.where(self.rotary, np.rint((before - driven) / (2.0 * np.pi)), 0.0)
+        return driven + 2.0 * np.pi * np.where(self.rotary, np.rint((about - driven) / (2.0 * np.pi)), 0.0)
 
     def turns(self, driven: np.ndarray) -> np.ndarray:
         """Return the whole turns in driven coordinates."""

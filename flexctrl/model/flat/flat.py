@@ -14,11 +14,13 @@ from dataclasses import dataclass
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.motion import FAST
 
 __all__ = ["Flat", "clear", "drive", "energy", "keep", "load", "place", "pull", "push", "tangent"]
 
 _TURN = 2.0 * math.pi
 _POSE = 12
+_FAST = FAST
 
 
 @dataclass
@@ -41,8 +43,8 @@ class Flat:
         their directions.
     q : Reals *
         Sums of the degrees of freedom at the start of the step.
-    driven, found : Reals
-        Driven coordinates at the start of the step, and at its end (*).
+    driven, found, about : Reals
+        Driven coordinates at the start of the step, at its end (*), and about what the step adds to them (*).
     whole : Wholes
         Nodes whose six degrees of freedom are their own and follow each other, and the first of these.
     moved, turned, linked : Wholes
@@ -58,6 +60,8 @@ class Flat:
         Where unit loads act, then the inputs they are of.
     unit : Reals
         Their values.
+    spun : Wholes
+        Degrees of freedom that turn what is driven.
     follows : Wholes
         Of each load that turns with a node: the input, the node, and where its three components act.
     toward : Reals
@@ -67,7 +71,8 @@ class Flat:
     shift : Reals *
         How far all nodes are shifted and turned from the drawn shape, for models in small motion.
     turn, linkage, winding, forces, tangents, energies, shifts : Runs
-        Kernels; of the linkage: places, rates, accelerations, forces; of its drives: driven coordinates.
+        Kernels; of the linkage: places, rates, accelerations, forces; of its drives: driven coordinates, and what
+        steps add to them.
     books : Reals
         Kinetic energy, stored energy, dissipated power.
     """
@@ -83,6 +88,7 @@ class Flat:
     linking: int
     rates: int
     drives: int
+    spinning: int
     inner: int
     pieces: int
     unit_loads: int
@@ -102,6 +108,7 @@ class Flat:
     q: Reals
     driven: Reals
     found: Reals
+    about: Reals
     whole: Wholes
     moved: Wholes
     turned: Wholes
@@ -113,6 +120,7 @@ class Flat:
     rigid: Wholes
     rotary: Wholes
     ratios: Reals
+    spun: Wholes
     inputs: Wholes
     unit: Reals
     follows: Wholes
@@ -173,19 +181,30 @@ def clear(n: int, x: Reals) -> None:
 
 @seldom
 def wind(f: Flat) -> None:
-    """Find the driven coordinates, with the whole turns that bring them next to those before the step."""
+    """Find the driven coordinates, with the whole turns that bring them next to what the step makes of them."""
     clear(f.drives, f.found)
     f.winding[0](f.z, f.z)
+    clear(f.drives, f.about)
+    if fast(f):
+        f.winding[1](f.z, f.z)
     for i in range(f.drives):
         slot = f.z[f.drive_base + DRIVE_SLOT * i :]
         slot[3] = 0.0
         if f.rotary[i] == 1:
-            f.found[i] += _TURN * math.floor((f.driven[i] - f.found[i]) / _TURN + 0.5)
+            f.found[i] += _TURN * math.floor((f.driven[i] + f.about[i] - f.found[i]) / _TURN + 0.5)
             slot[3] = math.floor(f.found[i] / _TURN + 0.5)
         if f.rigid[i] == 1:
             slot[0] = f.ratios[i] * f.found[i]
         else:
             slot[0] = f.q[f.shafts[i]] + f.step[f.shafts[i]]
+
+
+def fast(f: Flat) -> bool:
+    """Tell whether the step may turn what is driven by more than half a turn."""
+    most = 0.0
+    for i in range(f.spinning):
+        most = max(most, abs(f.step[f.spun[i]]))
+    return most >= _FAST
 
 
 def drive(f: Flat) -> None:

@@ -113,7 +113,7 @@ class Layout:
             **dict.fromkeys(("step", "v", "rate"), self.padded),
             **dict.fromkeys(("force", "load"), self.padded + self.carried),
             "q": self.padded,
-            "found": len(self.motion.drives),
+            **dict.fromkeys(("found", "about"), len(self.motion.drives)),
             "u": len(self.model.inputs),
             "shift": 0,
         }
@@ -235,6 +235,7 @@ class Layout:
             "rigid": m.rigid.astype(np.int64),
             "rotary": m.rotary.astype(np.int64),
             "ratios": m.ratios,
+            "spun": self._spun,
             "inputs": np.concatenate([self.targets[loads.row], loads.col]).astype(np.int64),
             "unit": loads.data.astype(float),
             "follows": self._follows(),
@@ -256,6 +257,7 @@ class Layout:
             "linking": len(tables["linked"]),
             "rates": len(tables["slots"]),
             "drives": len(m.drives),
+            "spinning": len(self._spun),
             "inner": m.inner.size,
             "pieces": len(self._runs["forces"]),
             "shifting": self.sizes["shift"],
@@ -274,7 +276,7 @@ class Layout:
         return {
             "turn": (self._turn(turned),) if len(turned) else (),
             "linkage": () if m.plain else self._linkage(),
-            "winding": (self._winding(),) if m.drives else (),
+            "winding": self._winding("pose") if m.drives else (),
             "forces": (*self._forces(), *([self._entry_forces()] if damped else [])),
             "tangents": (*self._tangents(), *([self._entry_slopes()] if damped else [])) if own_tangents else (),
             "energies": (*self._energies(), *([self._entry_energies()] if damped else [])),
@@ -315,7 +317,7 @@ class Layout:
 
     def _linkage(self) -> tuple[Run, ...]:
         m, starts = self.motion, self.starts
-        place, rates, accelerations, collect, _ = m.linkage.kernels
+        place, rates, accelerations, collect = m.linkage.kernels[:4]
         rigid = self.forces.drive_base + DRIVE_SLOT * np.flatnonzero(m.rigid)
         slot = NODE_SLOT * m.nodes[:, None]
         pose, own = (slot + np.arange(12)).ravel(), self.position[m.linked]
@@ -330,10 +332,20 @@ class Layout:
             self._bind(collect, np.concatenate([pose, raw]), starts["force"] + own),
         )
 
-    def _winding(self) -> Run:
-        m = self.motion
+    @cached_property
+    def _spun(self) -> np.ndarray:
+        return self.position[self.motion.linked] if self.motion.rotary.any() else np.zeros(0, dtype=int)
+
+    def _winding(self, levers: str) -> tuple[Run, Run]:
+        """Driven coordinates, and what a step adds to them with levers of some pose."""
+        m, drives = self.motion, np.arange(len(self.motion.drives))
         pose = (NODE_SLOT * m.nodes[:, None] + np.arange(12)).ravel()
-        return self._bind(m.linkage.kernels[4], pose, self.starts["found"] + np.arange(len(m.drives)))
+        before = (self.starts[levers] + 12 * m.nodes[:, None] + np.arange(12)).ravel()
+        step = self.starts["step"] + self.position[m.linked]
+        return (
+            self._bind(m.linkage.kernels[4], pose, self.starts["found"] + drives),
+            self._bind(m.linkage.kernels[5], np.concatenate([before, step]), self.starts["about"] + drives),
+        )
 
     def _forces(self) -> list[Run]:
         base, sources = self.forces.drive_base, self.motion.source_base

@@ -94,7 +94,7 @@ class SmallLayout(Layout):
         return {
             "turn": (),
             "linkage": self._linkage(),
-            "winding": (self._winding(),) if self.motion.drives else (),
+            "winding": self._winding("drawn") if self.motion.drives else (),
             "forces": (self._entry_forces(),),
             "tangents": (self._entry_slopes(),),
             "energies": (self._entry_energies(),),

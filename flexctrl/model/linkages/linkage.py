@@ -73,8 +73,8 @@ class Linkage(OpenLinkage):
         return _callable("collect", *self._collecting)
 
     @cached_property
-    def kernels(self) -> tuple[Kernel, Kernel, Kernel, Kernel, Kernel]:
-        """The same as kernels of one item: `place`, its rotations freed of drift, to `collect`, and `driven`."""
+    def kernels(self) -> tuple[Kernel, Kernel, Kernel, Kernel, Kernel, Kernel]:
+        """The same as kernels of one item: `place`, its rotations freed of drift, to `collect`; `driven`, `wound`."""
         import casadi as ca
 
         arguments, pose = self._placing
@@ -87,6 +87,7 @@ class Linkage(OpenLinkage):
             _kernel("accelerations", *self._accelerating),
             _kernel("collect", *self._collecting),
             _kernel("driven", *self._driving),
+            _kernel("wound", *self._winding),
         )
 
     def _squared(self, node: int, R: ca.SX) -> ca.SX:
@@ -119,6 +120,15 @@ class Linkage(OpenLinkage):
         values = [self._drive_motion(link, self._pose, still).driven for link in self.links]
         return [self._pose], ca.vertcat(*values, ca.SX(0, 1))
 
+    @property
+    def _winding(self) -> Terms:
+        import casadi as ca
+
+        V = ca.reshape(self._raw[: 6 * self.count], 6, self.count)
+        moving = [(V[:3, i], V[3:, i]) for i in range(self.count)]
+        values = [self._drive_motion(link, self._pose, moving).driven_rate for link in self.links]
+        return [self._pose, self._rate], ca.vertcat(*values, ca.SX(0, 1))
+
     @cached_property
     def matrix(self) -> Callable[..., np.ndarray]:
         """Pose → T, shape (raw, free), column by column."""
@@ -145,6 +155,11 @@ class Linkage(OpenLinkage):
     def driven(self) -> Callable[..., np.ndarray]:
         """Pose → driven coordinates of all drives; angles between −π and π."""
         return _callable("driven", *self._driving)
+
+    @cached_property
+    def wound(self) -> Callable[..., np.ndarray]:
+        """(pose, step of the independent freedoms) → about what it adds to the driven coordinates: whole turns too."""
+        return _callable("wound", *self._winding)
 
     @cached_property
     def grip(self) -> Callable[..., np.ndarray]:
