@@ -30,6 +30,7 @@ _HOMES = {
         "Tension",
         "Torque",
         "Velocity",
+        "WindSpeed",
     ),
     "flexctrl.structure.trolleys": ("Trolley",),
     "flexctrl.structure.join_table": ("JoinTable",),

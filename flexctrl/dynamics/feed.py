@@ -235,7 +235,7 @@ class Feed:
         T = self.model.motion.jacobian(state)[: self.model.motion.raw]
         C = (seeds[0] * on_place + seeds[1] * on_rates)[self.reads] @ T
         gain = sp.csr_matrix(self._gain(state, supply, h))
-        slope = (T.T @ self.model.signals.loads_at(state) @ gain @ C).tocsr()
+        slope = (T.T @ self.model.reach(state, supply.u) @ gain @ C).tocsr()
         return self.model.switches.freed(state, slope) if self.model.switches.sticks(state) else slope
 
     def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:

@@ -58,7 +58,7 @@ def rail_force(
     feed = feed_of(model, None, model.input_vector(inputs or {}))
     point = Stepper(model, feed, Coefficients.of(1.0), _TIGHT).start(state, feed.first(state), _AT_ONCE)
     motion, now = model.motion, point.state
-    raw = model.forces.raw(now, now.v, point.rate) + model.signals.loads_at(now) @ point.supply.u
+    raw = model.forces.raw(now, now.v, point.rate) + model.pushes(now, point.supply.u)
     nodes = [motion.nodes[f.node] for f in motion.tracks]
     pushes = motion.linkage.on_rails(motion.pose(now), raw[motion.linked_cells]).reshape(-1, 3)
     return pushes[nodes.index(model.structure.number(trolleys[name].node))]

@@ -25,6 +25,10 @@ class Wind(Effect):
     rest and the aerodynamic damping ½ ρ c_d A (|w| I + w wᵀ/|w|), twice as large along the wind as across it. What the
     wind does to the machine is in the books under dissipation, negative where it drives.
 
+    Gusts are inputs of the structure, `WindSpeed`: with them the air moves at w + Σ gᵢ eᵢ. What they add to the force
+    of the mean wind is an input's force and its work an input's work. In a linear model a gust's column of B is
+    ∂F/∂gᵢ = ½ ρ c_d A (|w| I + w wᵀ/|w|) eᵢ, the aerodynamic damping; about still air it is none.
+
     In a `RotatingFrame` the air does not turn along: v is the speed seen from outside, and the wind blows along the
     axis (across it, it would turn for who turns). There drag has no potential, and K of linear models is unsymmetric.
 

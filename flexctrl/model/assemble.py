@@ -20,6 +20,7 @@ from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equations import Small
 from flexctrl.model.equilibrium import equilibrium
 from flexctrl.model.laws.frictions import inner_freedoms
+from flexctrl.model.laws.gusts import check_gusts
 from flexctrl.model.linkages.mobility import motion_of
 from flexctrl.model.model import Model
 from flexctrl.structure.cut import cut_ropes
@@ -60,6 +61,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
         effect.check_beside(parts)
         _check_names(structure, effect)
         effect.check_on(structure)
+    check_gusts(structure, parts)
     structure, parts = _heavy(structure, parts)
     _check_trolleys(structure, parts)
     if any(isinstance(e, GeometricStiffness) for e in parts):

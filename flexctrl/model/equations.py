@@ -73,7 +73,7 @@ class LargeMotion:
 
     def loads(self, state: State, u: np.ndarray) -> np.ndarray:
         """Return the generalised forces of the inputs; what sticks does not move."""
-        force = self.model.motion.collect(state, self.model.signals.loads_at(state) @ u)
+        force = self.model.motion.collect(state, self.model.pushes(state, u))
         switches = self.model.switches
         return switches.freed(state, force) if switches.sticks(state) else force
 
@@ -89,7 +89,8 @@ class LargeMotion:
     ) -> sp.csr_matrix:
         """Return the slope of all forces."""
         model, switches = self.model, self.model.switches
-        slope = model.forces.slope(state, v, a, seeds, model.signals.loads_at(state) @ u, excess)
+        gusts = (model.gusts, u) if model.gusts else None
+        slope = model.forces.slope(state, v, a, seeds, model.pushes(state, u), excess, gusts)
         if seeds[0] and model.signals.follows:
             T = model.motion.jacobian(state)
             slope = (slope + seeds[0] * (T.T @ model.signals.turning(state, u) @ T)).tocsr()
@@ -99,13 +100,15 @@ class LargeMotion:
     def strain(self, state: State, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
         """Return ΦᵀKΦ of some motions, without the rounding of K's entries."""
         model, motion, signals = self.model, self.model.motion, self.model.signals
-        raw, loads = motion.jacobian(state) @ motions, signals.loads_at(state) @ u
+        raw, loads = motion.jacobian(state) @ motions, model.pushes(state, u)
         total = model.forces.strain(state, raw)
         if not motion.plain:
             still = np.zeros(model.n)
             total = total - motions.T @ (
                 motion.stiffening(state, model.forces.raw(state, still, still) + loads) @ motions
             )
+        if model.gusts:
+            total = total - raw.T @ (model.gusts.matrix(model.slots(state), u, (1.0, 0.0, 0.0), motion.raw) @ raw)
         return total - raw.T @ (signals.turning(state, u) @ raw) if signals.follows else total
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
@@ -156,8 +159,7 @@ class SmallMotion:
 
     def loads(self, state: State, u: np.ndarray) -> np.ndarray:
         """Return the generalised forces of the inputs."""
-        rest = self.model.rest
-        return self.model.motion.collect(rest, self.model.signals.loads_at(rest) @ u)
+        return self.model.motion.collect(self.model.rest, self._reach @ u)
 
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the sum of all other forces."""
@@ -174,6 +176,11 @@ class SmallMotion:
     def strain(self, state: State, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
         """Return ΦᵀKΦ of some motions."""
         return motions.T @ (self.matrices.K @ motions)
+
+    @cached_property
+    def _reach(self) -> sp.csr_matrix:
+        """Raw forces of unit inputs."""
+        return self.model.reach(self.model.rest, np.zeros(len(self.model.inputs)))
 
     @cached_property
     def _plain(self) -> tuple[np.ndarray | sp.spmatrix, ...]:

@@ -12,7 +12,9 @@ from flexctrl.kernels.extended import EXTENDED, evaluate
 from flexctrl.kernels.kernel import Backend, Run
 from flexctrl.linear.parts import Parts, parts_of
 from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.gusts import Gusts
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.laws.wind_kinds import WIND
 from flexctrl.model.mixed import Excess, Mixed
 from flexctrl.model.motion import DENSE_UP_TO, Motion
 from flexctrl.model.state import State
@@ -106,20 +108,22 @@ class Forces:
         seeds: tuple[float, float, float],
         loads: np.ndarray | None = None,
         excess: Excess | None = None,
+        gusts: tuple[Gusts, np.ndarray] | None = None,
     ) -> sp.csr_matrix:
         """Return ∂(balance)/∂(own motion) for increments that add ``seeds`` × to place, rates and accelerations.
 
-        ``loads`` are raw forces of the inputs; ``excess`` stresses are borne beside those of the state.
+        ``loads`` are raw forces of the inputs; ``excess`` stresses are borne beside those of the state; ``gusts``
+        blow with the inputs beside them.
         """
         z = self.slots(state, v, a)
-        blocks = self._blocks(z, seeds)
+        blocks = self._blocks(z, seeds, gusts)
         if excess is not None:
             blocks += excess.blocks
         if self.motion.plain:
             places, indices, indptr = self._table
             data = np.bincount(places, weights=blocks, minlength=len(indices) + 1)[:-1]
             return sp.csr_matrix((data, indices, indptr), shape=(self.motion.n, self.motion.n), copy=False)
-        slope = self._led(state, v, a, seeds, z, blocks)
+        slope = self._led(state, v, a, seeds, z, blocks, gusts)
         if seeds[0] != 0.0:
             acting = self.raw(state, v, a) + (0.0 if loads is None else loads)
             acting = acting if excess is None else acting + excess.raw
@@ -134,6 +138,7 @@ class Forces:
         seeds: tuple[float, float, float],
         z: np.ndarray,
         blocks: np.ndarray,
+        gusts: tuple[Gusts, np.ndarray] | None,
     ) -> sp.csr_matrix | np.ndarray:
         """Return the slope through the levers of followers; in motion rates and accelerations turn with these."""
         motion = self.motion
@@ -141,7 +146,9 @@ class Forces:
         raw = self._raw_matrix(blocks) @ T
         if v.any() or a.any():
             speed, pull, coriolis = motion.drift(state, v, a)
-            on_rates, on_pull = (self._raw_matrix(self._blocks(z, s)) for s in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+            on_rates, on_pull = (
+                self._raw_matrix(self._blocks(z, s, gusts)) for s in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+            )
             raw = raw + on_rates @ (seeds[0] * speed) + on_pull @ (seeds[0] * pull + seeds[1] * coriolis)
         return T.T @ raw
 
@@ -247,11 +254,23 @@ class Forces:
         nodes[:] = nodes.max(axis=1, keepdims=True)
         return sizes
 
-    def _blocks(self, z: np.ndarray, seeds: tuple[float, float, float]) -> np.ndarray:
+    def _blocks(
+        self, z: np.ndarray, seeds: tuple[float, float, float], gusts: tuple[Gusts, np.ndarray] | None = None
+    ) -> np.ndarray:
         seeded, blocks = np.append(z, seeds), np.zeros(self.pattern[0].size)
         for batch in self._tangent:
             batch(seeded, blocks)
+        if gusts is not None:
+            blocks[self.wind_blocks] += gusts[0].slope(z, gusts[1], seeds)
         return blocks
+
+    @cached_property
+    def wind_blocks(self) -> slice:
+        """Which entries of all tangent blocks are those of nodes in the wind."""
+        for f, start in zip(self.families, self.block_starts, strict=True):
+            if f.kernels.kind is WIND:
+                return slice(start, start + f.count * f.kernels.kind.width**2)
+        return slice(0, 0)
 
     def energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""

@@ -115,7 +115,7 @@ def _derivative(
         M=_symmetric(M),
         C=C.tocsc(),
         K=K.tocsc() if unsymmetric and asymmetry > _ROUND_OFF else _symmetric(K),
-        B=(T.T @ model.signals.loads_at(model.place(state))).toarray(),
+        B=(T.T @ model.reach(state, u)).toarray(),
         Cq=(on_place @ T).toarray(),
         Cv=(on_rates @ T).toarray(),
         D=np.zeros((len(model.outputs), len(model.inputs))),

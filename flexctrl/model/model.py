@@ -20,6 +20,7 @@ from flexctrl.model.equations import Equations, LargeMotion, Small, SmallMotion
 from flexctrl.model.forces import Forces
 from flexctrl.model.laws.families import families_of
 from flexctrl.model.laws.frictions import friction_families, lag_blocks
+from flexctrl.model.laws.gusts import Gusts, gusts_of
 from flexctrl.model.laws.kinks import Kinks
 from flexctrl.model.laws.loose_kinds import loose_families, loose_names
 from flexctrl.model.laws.switches import Switches
@@ -111,6 +112,60 @@ class Model:
     def signals(self) -> Signals:
         """Inputs and outputs, ready to be evaluated."""
         return signals_of(self.structure, self.effects, self.motion)
+
+    @cached_property
+    def gusts(self) -> Gusts:
+        """What the wind's inputs add to the mean wind."""
+        return gusts_of(self.structure, self.effects, self.forces.families)
+
+    def pushes(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return the raw forces of the inputs in a state, gusts among them.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        numpy.ndarray, shape (raw,)
+        """
+        steady = self.signals.loads_at(state) @ u
+        if not self.gusts:
+            return steady
+        return steady + self.gusts.force(self.slots(state), u, self.motion.raw)
+
+    def reach(self, state: State, u: np.ndarray) -> sp.csr_matrix:
+        """Return ∂(raw forces of the inputs)/∂u where the equations take it, about inputs u, shape (raw, inputs).
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        scipy.sparse.csr_matrix
+        """
+        place = self.place(state)
+        about = u if self.large else np.zeros_like(u)
+        steady = self.signals.loads_at(place)
+        if not self.gusts:
+            return steady
+        return steady + sp.csr_matrix(self.gusts.reach(self.slots(place), about, self.motion.raw))
+
+    def slots(self, state: State) -> np.ndarray:
+        """Return the flat vector that kernels read in a state, without accelerations.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        numpy.ndarray
+        """
+        return self.forces.slots(state, state.v, np.zeros(self.n))
 
     @cached_property
     def forces(self) -> Forces:

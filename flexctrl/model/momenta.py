@@ -74,7 +74,7 @@ class Momenta:
             return self.of(state, v), model.balance(state, v, np.zeros(model.n)) + model.loads(state, u)
         motion, both = model.motion, self._raw(state, v, span)
         momenta, change = both[: motion.raw], both[motion.raw :]
-        pushed = motion.collect(state, change + model.signals.loads @ u)
+        pushed = motion.collect(state, change + model.pushes(state, u))
         if model.viscous.nnz:
             pushed = pushed - model.viscous @ v
         if not motion.plain:

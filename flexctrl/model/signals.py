@@ -38,6 +38,7 @@ from flexctrl.structure.signals import (
     SwayAngle,
     Tension,
     Velocity,
+    WindSpeed,
 )
 from flexctrl.structure.structure import Structure
 
@@ -136,7 +137,7 @@ def _load(s: Structure, effects: tuple[Effect, ...], motion: Motion, signal: Inp
     if isinstance(signal, MotorTorque):
         drive = _drive(s, signal.drive)
         return [(motion.source_base + drive, 1.0), *_lagging(s, effects, motion, drive)]
-    if isinstance(signal, FollowerForce | FollowerTorque):
+    if isinstance(signal, FollowerForce | FollowerTorque | WindSpeed):
         return []
     offset = 0 if isinstance(signal, Force) else 3
     return [(6 * s.number(n) + offset + k, d) for n in signal.at for k, d in enumerate(signal.direction) if d]

@@ -45,6 +45,7 @@ from flexctrl.structure.signals import (
     Tension,
     Torque,
     Velocity,
+    WindSpeed,
 )
 from flexctrl.structure.structure import Structure, planar
 from flexctrl.structure.trolleys import Trolley
@@ -260,6 +261,7 @@ def _input_kinds(node: Reader) -> dict[str, Kind]:
         "follower_force": Kind(FollowerForce, {"at": nodes, "direction": direction}),
         "follower_torque": Kind(FollowerTorque, {"at": nodes, "axis": direction}),
         "motor_torque": Kind(MotorTorque, {"drive": text}),
+        "wind_speed": Kind(WindSpeed, {"direction": direction}),
     }
 
 

@@ -150,6 +150,27 @@ class MotorTorque:
         object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"MotorTorque {name!r}: drive"))
 
 
+@dataclass(frozen=True)
+class WindSpeed:
+    """Input: a gust along a fixed direction, in m/s, on top of the mean wind of every `Wind` the model has.
+
+    It blows on all drag areas at once. Where no effect asks for wind it acts on nothing.
+
+    Parameters
+    ----------
+    name : str
+    direction : str or sequence of 3 floats
+        Where the air goes.
+    """
+
+    name: str
+    direction: Vector
+
+    def __init__(self, name: str, direction: str | Sequence[float]) -> None:
+        object.__setattr__(self, "name", check_signal(name, "WindSpeed"))
+        object.__setattr__(self, "direction", parse_direction(direction, f"WindSpeed {name!r}"))
+
+
 def _set_measure(
     signal: Position | Velocity | Rotation | AngularVelocity,
     name: str,
@@ -355,7 +376,7 @@ class Tension:
         object.__setattr__(self, "line", _name_of(line, (Rope, Spring, Winch), f"Tension {name!r}: line"))
 
 
-Input: TypeAlias = Force | Torque | FollowerForce | FollowerTorque | MotorTorque
+Input: TypeAlias = Force | Torque | FollowerForce | FollowerTorque | MotorTorque | WindSpeed
 Output: TypeAlias = Position | Velocity | Rotation | AngularVelocity | DriveAngle | DriveSpeed | SwayAngle | Tension
 
 __all__ = [
@@ -374,4 +395,5 @@ __all__ = [
     "Tension",
     "Torque",
     "Velocity",
+    "WindSpeed",
 ]

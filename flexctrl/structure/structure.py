@@ -53,7 +53,7 @@ class Structure:
     joints : sequence of Support, Weld, Pin, Hinge or Slide, or a JoinTable
         How nodal freedoms are tied. A `JoinTable` made from rows may stand in place of joints.
     drives : sequence of RotaryDrive, LinearDrive or Winch
-    inputs : sequence of Force, Torque, FollowerForce, FollowerTorque or MotorTorque
+    inputs : sequence of Force, Torque, FollowerForce, FollowerTorque, MotorTorque or WindSpeed
     outputs : sequence of Position, Velocity, Rotation, …
     name : str
 

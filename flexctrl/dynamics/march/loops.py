@@ -351,7 +351,9 @@ def enter(m: March) -> None:
     """Enter the step in the books: work of the inputs, and what was lost."""
     f = m.flat
     work = 0.0 * eight(m.weight)
-    if f.carried > 0 or f.following > 0:
+    if f.gusting > 0:
+        drive(f)
+    if f.carried > 0 or f.following > 0 or f.gusting > 0:
         pull(f)
         for i in range(0, f.padded, 8):
             work = work + 0.5 * (eight(m.pulled[i:]) + eight(f.force[i:])) * eight(f.step[i:])

@@ -73,6 +73,8 @@ class Flat:
     turn, linkage, winding, forces, tangents, energies, shifts : Runs
         Kernels; of the linkage: places, rates, accelerations, forces; of its drives: driven coordinates, and what
         steps add to them.
+    gusts : Runs
+        Kernels of the forces of gusts.
     books : Reals
         Kinetic energy, stored energy, dissipated power.
     """
@@ -93,6 +95,7 @@ class Flat:
     pieces: int
     unit_loads: int
     following: int
+    gusting: int
     carried: int
     shifting: int
     entries: int
@@ -134,6 +137,7 @@ class Flat:
     tangents: Runs
     energies: Runs
     shifts: Runs
+    gusts: Runs
     books: Reals
 
 
@@ -267,6 +271,8 @@ def press(f: Flat) -> None:
         for i in range(3):
             along = R[3 * i] * way[0] + R[3 * i + 1] * way[1] + R[3 * i + 2] * way[2]
             f.force[at[2 + i]] += f.u[at[0]] * along
+    for k in range(f.gusting):
+        f.gusts[k](f.z, f.z)
 
 
 @seldom
@@ -276,7 +282,7 @@ def tangent(f: Flat, on_place: float, on_rate: float, on_acceleration: float, en
     f.seeds[1] = on_rate
     f.seeds[2] = on_acceleration
     clear(f.entries, entries)
-    for k in range(f.pieces):
+    for k in range(f.pieces + f.gusting):
         f.tangents[k](f.z, entries)
 
 

@@ -262,6 +262,7 @@ class Layout:
             "pieces": len(self._runs["forces"]),
             "shifting": self.sizes["shift"],
             "unit_loads": len(tables["unit"]),
+            "gusting": len(self._runs["gusts"]),
             "following": len(self.model.signals.follows),
             "carried": self.carried,
             "entries": self.plan.length,
@@ -278,9 +279,10 @@ class Layout:
             "linkage": () if m.plain else self._linkage(),
             "winding": self._winding("pose") if m.drives else (),
             "forces": (*self._forces(), *([self._entry_forces()] if damped else [])),
-            "tangents": (*self._tangents(), *([self._entry_slopes()] if damped else [])) if own_tangents else (),
+            "tangents": (*([self._entry_slopes()] if damped else []), *self._tangents()) if own_tangents else (),
             "energies": (*self._energies(), *([self._entry_energies()] if damped else [])),
             "shifts": (),
+            "gusts": (self._gusts(),) if self.model.gusts else (),
         }
 
     def _entry_forces(self) -> Run:
@@ -355,6 +357,19 @@ class Layout:
             bind(f.kernels.force, f.gather(base), f.parameters, goal[f.scatter(sources)]) for f in self.forces.families
         ]
 
+    def _gusts(self) -> Run:
+        gusts, goal = self.model.gusts, self.starts["force"] + self.targets
+        gather = gusts.gather(self.starts["u"])
+        return self.model.backend.bind(gusts.kernels.force, gather, gusts.parameters, goal[gusts.scatter])
+
+    def _gust_slopes(self, places: np.ndarray) -> Run:
+        """Into the blocks of the nodes in the wind."""
+        gusts, bind = self.model.gusts, self.model.backend.bind
+        seeds = np.tile(self.starts["seeds"] + np.arange(3), (len(gusts.nodes), 1))
+        gather = np.hstack([gusts.gather(self.starts["u"]), seeds])
+        scatter = places[self.forces.wind_blocks].reshape(-1, 9)
+        return bind(gusts.kernels.tangent, gather, gusts.parameters, scatter)
+
     def _energies(self) -> list[Run]:
         base, bind = self.forces.drive_base, self.model.backend.bind
         return [
@@ -373,7 +388,7 @@ class Layout:
             gather = np.hstack([f.gather(self.forces.drive_base), seeds])
             scatter = places[start : start + f.count * size].reshape(f.count, size)
             runs.append(self.model.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
-        return runs
+        return [*runs, self._gust_slopes(places)] if self.model.gusts else runs
 
 
 def _aligned(size: int) -> np.ndarray:

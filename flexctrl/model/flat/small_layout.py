@@ -99,6 +99,7 @@ class SmallLayout(Layout):
             "tangents": (self._entry_slopes(),),
             "energies": (self._entry_energies(),),
             "shifts": (self._along(("q", "step"), np.arange(6 * len(self.motion.place)), self.starts["shift"]),),
+            "gusts": (),
         }
 
     def _linkage(self) -> tuple[Run, ...]:

@@ -17,7 +17,7 @@ from flexctrl.structure.structure import Structure
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["wind_families"]
+__all__ = ["WIND", "drag", "wind_families"]
 
 _CALM = 1e-40
 
@@ -26,12 +26,19 @@ def _wind(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
     """½ ρ c_d A and w are the parameters."""
     import casadi as ca
 
-    past = p[1:4] - seen_outside(effects, nodes[0]).v
-    force = p[0] * ca.sqrt(ca.dot(past, past) + _CALM) * past
+    force = drag(effects, nodes[0], p)
     return Shares(ca.SX(3, 1), force, ca.SX(1, 1), ca.SX(1, 1), -ca.dot(force, nodes[0].v))
 
 
-_WIND = Kind("wind", 1, 3, 0, 4, _wind)
+def drag(effects: tuple[Effect, ...], node: NodeMotion, p: ca.SX) -> ca.SX:
+    """Return the force of the air on a node; ½ ρ c_d A and the velocity of the air are the parameters."""
+    import casadi as ca
+
+    past = p[1:4] - seen_outside(effects, node).v
+    return p[0] * ca.sqrt(ca.dot(past, past) + _CALM) * past
+
+
+WIND = Kind("wind", 1, 3, 0, 4, _wind)
 
 
 def wind_families(structure: Structure, effects: Sequence[Effect]) -> tuple[Family, ...]:
@@ -55,5 +62,5 @@ def _family(s: Structure, effect: Wind, frames: tuple[Effect, ...]) -> Family:
     shares = effect.shares(s)
     rows = [[0.5 * effect.density * area, *effect.speed] for _, area in shares]
     return pieces(
-        _WIND, [node.part for node, _ in shares], [[s.number(n)] for n, _ in shares], [[]] * len(shares), rows, frames
+        WIND, [node.part for node, _ in shares], [[s.number(n)] for n, _ in shares], [[]] * len(shares), rows, frames
     )
