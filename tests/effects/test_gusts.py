@@ -121,7 +121,7 @@ def test_compiled_marches_and_plain_steps_agree(effects):
 
     marched, plain = run(fc.Compiled()), run(fc.CasadiVM())
     assert np.abs(plain["x"]).max() > 1e-3
-    assert marched.y == pytest.approx(plain.y, abs=1e-9)
+    assert marched.y == pytest.approx(plain.y, abs=1e-7)
     assert marched.report.energy.work == pytest.approx(plain.report.energy.work, rel=1e-5)
 
 
