@@ -13,7 +13,7 @@ from flexctrl.study.answers import Curves, outputs_apart
 from flexctrl.study.omissions import Subject
 from flexctrl.study.settings import Fidelity, Setting
 
-__all__ = ["Reference", "certified", "error_of", "finest_of", "finished"]
+__all__ = ["Reference", "certified", "error_of", "finest_of", "finished", "refined_by", "trusted"]
 
 _REFINEMENTS = 4
 _MESH = "a coarser mesh"
@@ -25,16 +25,20 @@ class Reference:
 
     Attributes
     ----------
-    run : Run
+    run : Curves
+        Its outputs.
     setting : Setting
     agreement : mapping of str to float
         How far it is from a coarser mesh, from longer steps and from another integrator: largest change of an
         output over its magnitude.
+    refined : tuple of str
+        What the disagreements were over which it was refined, in turn.
     """
 
-    run: Run
+    run: Curves
     setting: Setting
     agreement: dict[str, float]
+    refined: tuple[str, ...] = ()
 
     @property
     def uncertainty(self) -> float:
@@ -84,27 +88,51 @@ def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> 
     FlexctrlError
         If a run fails or they do not agree; says by how much.
     """
-    finest = finest_of(settings)
+    refined: tuple[str, ...] = ()
     for _ in range(_REFINEMENTS):
-        reference = _reference(scene, finest)
-        if reference.uncertainty <= tolerance / 3.0:
+        reference = _reference(scene, refined_by(finest_of(settings), refined), refined)
+        if trusted(reference, tolerance):
             return reference
         worst = max(reference.agreement, key=lambda name: reference.agreement[name])
-        finest = replace(finest, mesh=2 * finest.mesh) if worst == _MESH else _shorter(finest)
+        refined = (*refined, worst)
     raise FlexctrlError(
         f"{scene.name}: the reference ({reference.setting}) is {reference.uncertainty:.2g} from {worst}, more than a "
         f"third of the tolerance {tolerance:g}; give settings with finer meshes or shorter steps, or a larger tolerance"
     )
 
 
-def _reference(scene: Subject, finest: Setting) -> Reference:
+def trusted(reference: Reference, tolerance: float) -> bool:
+    """Tell whether a reference is good enough to judge errors of the size of a tolerance."""
+    return reference.uncertainty <= tolerance / 3.0
+
+
+def refined_by(setting: Setting, disagreements: Sequence[str]) -> Setting:
+    """Return a setting refined for each of some disagreements, in turn.
+
+    Parameters
+    ----------
+    setting : Setting
+    disagreements : sequence of str
+        As in `Reference.agreement`.
+
+    Returns
+    -------
+    Setting
+    """
+    for worst in disagreements:
+        setting = replace(setting, mesh=2 * setting.mesh) if worst == _MESH else _shorter(setting)
+    return setting
+
+
+def _reference(scene: Subject, finest: Setting, refined: tuple[str, ...]) -> Reference:
     run = finished(finest.of(scene))
     others = {
         _MESH: replace(finest, mesh=finest.mesh // 2),
         "longer steps": _longer(finest),
         "another integrator": _other(finest, run),
     }
-    return Reference(run, finest, {name: error_of(run, finished(s.of(scene))) for name, s in others.items()})
+    agreement = {name: error_of(run, finished(s.of(scene))) for name, s in others.items()}
+    return Reference(Curves.of(run), finest, agreement, refined)
 
 
 def _shorter(setting: Setting) -> Setting:

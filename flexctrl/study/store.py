@@ -6,11 +6,14 @@ import hashlib
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flexctrl.dynamics.checkpoint import machine_of
+from flexctrl.study.answers import Curves
 from flexctrl.study.omissions import Subject
+from flexctrl.study.reference import Reference, refined_by
 from flexctrl.study.settings import Setting
 
 __all__ = ["Point", "Store", "fingerprint"]
@@ -41,7 +44,7 @@ class Point:
 
 
 class Store:
-    """Points on disk, one a line, the later line of a setting counts; in memory only without a path.
+    """Points and references on disk, one a line, the later line of a setting counts; in memory only without a path.
 
     Parameters
     ----------
@@ -53,7 +56,9 @@ class Store:
     def __init__(self, path: str | Path | None, scene: str) -> None:
         self.path = None if path is None else Path(path)
         self.scene = scene
-        self.lines: dict[str, dict[str, float | int | str]] = {}
+        self.lines: dict[str, dict[str, Any]] = {}
+        self.references: dict[str, dict[str, Any]] = {}
+        self.held: dict[tuple[str, str], tuple[float, ...]] = {}
         if self.path is not None and self.path.is_file():
             for line in self.path.read_text(encoding="utf-8").splitlines():
                 self._read(line)
@@ -64,7 +69,13 @@ class Store:
             found = json.loads(line)
         except json.JSONDecodeError:
             return
-        if found.get("scene") == self.scene:
+        if found.get("scene") != self.scene:
+            return
+        if "outputs" in found:
+            self.references[found["reference"]] = found
+        elif "held_out" in found:
+            self.held[found["setting"], found["reference"]] = tuple(found["held_out"])
+        else:
             self.lines[found["setting"]] = found
 
     def known(self, setting: Setting) -> Point | None:
@@ -81,10 +92,48 @@ class Store:
             name: getattr(point, name) for name in ("error", "time_ratio", "steps", "failure")
         }
         self.lines[repr(point.setting)] = line
+        self._write(line)
+        return point
+
+    def reference(self, finest: Setting) -> Reference | None:
+        """Return the reference that was found when a setting was the first tried for it."""
+        found = self.references.get(repr(finest))
+        if found is None:
+            return None
+        curves = Curves(np.array(found["t"]), tuple(found["outputs"]), np.array(found["y"]))
+        refined = tuple(found["refined"])
+        return Reference(curves, refined_by(finest, refined), dict(found["agreement"]), refined)
+
+    def keep_reference(self, finest: Setting, reference: Reference) -> Reference:
+        """Write a reference down under the setting that was the first tried for it; return it."""
+        line = {
+            "scene": self.scene,
+            "reference": repr(finest),
+            "refined": list(reference.refined),
+            "agreement": reference.agreement,
+            "outputs": list(reference.run.outputs),
+            "t": reference.run.t.tolist(),
+            "y": reference.run.y.tolist(),
+        }
+        self.references[repr(finest)] = line
+        self._write(line)
+        return reference
+
+    def known_held(self, setting: Setting, reference: Setting) -> tuple[float, ...] | None:
+        """Return the errors of a setting on the held-out cases against a reference, if they are known."""
+        return self.held.get((repr(setting), repr(reference)))
+
+    def keep_held(self, setting: Setting, reference: Setting, errors: tuple[float, ...]) -> tuple[float, ...]:
+        """Write the errors of a setting on the held-out cases down; return them."""
+        self.held[repr(setting), repr(reference)] = errors
+        line = {"setting": repr(setting), "reference": repr(reference), "held_out": list(errors)}
+        self._write({"scene": self.scene} | line)
+        return errors
+
+    def _write(self, line: dict[str, Any]) -> None:
         if self.path is not None:
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(line) + "\n")
-        return point
 
 
 def fingerprint(scene: Subject) -> str:

@@ -12,10 +12,9 @@ import numpy as np
 
 from flexctrl.dynamics.run import Run
 from flexctrl.errors import StructureError
-from flexctrl.study.answers import Curves
 from flexctrl.study.held_out import load_cases
 from flexctrl.study.omissions import Subject
-from flexctrl.study.reference import Reference, certified, error_of, finished
+from flexctrl.study.reference import Reference, certified, error_of, finest_of, finished, trusted
 from flexctrl.study.settings import Setting, sweep
 from flexctrl.study.store import Point, Store, fingerprint, timed
 from flexctrl.study.tryouts import errors, time_of, workers_of
@@ -164,7 +163,7 @@ class _Study:
         self.workers, self.progress = workers, progress
 
     def made(self) -> WorkPrecision:
-        reference = certified(self.scene, self.settings, self.tolerance)
+        reference = self._reference()
         chosen: Point | None = None
         held_out: dict[str, tuple[float, ...]] = {}
         complete = True
@@ -176,6 +175,14 @@ class _Study:
             complete = False
         self.progress(1.0)
         return WorkPrecision(self.scene.name, self.tolerance, self._points, reference, chosen, held_out, complete)
+
+    def _reference(self) -> Reference:
+        """The reference of an earlier study, if it is fine enough; else a new one."""
+        finest = finest_of(self.settings)
+        known = self.store.reference(finest)
+        if known is not None and trusted(known, self.tolerance):
+            return known
+        return self.store.keep_reference(finest, certified(self.scene, self.settings, self.tolerance))
 
     @property
     def _points(self) -> tuple[Point, ...]:
@@ -190,7 +197,7 @@ class _Study:
         left = [setting for setting in self.settings if self.store.known(setting) is None]
         done = len(self.settings) - len(left)
         self._tick(done)
-        for _, point in errors(self.scene, left, Curves.of(reference.run), self.workers):
+        for _, point in errors(self.scene, left, reference.run, self.workers):
             self.store.keep(point)
             self._tick(done := done + 1)
 
@@ -210,10 +217,13 @@ class _Study:
         references: list[Run] = []
         held_out: dict[str, tuple[float, ...]] = {}
         for point in fit:
-            references = references or [finished(reference.setting.of(case)) for case in cases]
-            held = tuple(
-                error_of(r, finished(point.setting.of(case))) for r, case in zip(references, cases, strict=True)
-            )
+            held = self.store.known_held(point.setting, reference.setting)
+            if held is None:
+                references = references or [finished(reference.setting.of(case)) for case in cases]
+                found = (
+                    error_of(r, finished(point.setting.of(case))) for r, case in zip(references, cases, strict=True)
+                )
+                held = self.store.keep_held(point.setting, reference.setting, tuple(found))
             held_out[str(point.setting)] = held
             if max(held, default=0.0) <= self.tolerance:
                 return point, held_out

@@ -111,6 +111,26 @@ def test_a_study_goes_on_where_it_was_stopped(scene, tmp_path, monkeypatch):
     assert done == {"errors": list(tried), "times": list(tried)}
 
 
+def test_a_study_that_is_complete_runs_nothing_again(scene, study, tmp_path, monkeypatch):
+    """Reference and held-out cases are read too; a tighter tolerance asks for a reference of its own."""
+    store, tried = tmp_path / "cost.jsonl", settings(scene)
+    first = fc.work_precision(scene, 0.02, settings=tried, store=store, workers=1)
+
+    def refused(*anything):
+        raise AssertionError("run again")
+
+    with monkeypatch.context() as patched:
+        for name in ("reference.finished", "work_precision.finished", "work_precision.time_of", "tryouts._tried"):
+            patched.setattr(f"flexctrl.study.{name}", refused)
+        again = fc.work_precision(scene, 0.02, settings=tried, store=store, workers=1)
+        with pytest.raises(AssertionError, match="run again"):
+            fc.work_precision(scene, 0.1 * first.reference.uncertainty, settings=tried, store=store, workers=1)
+    assert str(again) == str(first)
+    assert again.held_out == first.held_out
+    assert np.array_equal(again.reference.run.y, first.reference.run.y)
+    assert again.reference.setting == study.reference.setting
+
+
 def test_points_of_another_scene_are_not_taken_up(scene, tmp_path):
     store, tried = tmp_path / "cost.jsonl", settings(scene)[:2]
     base = scene.with_(controller=scene.law)
