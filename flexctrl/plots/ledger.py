@@ -66,7 +66,7 @@ def change_bars(ax: Axes, ledger: Ledger) -> Axes:
 
 
 def cost_bars(ax: Axes, ledger: Ledger) -> Axes:
-    """Draw the time of a run without each effect over that of the full scene.
+    """Draw the time of a run without each effect over that of the full scene, from 1 on a logarithmic scale.
 
     Parameters
     ----------
@@ -78,9 +78,10 @@ def cost_bars(ax: Axes, ledger: Ledger) -> Axes:
     matplotlib.axes.Axes
     """
     rows = np.arange(len(ledger.entries))
-    times = [1.0 / e.cost_ratio if np.isfinite(e.cost_ratio) else 0.0 for e in ledger.entries]
-    ax.barh(rows, times, color=[_colour(e) for e in ledger.entries], height=0.66)
+    times = np.array([1.0 / e.cost_ratio if np.isfinite(e.cost_ratio) else 1.0 for e in ledger.entries])
+    ax.barh(rows, times - 1.0, left=1.0, color=[_colour(e) for e in ledger.entries], height=0.66)
     ax.axvline(1.0, color=INK, linewidth=0.8)
+    ax.set_xscale("log")
     tidy(ax).set(xlabel="time without it, over that of the full scene")
     return ax
 

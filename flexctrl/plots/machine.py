@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
 
 from flexctrl.mechanics.clamped_modes import clamped_shapes
+from flexctrl.model.state import State
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
 from flexctrl.structure.drives import RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, Part, PointMass, RigidBody, Rope, Spring
@@ -83,6 +84,24 @@ def seen(structure: Structure, pose: Pose) -> Drawn:
     for track in structure.tracks:
         x[track.gauge] = x[track.node]
     return Drawn(x, pose.R[:count], pose.bent if isinstance(pose, Drawn) else {})
+
+
+def pose_of(structure: Structure, coordinates: Sequence[str], state: State) -> Drawn:
+    """Return the pose of a state of a model, beams bent by their component modes.
+
+    Parameters
+    ----------
+    structure : Structure
+    coordinates : sequence of str
+        Of the model.
+    state : State
+        A frame of a run, say.
+
+    Returns
+    -------
+    Drawn
+    """
+    return replace(seen(structure, state), bent=bent_of(structure, coordinates, state.q))
 
 
 def bent_of(structure: Structure, coordinates: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:
@@ -412,4 +431,4 @@ def draw_deformed(
     return ax
 
 
-__all__ = ["Drawn", "Pose", "add_machine_axes", "best_plane", "draw_deformed", "draw_machine", "seen"]
+__all__ = ["Drawn", "Pose", "add_machine_axes", "best_plane", "draw_deformed", "draw_machine", "pose_of", "seen"]

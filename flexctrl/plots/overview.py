@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from flexctrl.mechanics.rotation import exponential, logarithm
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
-from flexctrl.plots.machine import Drawn, add_machine_axes, best_plane, draw_deformed, draw_machine, seen
+from flexctrl.plots.machine import Drawn, add_machine_axes, bent_of, best_plane, draw_deformed, draw_machine, seen
 from flexctrl.plots.style import FLEXIBLE, INK, new_figure
 from flexctrl.structure.elements import Part, PointMass, RigidBody
 from flexctrl.structure.structure import Structure
@@ -85,7 +85,8 @@ def rest_figure(rest: Rest) -> Figure:
     moved, turned = seen(structure, rest.state).x - drawn.x, logarithm(rest.state.R[:count])
     largest = max(float(np.abs(moved).max(initial=0.0)) / structure.size, float(np.abs(turned).max(initial=0.0)))
     scale = _round(_ENLARGED / largest) if 0.0 < largest < _SEEN else 1.0
-    pose = Drawn(drawn.x + scale * moved, exponential(scale * turned))
+    bent = bent_of(structure, rest.model.coordinates, rest.state.q)
+    pose = Drawn(drawn.x + scale * moved, exponential(scale * turned), {name: scale * a for name, a in bent.items()})
     ax = _machine_axes(structure, pose)
     draw_deformed(ax, structure, pose, FLEXIBLE, plane=best_plane(structure, (pose,)))
     enlarged = f", displacements × {scale:g}" if scale != 1.0 else ""

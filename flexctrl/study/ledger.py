@@ -187,8 +187,11 @@ class Ledger:
             return f"{e.name:<{wide}}  kept: {e.failure}"
         outputs, poles, margins = (_percent(c) for c in (e.change.outputs_worst, e.change.poles, e.change.margins))
         pole = f"{e.change.pole:.2g}" if e.change.poles > 0.0 else "–"
-        cells = [f"{c:>9}" for c in (margins, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)]
-        line = "  ".join([f"{e.name:<{wide}}", f"{outputs:>9}", f"{poles:>9}", f"{pole:>{_width('of pole')}}", *cells])
+        cells = [f"{c:>10}" for c in (margins, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)]
+        places = [f"{outputs:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}"]
+        line = "  ".join([f"{e.name:<{wide}}", *places, *cells])
+            [f"{e.name:<{wide}}", f"{outputs:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}", *cells]
+        )
         before = f"  (both without {', '.join(e.first)})" if e.first else ""
         return line + ("  keep" if e.keep else "") + before
 
@@ -413,8 +416,8 @@ def _size(scene: Subject, run: Run) -> Size:
 
 
 def _percent(value: float) -> str:
-    return "–" if not np.isfinite(value) else f"{100.0 * value:.3g} %"
+    return "–" if not np.isfinite(value) else f"{100.0 * value:.3g} %"  # at most 10 characters, of 1.23e-05 %
 
 
 def _width(head: str) -> int:
-    return 14 if head == "of pole" else 9
+    return 14 if head == "of pole" else 10

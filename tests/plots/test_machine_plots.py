@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 import flexctrl as fc
 from flexctrl.cranes import bridge_crane, ceiling_crane, flexible_arm
-from flexctrl.plots.machine import add_machine_axes, best_plane, draw_machine
+from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed, draw_machine, pose_of
 from flexctrl.plots.modes import mode_label, mode_pose, modes_figure
 from flexctrl.plots.run import comparison_curves, panels, run_curves, units
 from flexctrl.study.compare import Comparison
@@ -147,3 +147,21 @@ def test_a_beam_of_component_modes_is_drawn_bent():
     moved = np.array(animation(structure, modes)["modes"][0]["moved"])
     assert np.abs(moved[:2]).max() == 0.0
     assert np.abs(moved[2:]).max() > 0.05
+
+
+def test_frames_of_runs_and_equilibria_show_component_modes_bent():
+    """A beam of one clamped–clamped element sags by modes alone: the drawn line has its sag w L⁴/(384 EI)."""
+    section = fc.Section(EA=1e7, EI_y=1e6, EI_z=1e6, GJ=1e6, rhoA=100.0, rhoJ=1.0)
+    beam = fc.Beam("beam", (0, 0, 0), (10, 0, 0), section, elements=1)
+    structure = fc.Structure([beam], [fc.Support(beam.start), fc.Support(beam.end)])
+    model = fc.assemble(structure, [fc.Gravity(), fc.ComponentModes(6), fc.LargeRotation()])
+    rest = fc.equilibrium(model)
+    sag = 100.0 * 9.81 * 10.0**4 / (384.0 * 1e6)
+    run = fc.simulate(model, until=0.01, start=rest)
+    pose = pose_of(structure, model.coordinates, run.frames[-1])
+    axes = add_machine_axes(Figure(), structure, [pose])
+    draw_deformed(axes, structure, pose, "blue", plane=(0, 2))
+    assert min(line.get_ydata().min() for line in axes.lines) == pytest.approx(-sag, rel=0.02)
+    drawn = rest.plot().axes[0]
+    scale = float(drawn.get_title().split("× ")[1]) if "×" in drawn.get_title() else 1.0
+    assert min(line.get_ydata().min() for line in drawn.lines) == pytest.approx(-sag * scale, rel=0.02)
