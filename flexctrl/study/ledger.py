@@ -190,8 +190,6 @@ class Ledger:
         cells = [f"{c:>10}" for c in (margins, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)]
         places = [f"{outputs:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}"]
         line = "  ".join([f"{e.name:<{wide}}", *places, *cells])
-            [f"{e.name:<{wide}}", f"{outputs:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}", *cells]
-        )
         before = f"  (both without {', '.join(e.first)})" if e.first else ""
         return line + ("  keep" if e.keep else "") + before
 
