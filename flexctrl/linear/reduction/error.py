@@ -17,6 +17,7 @@ from flexctrl.linear.modes import COMPLETE, Modes
 from flexctrl.linear.poles import second_order_roots
 from flexctrl.linear.reduction.low_frequency import low_frequency, nearest_modes, rigid_basis, undamped
 from flexctrl.linear.reduction.modal import ModalTruncation
+from flexctrl.linear.response import response_span
 from flexctrl.linear.transfer import Transfer, transfer
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ class ErrorReport:
         max |G − G_r| over the band, output unit per input unit.
     relative : numpy.ndarray, shape (n_outputs, n_inputs)
         The same over max |G − G₋₂/s² − G₋₁/s|, the peak of the response without its rigid-body motion (for a
-        channel that is nearly silent, by symmetry or by place: over 1e-4 of what its input and output could do).
+        channel that is nearly silent, by symmetry or by place: over 1e-4 of what its input and output could do; of a
+        machine with rigid-body motion alone: over what they could do at the end of the band).
     at : numpy.ndarray, shape (n_outputs, n_inputs)
         Where, rad/s.
     up_to : float
@@ -106,8 +108,7 @@ class Reference:
         expansion = low_frequency(full, rigid_basis(full))
         s = 1j * self.omega
         rigid = expansion.double[:, :, None] / s**2 + expansion.single[:, :, None] / s
-        silence = SILENT * _potential(modes)
-        self.peak = np.maximum(abs(self.values - rigid).max(axis=-1), silence)
+        self.peak = np.maximum(abs(self.values - rigid).max(axis=-1), _silence(modes, top))
 
     def compare(self, reduced: Reduced) -> ErrorReport:
         """Measure a reduced model against this response."""
@@ -215,11 +216,13 @@ def _highest(
 
 
 def _band(full: LinearModel, top: float, kept: Callable[[], float] | None = None) -> float:
-    """The end of the band: as asked, else three times the highest mode (kept, in a large model)."""
+    """The end of the band: as asked, else three times the highest mode (kept, in a large model), or rate."""
     if np.isfinite(top):
         return top
     if len(full.coordinates) <= COMPLETE:
-        return 3.0 * float(np.sqrt(abs(nearest_modes(full).omega_squared).max()))
+        modes = nearest_modes(full)
+        highest = np.sqrt(abs(modes.omega_squared).max(initial=0.0)) or abs(modes.decay).max(initial=0.0)
+        return 3.0 * float(highest) or response_span(np.zeros(0))[1]
     if kept is None:
         raise ReductionError(f"{len(full.coordinates)} coordinates: say up to which frequency, up_to_hz")
     return 3.0 * kept()
@@ -246,13 +249,23 @@ def _slowest(full: LinearModel, modes: Modes) -> float:
     zero = slice(modes.unstable, modes.unstable + modes.rigid)
     dragged = ~undamped(full, modes.shapes[:, zero])
     rates = np.concatenate([np.sqrt(abs(np.delete(modes.omega_squared, zero))), modes.decay[zero][dragged]])
-    return float(rates.min(initial=np.inf)) if rates.size else 1.0
+    return float(rates.min(initial=np.inf))
 
 
-def _potential(modes: Modes) -> np.ndarray:
-    """Peak that a channel would have if its input and output met in the modes where each is strongest."""
+def _silence(modes: Modes, top: float) -> np.ndarray:
+    """A peak that counts as none: 1e-4 of what a channel could do if both its ends met where each is strongest.
+
+    Of a machine where nothing bends, what a channel could do at the end of the band: nothing is lost of such a one.
+    """
     bent = modes.select(np.arange(len(modes))[modes.flexible])
+    if not len(bent):
+        still = 1.0 / (top**2 + abs(modes.omega_squared))
+        seen = abs(modes.output_gain) ** 2 + abs(top * modes.output_rate_gain) ** 2
+        return _met(seen * still, abs(modes.input_gain.T) ** 2 * still)
     sharp = 1.0 / (2 * np.maximum(bent.damping, 1e-4) * np.maximum(bent.omega_squared, np.finfo(float).tiny))
-    seen = (abs(bent.output_gain) ** 2 + abs(bent.omega * bent.output_rate_gain) ** 2) * sharp
-    moved = abs(bent.input_gain.T) ** 2 * sharp
+    seen = abs(bent.output_gain) ** 2 + abs(bent.omega * bent.output_rate_gain) ** 2
+    return SILENT * _met(seen * sharp, abs(bent.input_gain.T) ** 2 * sharp)
+
+
+def _met(seen: np.ndarray, moved: np.ndarray) -> np.ndarray:
     return np.sqrt(np.outer(seen.max(axis=1, initial=0.0), moved.max(axis=1, initial=0.0)))
