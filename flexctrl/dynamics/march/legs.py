@@ -124,6 +124,8 @@ class Legs:
     memory : Memory
     first, moved : numpy.ndarray, shape (n,)
         Where the degrees of freedom were at first, and how far they had been from there.
+    size : float
+        Of the step before, or the first one [s].
     parts : list of Leg, Held or Told
     """
 
@@ -132,6 +134,7 @@ class Legs:
     memory: Memory
     first: np.ndarray
     moved: np.ndarray
+    size: float
     parts: list[Leg | Held | Told] = field(default_factory=list)
     end: AlphaPoint = field(init=False)
 
@@ -171,6 +174,7 @@ class Legs:
         again.enter(self.start)
         marcher = again.marcher
         marcher.open(self.first, self.moved, False)
+        marcher.about_to(self.size)
         marcher.keep(all_states=True)
         u, found = self.start.supply.u, []
         for leg in self.legs:

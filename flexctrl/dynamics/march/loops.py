@@ -8,6 +8,7 @@ from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import in_doubt, settled
 from flexctrl.dynamics.march.corners import passes
+from flexctrl.dynamics.march.flowing import flow_on, pivot, released
 from flexctrl.dynamics.march.gliding import back, glide, land, leap, level
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
 from flexctrl.dynamics.march.record import (
@@ -465,10 +466,14 @@ def jump(m: March) -> int:
         status = massed(m)
         if status != DONE:
             return status
-    if m.attempt == 1 or m.unsure == 1 or not small(m):
+    if m.flows.count > 0:
+        flow_on(m.flows, f, m.h)
+    if m.attempt == 1 or m.unsure == 1 or m.flows.count > 0 or not small(m):
         status = solved_for(m)
         if status != DONE:
             return status
+    if m.flows.count > 0:
+        run_on(m)
     for i in range(0, f.padded, 8):
         change = eight(f.rate[i:]) - eight(m.rate[i:])
         put(m.algorithmic[i:], eight(m.algorithmic[i:]) + change)
@@ -476,6 +481,20 @@ def jump(m: March) -> int:
     pull(f)
     copy(f.padded, f.force, m.pulled)
     return DONE
+
+
+@seldom
+def run_on(m: March) -> None:
+    """Enter the rates of first order after a jump, how they change, and what is dissipated."""
+    f = m.flat
+    for k in range(m.flows.count):
+        i = m.flows.places[k]
+        m.v[i] = m.flows.rates[k]
+        f.rate[i] = m.flows.changes[k]
+    if m.losing == 1:
+        drive(f)
+        energy(f)
+        m.power = f.books[2]
 
 
 @seldom
@@ -537,12 +556,14 @@ def balanced(m: March) -> bool:
     f = m.flat
     share = m.made_for * m.made_for * m.beta if m.made_for > 0.0 else math.inf
     copy(f.padded, m.rate, f.rate)
+    released(m.flows, f.rate)
     last = math.inf
     first = 0.0
     for k in range(_SOLUTIONS):
         drive(f)
         push(f)
         f.force[f.n] = 0.0
+        released(m.flows, f.force)
         solved(m.axes, m.mass, m.fronts, f.force)
         change = added(m)
         if k == 0:
@@ -585,6 +606,7 @@ def largest_rate(m: March) -> float:
 def weighed(m: March) -> int:
     """Factorise the mass that has been filled in for the present shape."""
     f = m.flat
+    pivot(m.flows, m.entries)
     where = factor(m.fronts, m.entries, m.mass.diagonal, m.mass.down, m.mass.up)
     m.mass_for = 0.0
     most = 0.0

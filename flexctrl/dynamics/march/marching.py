@@ -16,6 +16,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.frames import Later
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
+from flexctrl.dynamics.march.flowing import flows_of
 from flexctrl.dynamics.march.law import Sampling, no_law
 from flexctrl.dynamics.march.loops import run
 from flexctrl.dynamics.march.probing import probes_of
@@ -360,6 +361,11 @@ class Marcher:
             moved=self.flattened.own(m.reach),
         )
 
+    def about_to(self, h: float) -> None:
+        """Tell about how long the steps are, which says over what time rates of first order change little."""
+        if self.model.motion.flows.size:
+            self.march.h = h
+
     def jump(self, u: np.ndarray) -> int:
         """Let the inputs jump; return how it ended."""
         self.supply(u)
@@ -439,6 +445,7 @@ def _march(F: Flattened, method: Method) -> March:
         gauges=F.gauges,
         corners=corners_of(F.model),
         closing=closing_of(F),
+        flows=flows_of(F),
         law=no_law(),
         leap=no_leap(),
         fronts=F.plan.fronts,

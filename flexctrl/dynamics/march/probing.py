@@ -66,7 +66,9 @@ def probes_of(F: Flattened, weight: np.ndarray) -> Probes:
         found = F.model.__dict__["_probed"] = _grouped(F)
     groups, starts, columns, firsts, rows, cells = found
     base, step, v, rate = np.zeros((4, F.flat.padded))
-    size, driven = F.ordered(1.0 / weight), np.zeros(len(F.flat.driven))
+    # what has no yardstick only adds to the forces
+    far, driven = np.divide(1.0, weight, out=np.full_like(weight, 1.0 / _STEP), where=weight > 0.0), F.flat.driven
+    size, driven = F.ordered(far), np.zeros_like(driven)
     return Probes(groups, starts, columns, firsts, rows, cells, size, base, step, v, rate, driven)
 
 

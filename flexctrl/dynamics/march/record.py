@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.corners import Corners
+from flexctrl.dynamics.march.flowing import Flows
 from flexctrl.dynamics.march.law import Law
 from flexctrl.dynamics.march.probing import Probes
 from flexctrl.kernels.native import Reals, Wholes
@@ -140,6 +141,7 @@ class March:
     gauges : Gauges
     corners : Corners
     closing : Closing
+    flows : Flows
     law : Law
     leap : Leap
     fronts : Fronts
@@ -211,6 +213,7 @@ class March:
     gauges: Gauges
     corners: Corners
     closing: Closing
+    flows: Flows
     law: Law
     leap: Leap
     fronts: Fronts

@@ -84,6 +84,7 @@ class MarchingStepper:
         """
         zero = np.zeros(self.plain.model.n)
         self.enter(AlphaPoint(state, zero, supply, zero, zero))
+        self.marcher.about_to(step)
         self.marcher.march.unsure = 1  # no rates are known that a change of the inputs could be added to
         status = self.marcher.jump(supply.u)
         self.marcher.march.unsure = 0
@@ -98,6 +99,7 @@ class MarchingStepper:
         The point's rates are those of its state under its inputs: what changes them beside the inputs starts anew.
         """
         self.enter(point)
+        self.marcher.about_to(step)
         if self.marcher.jump(supply.u) == DONE:
             return self.leave(supply)
         self._here = None

@@ -12,10 +12,9 @@ __all__ = ["Flattened", "can_be_flat", "flatten"]
 def can_be_flat(model: Model) -> bool:
     """Tell whether `flatten` covers a model.
 
-    Nothing of first order; in small motion no loads that turn with their nodes.
+    No dry contacts; in small motion no loads that turn with their nodes.
     """
-    motion = model.motion
-    if model.n == 0 or any(i.order == 1 for i in motion.effects):
+    if model.n == 0 or model.switches.names:
         return False
     return model.large or not model.signals.follows
 
