@@ -72,6 +72,6 @@ def test_a_page_of_studies_runs_on_short_scenes(name: str, tmp_path: Path, monke
     assert all((tmp_path / picture).stat().st_size > 5_000 for picture in pictures)
 
 
-@pytest.mark.parametrize("name", (*PAGES_RUN, *PAGES_OF_STUDIES))
+@pytest.mark.parametrize("name", [*PAGES_RUN, *PAGES_OF_STUDIES])
 def test_pages_are_in_the_contents(name: str) -> None:
     assert f"\nhowto/{name}\n" in (PAGES.parent / "index.md").read_text(encoding="utf-8")
