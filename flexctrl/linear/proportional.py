@@ -13,6 +13,7 @@ AGREED = 1e-10
 PARALLEL = 1e-3
 ROUNDING = 1e-13
 NOTHING = 1e-15
+EPS, CAUTION = float(np.finfo(float).eps), 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +69,13 @@ def _in_most_columns(terms: np.ndarray, c: np.ndarray, starts: np.ndarray) -> np
 
 
 def _fitted(terms: np.ndarray, c: np.ndarray, most: float) -> np.ndarray:
-    """Least squares; 0 for what is only rounding."""
+    """Least squares; a term that is no more than the rounding of the entries makes of it is left out."""
     size = np.abs(terms).max(axis=0, initial=0.0)
     size[size == 0.0] = 1.0
-    found = np.linalg.lstsq(terms / size, c, rcond=None)[0]
-    return np.asarray(np.where(np.abs(found) < NOTHING * most, 0.0, found / size))
+    even = terms / size
+    found = np.linalg.lstsq(even, c, rcond=None)[0]
+    unsure = np.abs(np.linalg.pinv(even)) @ (EPS * np.abs(c) + np.abs(c - even @ found))
+    idle = np.abs(found) <= np.maximum(NOTHING * most, CAUTION * unsure)
+    if idle.any() and not idle.all():
+        found[~idle] = np.linalg.lstsq(even[:, ~idle], c, rcond=None)[0]
+    return np.asarray(np.where(idle, 0.0, found / size))

@@ -222,6 +222,11 @@ class Forces:
             total += np.bincount(cells.ravel(), weights=size.ravel(), minlength=motion.raw)
         return Terms(total, slopes)
 
+    def drags(self, state: State) -> sp.csr_matrix:
+        """Return how large the tangents of single pieces by rates are at rest, shape (raw, raw)."""
+        still = np.zeros(self.motion.n)
+        return self._raw_matrix(np.abs(self._blocks(self.slots(state, still, still), (0.0, 1.0, 0.0))))
+
     @cached_property
     def _apart(self) -> tuple[Run, ...]:
         """The forces of each family, piece by piece."""

@@ -16,6 +16,7 @@ __all__ = ["TURNS", "tangents"]
 
 TURNS = ("_rx", "_ry", "_rz", "_turn")
 _LAST_DIGITS, _CAUTION = 1e-14, 30.0
+_DUST = 4.0 * float(np.finfo(float).eps)
 
 
 def tangents(model: Model, state: State, u: np.ndarray) -> tuple[sp.csc_matrix, sp.csc_matrix, sp.csc_matrix]:
@@ -37,7 +38,18 @@ def tangents(model: Model, state: State, u: np.ndarray) -> tuple[sp.csc_matrix, 
     M, C, K = ((-model.slope(state, still, still, seed, u)).tocsc() for seed in seeds)
     sizes = abs(model.motion.jacobian(place)).T @ np.sqrt(model.forces.inertias(place))
     M = clean_mass(0.5 * (M + M.T), sizes, groups)
+    C = _without_dust(model, place, C)
     return M, C, clean_stiffness(K, _unsure(model, state, u, K), groups) if model.large else K
+
+
+def _without_dust(model: Model, place: State, C: sp.csc_matrix) -> sp.csc_matrix:
+    """C without what levers leave of dampers that do not move: entries below the rounding of their terms."""
+    if model.motion.plain or not C.nnz:
+        return C
+    T = abs(model.motion.jacobian(place))
+    clean = sp.csc_matrix(C.multiply(abs(C) > _DUST * sp.csc_matrix(T.T @ model.forces.drags(place) @ T)))
+    clean.eliminate_zeros()
+    return clean
 
 
 def _unsure(model: Model, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.ndarray:

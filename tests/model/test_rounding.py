@@ -123,3 +123,42 @@ def test_a_pendulum_turned_by_a_thousandth_is_no_equilibrium(elements, wrong):
     turned = model.advance(rest.state, wrong * 1.3 * swing / np.abs(swing[-6:-3]).max(), np.zeros(model.n), 0.0)
     with pytest.raises(LinearizationError, match="not an equilibrium"):
         fc.linearize(model, at=turned)
+
+
+def five_bar(seed: int) -> fc.Structure:
+    """A planar two-arm robot, its links joined at the tip, with two geared motors."""
+    x, y = 1.0 + 0.3 * np.random.default_rng(seed).uniform(-1.0, 1.0, (2, 2))
+    a, b = fc.Beam("a", (-1, 0, 0), (-x[0], y[0], 0), TUBE), fc.Beam("b", (-x[0], y[0], 0), (0, 1.8, 0), TUBE)
+    c, d = fc.Beam("c", (1, 0, 0), (x[1], y[1], 0), TUBE), fc.Beam("d", (x[1], y[1], 0), (0, 1.8, 0), TUBE)
+    left = fc.RotaryDrive("left", a.start, axis="z", stiffness=3.0, ratio=100, inertia=1e-3)
+    elbow = fc.RotaryDrive("elbow", b.start, a.end, axis="z", stiffness=1.0, ratio=50, inertia=5e-4)
+    joints = [fc.Support(a.start, "u v w"), fc.Support(c.start, "u v w"), fc.Pin(a.end, b.start)]
+    joints += [fc.Pin(c.end, d.start), fc.Pin(b.end, d.end)]
+    inputs, outputs = [fc.MotorTorque("torque", left)], [fc.DriveAngle("angle", left), fc.Position("x", b.end, "x")]
+    machine = fc.Structure([a, b, c, d], joints, drives=[left, elbow], inputs=inputs, outputs=outputs)
+    return fc.planar(machine, "z")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_damping_of_strain_leaves_free_motion_undamped(seed):
+    """C = β K does no work where K does none: two poles at exactly 0 for each free motion, and no others near."""
+    model = fc.assemble(five_bar(seed), [fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(0.0, 2e-4)])
+    twin, machine = fc.linearize(fc.rigid(model)), fc.linearize(model)
+    assert twin.C.nnz == 0
+    assert "skew" not in str(twin.certificate)
+    for linear in (machine, twin):
+        poles = linear.damped_poles()
+        assert np.count_nonzero(poles == 0.0) == 4
+        assert np.abs(poles[poles != 0.0]).min(initial=np.inf) > 1.0
+        assert np.count_nonzero(linear.to_ss().poles() == 0.0) == 4
+        assert linear.frequency_response().omega[0] > 1e-3
+    assert twin.reduce(fc.RelativeError(1e-6, up_to_hz=20.0)).order == 2
+
+
+@pytest.mark.parametrize("alpha", [1e-3, 1e-1])
+def test_damping_of_motion_however_small_beside_that_of_strain_is_kept(alpha):
+    """C = α M + β K: free motion dies away at α, though β ω² is 1e8 times that."""
+    model = fc.assemble(five_bar(0), [fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(alpha, 2e-4)])
+    poles = fc.linearize(model).damped_poles()
+    assert np.count_nonzero(poles == 0.0) == 2
+    assert poles[2:4].real == pytest.approx(-alpha, rel=1e-6)
