@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.errors import ControllerError, StructureError, did_you_mean
+from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
     import control
@@ -74,7 +75,7 @@ def sampled_response(
     reads = [plant.output_labels.index(name) for name in law.inputs]
     writes = [plant.input_labels.index(name) for name in law.outputs]
     base = _base(plant, inputs or {})
-    x = np.zeros(plant.nstates) if initial_state is None else np.array(initial_state, dtype=float)
+    x = np.zeros(plant.nstates) if initial_state is None else _checked_state(initial_state, plant.nstates)
     z, u = np.asarray(law.initial(), dtype=float), base
     solver = {"method": method or _fitting(plant, x, u, law.sample_time), "rtol": rtol, "atol": atol}
     t: list[np.ndarray] = []
@@ -127,6 +128,15 @@ def _fitting(plant: control.InputOutputSystem, x: np.ndarray, u: np.ndarray, spa
         return RK45
     fastest = float(np.abs(np.linalg.eigvals(slopes)).max(initial=0.0))
     return Radau if 6.0 * span * fastest / 3.3 > len(x) + 150 else RK45
+
+
+def _checked_state(given: object, count: int) -> np.ndarray:
+    state = numbers(given)
+    if len(state) != count or not np.isfinite(state).all():
+        raise StructureError(
+            f"sampled_response: initial_state = {given!r}; expected {count} finite numbers, one for each state"
+        )
+    return np.array(state)
 
 
 def _check(law: Controller, until: float, points: int) -> None:

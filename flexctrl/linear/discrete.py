@@ -33,6 +33,9 @@ class ZeroOrderHold:
 
     delay: float = 0.0
 
+    def __post_init__(self) -> None:
+        _check_delay(self.delay)
+
 
 @dataclass(frozen=True)
 class FirstOrderHold:
@@ -49,6 +52,9 @@ class FirstOrderHold:
     """
 
     delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_delay(self.delay)
 
 
 MOST_PAST = 5000
@@ -89,8 +95,6 @@ def discretize(linear: LinearModel, dt: float, hold: Hold | None = None) -> cont
         raise StructureError(f"hold = {hold!r}; expected ZeroOrderHold(delay) or FirstOrderHold(delay)")
     if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
         raise StructureError(f"sampling time dt = {dt!r} s: give a positive number")
-    if not isinstance(kind.delay, Real) or not 0.0 <= kind.delay < np.inf:
-        raise StructureError(f"delay = {kind.delay!r} s: give zero or a positive number")
     if kind.delay * max(len(linear.inputs), 1) > MOST_PAST * dt:
         raise StructureError(
             f"delay = {kind.delay} s is {kind.delay / dt:.3g} samples, each a state for every input; "
@@ -112,6 +116,11 @@ def discretize(linear: LinearModel, dt: float, hold: Hold | None = None) -> cont
         states=[*first.states, *past],
         name=linear.name,
     )
+
+
+def _check_delay(delay: float) -> None:
+    if isinstance(delay, bool) or not isinstance(delay, Real) or not 0.0 <= delay < np.inf:
+        raise StructureError(f"delay = {delay!r} s: give zero or a positive number")
 
 
 def _split_delay(delay: float, dt: float) -> tuple[int, float]:

@@ -201,6 +201,7 @@ class Modes:
         str
             Empty if the model does not know its parts.
         """
+        mode = check_whole(mode, "mode", "dominant_part", least=0, most=len(self) - 1)
         shares = self.kinetic_shares if self.kinds[mode] == "rigid" else self.strain_shares
         return max(shares, key=lambda name: shares[name][mode]) if shares else ""
 
@@ -216,6 +217,7 @@ class Modes:
         -------
         str
         """
+        mode = check_whole(mode, "mode", "dominant_coordinate", least=0, most=len(self) - 1)
         return self.coordinates[int(np.argmax(np.abs(self.shapes[:, mode])))]
 
     def plot(self, count: int = 6) -> Figure:

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from flexctrl.errors import StructureError
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction import Reduced
 from flexctrl.linear.response import response_span
 from flexctrl.linear.transfer import transfer
-from flexctrl.study.loop import Loop
+from flexctrl.study.loop import Loop, check_loop
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -155,7 +156,7 @@ def margins(loop: Loop) -> Margins:
     -------
     Margins
     """
-    omega, L = loop_grid(loop)
+    omega, L = loop_grid(check_loop(loop, "margins"))
     through_one = _roots(lambda w: np.log(abs(loop.at(w))), omega, np.log(abs(L)))
     through_axis = _roots(lambda w: np.sin(np.angle(loop.at(w))), omega, np.sin(np.angle(L)))
     gains = tuple(Crossing(w, _wrapped(np.angle(_one(loop, w)) + np.pi)) for w in through_one)
@@ -203,6 +204,8 @@ def peak_gain(system: LinearModel | Reduced) -> Peak:
         Infinite, with the frequency, if a pole on the imaginary axis (an integrator, an undamped mode)
         is seen by the inputs and outputs, or if a mode is unstable.
     """
+    if not isinstance(system, LinearModel | Reduced):
+        raise StructureError(f"peak_gain: {system!r} is no linear model; give what linearize or reduce returns")
     poles = system.damped_poles()
     span = response_span(poles)
     evaluate = transfer(system, 10 * span[1]) if isinstance(system, LinearModel) else system.transfer(10 * span[1])

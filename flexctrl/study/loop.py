@@ -15,6 +15,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction import Reduced, ReducedModel, ReducedStates
 from flexctrl.linear.reduction.states import states_transfer
 from flexctrl.linear.transfer import transfer
+from flexctrl.structure.freedoms import numbers
 from flexctrl.study.channel import channel_states
 from flexctrl.study.zeros import deflated_zeros, zeros
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     import control
     from matplotlib.figure import Figure
 
-__all__ = ["Loop", "open_loop"]
+__all__ = ["Loop", "check_loop", "open_loop"]
 
 AT_REST = 1e-8
 BOUNDARY = 1e-10
@@ -181,7 +182,17 @@ class Loop:
         """
         import control
 
-        return control.FrequencyResponseData(self.at(omega), omega, dt=self.dt, name=self.name)
+        wanted = numbers(omega)
+        if not wanted or not np.isfinite(wanted).all():
+            raise StructureError(f"Loop.frd: omega = {omega!r}; expected a list of angular frequencies, rad/s")
+        return control.FrequencyResponseData(self.at(np.array(wanted)), np.array(wanted), dt=self.dt, name=self.name)
+
+
+def check_loop(loop: Loop, owner: str) -> Loop:
+    """Return a loop as it is; refuse what is none, with the remedy."""
+    if not isinstance(loop, Loop):
+        raise StructureError(f"{owner}: {loop!r} is no loop; give what flexctrl.open_loop or broken_loop returns")
+    return loop
 
 
 def open_loop(

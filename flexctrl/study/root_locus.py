@@ -12,7 +12,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 
 from flexctrl.errors import StructureError
 from flexctrl.study.frequency import NOISE, loop_grid
-from flexctrl.study.loop import Loop
+from flexctrl.study.loop import Loop, check_loop
 
 if TYPE_CHECKING:
     import control
@@ -159,6 +159,7 @@ def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) ->
     StructureError
         For gains that are not ascending positive numbers.
     """
+    check_loop(loop, "root_locus")
     wanted = _gain_range(loop) if gains is None else _checked(gains)
     used, loci = _followed(loop.closed_poles, np.concatenate([[0.0], wanted[wanted > 0]]))
     return RootLocus(used, loci, loop.poles, loop.zeros, loop)

@@ -93,3 +93,26 @@ def test_units_that_belong_together(names):
 def test_a_folder_that_is_not_there(tmp_path):
     with pytest.raises(LinearizationError, match="folder that exists"):
         crane(1.0, 0.5, 2.0).save_mat(tmp_path / "none" / "crane.mat")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (lambda plant: fc.margins(plant), "open_loop"),
+        (lambda plant: fc.root_locus("x"), "open_loop"),
+        (lambda plant: fc.peak_gain(3), "linearize or reduce"),
+        (lambda plant: plant.reduce(fc.RelativeError(0.01, 20.0), using=lambda order: 7), "gave 7, no method"),
+        (lambda plant: plant.reduce(fc.RelativeError(0.01, 20.0), using=lambda order: fc.Lowest), "no method"),
+        (lambda plant: fc.RelativeError("a"), "'a'.*positive numbers"),
+        (lambda plant: fc.RelativeError(0.01, None), "positive numbers"),
+        (lambda plant: plant.reduce(fc.ModalTruncation(2)).error_up_to("x"), "hz = 'x'"),
+        (lambda plant: loop().frd("a"), "list of angular frequencies"),
+        (lambda plant: plant.modes().dominant_part(99), "mode = 99"),
+        (lambda plant: plant.modes().dominant_coordinate("a"), "mode = 'a'"),
+        (lambda plant: fc.ZeroOrderHold(delay=-1), "delay = -1 s"),
+        (lambda plant: fc.FirstOrderHold(delay="a"), "delay = 'a' s"),
+    ],
+)
+def test_what_is_of_another_kind_is_told_in_words(wrong, told):
+    with pytest.raises((StructureError, ReductionError), match=told):
+        wrong(crane(1.0, 0.5, 2.0))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from flexctrl.errors import ReductionError
+from flexctrl.errors import ReductionError, StructureError
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes
@@ -19,6 +19,7 @@ from flexctrl.linear.reduction.low_frequency import low_frequency, nearest_modes
 from flexctrl.linear.reduction.modal import ModalTruncation
 from flexctrl.linear.response import response_span
 from flexctrl.linear.transfer import Transfer, transfer
+from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
     from flexctrl.linear.reduction.result import Method, Reduced
@@ -89,8 +90,10 @@ class RelativeError:
     up_to_hz: float = np.inf
 
     def __post_init__(self) -> None:
-        if not (self.tolerance > 0 and self.up_to_hz > 0):
-            raise ReductionError(f"tolerance {self.tolerance} and up_to_hz {self.up_to_hz} must be positive numbers")
+        if not all(value > 0.0 for value in numbers((self.tolerance, self.up_to_hz))):
+            raise ReductionError(
+                f"tolerance {self.tolerance!r} and up_to_hz {self.up_to_hz!r} must be positive numbers"
+            )
 
 
 class Reference:
@@ -190,7 +193,10 @@ def smallest(full: LinearModel, goal: RelativeError, using: Callable[[int], Meth
 def _attempt(full: LinearModel, using: Callable[[int], Method], order: int) -> Reduced | None:
     """A reduction of this order; none if the order is too small for what must be kept."""
     try:
-        return using(order).apply(full)
+        method = using(order)
+        if isinstance(method, type) or not hasattr(method, "apply"):
+            raise StructureError(f"reduce: using({order}) gave {method!r}, no method; expected e.g. ModalTruncation(8)")
+        return method.apply(full)
     except ReductionError:
         if order >= 2 * len(full.coordinates):
             raise

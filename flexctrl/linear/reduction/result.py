@@ -15,6 +15,7 @@ from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import low_frequency, undamped
 from flexctrl.linear.transfer import Transfer, transfer
+from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
     import control
@@ -131,7 +132,7 @@ class Reduced(ABC):
         """
         from flexctrl.linear.reduction.error import error_report
 
-        if not hz > 0.0:
+        if not all(value > 0.0 for value in numbers((hz,))):
             raise ReductionError(f"error_up_to: hz = {hz!r}; expected a frequency above 0")
         return error_report(self, 2 * np.pi * hz)
 
