@@ -90,6 +90,10 @@ class Exact:
                 "Exact: this model moves far (LargeRotation), its equations are not linear; give linearize(model), a "
                 "model without LargeRotation, or another method"
             )
+        if not model.n:
+            raise StructureError(
+                "Exact: the machine has no degrees of freedom, so nothing of it vibrates; give another method"
+            )
         from flexctrl.dynamics.march.leaps import LeapingStepper
         from flexctrl.dynamics.march.marching import can_march
 

@@ -116,3 +116,10 @@ def test_a_folder_that_is_not_there(tmp_path):
 def test_what_is_of_another_kind_is_told_in_words(wrong, told):
     with pytest.raises((StructureError, ReductionError), match=told):
         wrong(crane(1.0, 0.5, 2.0))
+
+
+def test_exact_motion_of_a_machine_that_cannot_move():
+    post = fc.Beam("post", (0, 0, 0), (0, 0, 2), fc.Section.tube(fc.STEEL, 0.03, 0.002))
+    model = fc.rigid(fc.assemble(fc.Structure([post], [fc.Support(post.start)]), [fc.Flexible()]))
+    with pytest.raises(StructureError, match="no degrees of freedom"):
+        fc.simulate(model, until=1.0, method=fc.Exact(0.1))
