@@ -12,7 +12,7 @@ from scenes import EXAMPLES, TROLLEY
 
 import flexctrl as fc
 from flexctrl.cranes import bridge_crane, ceiling_crane
-from flexctrl.design import AntiWindup, Sampled, Saturated, Shaped, TrapezoidalVelocity, zvd
+from flexctrl.design import AntiWindup, MinimumJerk, Sampled, Saturated, Shaped, TrapezoidalVelocity, zvd
 from flexctrl.errors import EquilibriumError, SceneError
 from flexctrl.scene import PID, Controlled, Gains, Hardware, Move, Reference, StateFeedback, Transfer, load_scene
 from flexctrl.scene.laws import MOVES, SHAPERS, move
@@ -215,6 +215,30 @@ def test_a_shaped_move_scales_with_its_shaper():
     for t in (0.3, 1.7, 2.9, 5.0, 9.0):
         assert scaled(t) == pytest.approx(7.0 * exact(t), rel=1e-12)
         assert scaled.derivative(t) == pytest.approx(7.0 * exact.derivative(t), rel=1e-12)
+
+
+def test_there_wait_and_back_is_a_sum_of_moves():
+    out = {"kind": "trapezoidal_velocity", "distance": 2.0, "speed": 1.0, "acceleration": 0.5, "at": 1.0}
+    back = {"kind": "minimum_jerk", "distance": -2.0, "duration": 3.0, "at": 8.0}
+    held = {"kind": "constant", "value": 0.5}
+    shaped = {"kind": "zvd", "omega": 9.0, "zeta": 0.1}
+    found = move({"kind": "sum", "terms": [out, back, held], "shaper": shaped}, Place("x"))
+    there, home = TrapezoidalVelocity(2.0, 1.0, 0.5, 1.0), MinimumJerk(-2.0, 3.0, 8.0)
+    command = found.times(7.0)
+    for t in np.linspace(-1.0, 13.0, 57):
+        expected = 0.5 + Shaped(there, zvd(9.0, 0.1))(t) + Shaped(home, zvd(9.0, 0.1))(t)
+        assert command(t) == pytest.approx(7.0 * expected, abs=1e-11)
+        rate = Shaped(there, zvd(9.0, 0.1)).derivative(t) + Shaped(home, zvd(9.0, 0.1)).derivative(t)
+        assert command.derivative(t) == pytest.approx(7.0 * rate, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("terms", "message"),
+    [([], "at least one"), ([{"kind": "stp", "size": 1.0}], "step"), ([{"kind": "step"}], "size"), (3.0, "a list")],
+)
+def test_a_sum_says_what_is_wrong_with_its_terms(terms, message):
+    with pytest.raises(SceneError, match=message):
+        move({"kind": "sum", "terms": terms}, Place("x"))
 
 
 def test_a_shaper_for_two_modes():

@@ -8,6 +8,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from flexctrl.errors import ControllerError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Constant", "PiecewisePolynomial", "Sum", "Trajectory"]
+__all__ = ["Constant", "PiecewisePolynomial", "Sum", "Trajectory", "simplified"]
 
 _ROUND_OFF = 1e-12  # a sample instant this near a break (relative) counts as past it, not a sample early
 
@@ -183,13 +184,24 @@ class PiecewisePolynomial(Trajectory):
         knots = distinct(knot + delay for knot in self.knots for delay in delays)
         copies = tuple(zip(amplitudes, delays, strict=True))
         rows = tuple(
-            tuple(sum(column) for column in zip(*(self._expanded(a, knot - delay) for a, delay in copies), strict=True))
+            tuple(sum(column) for column in zip(*(self.expanded(a, knot - delay) for a, delay in copies), strict=True))
             for knot in knots
         )
         return PiecewisePolynomial(knots, rows, self.before * sum(amplitudes))
 
-    def _expanded(self, amplitude: float, instant: float) -> tuple[float, ...]:
-        """The piece at an instant, times the amplitude, in powers of the time since that instant."""
+    def expanded(self, amplitude: float, instant: float) -> tuple[float, ...]:
+        """Return the piece at an instant, times an amplitude, in powers of the time since that instant.
+
+        Parameters
+        ----------
+        amplitude : float
+        instant : float
+            [s]
+
+        Returns
+        -------
+        tuple of float
+        """
         piece = bisect_right(self._reached, instant) - 1
         row, s = (self.coefficients[piece], instant - self.knots[piece]) if piece >= 0 else ((self.before,), 0.0)
         shifted = [sum(math.comb(k, m) * row[k] * s ** (k - m) for k in range(m, len(row))) for m in range(len(row))]
@@ -255,6 +267,34 @@ class Sum(Trajectory):
     @property
     def shortest_period(self) -> float:
         return min((term.shortest_period for term in self.terms), default=math.inf)
+
+
+def simplified(path: Trajectory) -> Trajectory:
+    """Return a trajectory as one polynomial in pieces, where it is one: sums are added up once and for all.
+
+    Parameters
+    ----------
+    path : Trajectory
+
+    Returns
+    -------
+    Trajectory
+        A `PiecewisePolynomial`, or the trajectory itself.
+    """
+    if isinstance(path, Constant):
+        return PiecewisePolynomial((0.0,), ((path.value,),), path.value)
+    if isinstance(path, Sum):
+        terms = [simplified(term) for term in path.terms]
+        known = [term for term in terms if isinstance(term, PiecewisePolynomial)]
+        return _added(known) if known and len(known) == len(terms) else path
+    pieces = getattr(path, "pieces", path)
+    return pieces if isinstance(pieces, PiecewisePolynomial) else path
+
+
+def _added(terms: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
+    knots = distinct(knot for term in terms for knot in term.knots)
+    rows = [zip_longest(*(term.expanded(1.0, knot) for term in terms), fillvalue=0.0) for knot in knots]
+    return PiecewisePolynomial(knots, tuple(tuple(map(sum, row)) for row in rows), sum(term.before for term in terms))
 
 
 def distinct(instants: Iterable[float]) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, distinct
+from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, distinct, simplified
 from flexctrl.design.shaper import Shaper
 
 __all__ = ["CoarseGridWarning", "Shaped", "check_grid", "fir"]
@@ -42,7 +42,7 @@ class Shaped(Trajectory):
     @cached_property
     def _value(self) -> Callable[[float], float]:
         """The delayed copies added up beforehand, where they are polynomials."""
-        pieces = getattr(self.trajectory, "pieces", None)
+        pieces = simplified(self.trajectory)
         if isinstance(pieces, PiecewisePolynomial):
             return pieces.convolved(self.shaper.amplitudes, self.shaper.times)
         return self._copies

@@ -12,7 +12,7 @@ from flexctrl.design.controller import Controller, LinearController, as_controll
 from flexctrl.design.feedback import FilteredRate, pid, state_feedback
 from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
 from flexctrl.design.optimal import bryson, lqr
-from flexctrl.design.piecewise import Constant, PiecewisePolynomial, Trajectory
+from flexctrl.design.piecewise import Constant, PiecewisePolynomial, Trajectory, simplified
 from flexctrl.design.shaper import Shaper
 from flexctrl.design.shaping import Shaped
 from flexctrl.design.tracking import Together, Tracking
@@ -45,7 +45,7 @@ def _scaled(path: Trajectory, factor: float) -> Trajectory:
         return path
     if isinstance(path, Constant):
         return Constant(factor * path.value)
-    pieces = getattr(path, "pieces", path)
+    pieces = simplified(path)
     assert isinstance(pieces, PiecewisePolynomial)
     rows = tuple(tuple(factor * c for c in row) for row in pieces.coefficients)
     return PiecewisePolynomial(pieces.knots, rows, factor * pieces.before)

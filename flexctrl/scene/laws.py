@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from flexctrl.design.feedback import FilteredRate
-from flexctrl.design.piecewise import Constant
+from flexctrl.design.piecewise import Constant, Sum
 from flexctrl.design.shaper import Shaper, convolve
 from flexctrl.design.shapers import ei, um_zv, um_zvd, zv, zvd, zvdd
 from flexctrl.design.trajectories import (
@@ -63,6 +63,17 @@ MOVES = {
     ),
 }
 """Commands by the name they have in a scene file."""
+
+
+def _terms(value: Any, place: Place) -> tuple[Any, ...]:
+    """Read the moves of a sum, at least one."""
+    found = several(lambda item, where: of_kind(item, where, MOVES))(value, place)
+    if not found:
+        raise place.expected("a list of moves, at least one", value)
+    return found
+
+
+MOVES["sum"] = Kind(Sum, {"terms": _terms})
 
 
 def move(value: Any, place: Place) -> Move:
