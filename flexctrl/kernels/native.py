@@ -72,9 +72,12 @@ class Packed:
         self._lent.clear()
 
     def lend(self, name: str, record: Any) -> Packed:
-        """Put another record in the place of one until the numbers are set back; return it as machine code sees it."""
+        """Put another record in the place of one until the numbers are set back; return it as machine code sees it.
+
+        One that is packed already is used as it is.
+        """
         known = record_fields(type(self._record))  # type: ignore[arg-type]
-        inner = self._lent[name] = Packed(record)
+        inner = self._lent[name] = record if isinstance(record, Packed) else Packed(record)
         self._words[list(known).index(name)] = _start(inner._words)
         return inner
 

@@ -97,7 +97,6 @@ def read(g: Gauges, z: Reals, y: Reals) -> None:
     show(g, z, y)
 
 
-@seldom
 def show(g: Gauges, z: Reals, y: Reals) -> None:
     """Tell the outputs that are sums, angles of sums, and rotations."""
     for k in range(g.plains):

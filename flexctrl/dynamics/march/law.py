@@ -138,6 +138,17 @@ class Sampling:
             room=self.room,
         )
 
+    def serves(self, feed: Feed) -> bool:
+        """Tell whether this can be the controller of another feed: the same law on the same signals."""
+        mine, same = self.feed, feed.lowered is self.feed.lowered and feed.model is self.feed.model
+        same = same and mine.sample_time == feed.sample_time
+        return same and mine.reads.tolist() == feed.reads.tolist() and mine.writes == feed.writes
+
+    def serve(self, feed: Feed) -> None:
+        """Be that controller from now on."""
+        self.feed = feed
+        self.law.base[:] = feed.base
+
     @property
     def state(self) -> np.ndarray:
         """The law's state in force."""
@@ -168,7 +179,6 @@ def _until_one_fails(found: Lowered, times: np.ndarray) -> np.ndarray:
     return np.array(rows).reshape(-1, len(found.clocks))
 
 
-@seldom
 def said(law: Law, y: Reals) -> bool:
     """Ask the law at a sample; tell whether what it says, left in ``answer``, are numbers."""
     own = law.work[law.outputs :]
@@ -185,7 +195,6 @@ def said(law: Law, y: Reals) -> bool:
     return math.isfinite(total)
 
 
-@seldom
 def obeyed(law: Law) -> bool:
     """Put what the law has said in force; tell whether inputs change."""
     own = law.work[law.outputs :]
@@ -203,7 +212,6 @@ def obeyed(law: Law) -> bool:
     return changed
 
 
-@seldom
 def enter_leg(law: Law, steps: int) -> None:
     """Write down a leg."""
     row = law.told[(3 + law.inputs + law.states) * law.legs :]
@@ -217,7 +225,6 @@ def enter_leg(law: Law, steps: int) -> None:
     law.legs += 1
 
 
-@seldom
 def enter_inputs(law: Law, first: int, last: int) -> None:
     """Write down the inputs in force from the ends of some steps on."""
     for k in range(first, last):

@@ -13,15 +13,18 @@ from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.exact import ExactStepper, ModalPoint
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.leaping import Leaps, Tables
-from flexctrl.dynamics.march.marching import Marcher, Method
+from flexctrl.dynamics.march.marching import Marcher, Method, Remembered
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Point
+from flexctrl.kernels.native import Packed
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
 __all__ = ["Leaper", "LeapingStepper"]
+
+_MEMORY = Memory(None, Remembered(np.zeros(0), np.zeros(0), -1.0, ()))
 
 
 @dataclass(frozen=True)
@@ -37,16 +40,18 @@ class Leaper(Marcher):
     def __init__(self, model: Model, method: Method) -> None:
         super().__init__(model, method)
         self._tables: dict[tuple[float, int | None], Tables] = {}
-        self._known: dict[int | None, Leaps] = {}
+        self._known: dict[int | None, tuple[Leaps, Packed]] = {}
         self._steps: ExactStepper | None = None
 
     def taking(self, steps: ExactStepper) -> Leaper:
         """Take such steps; return the march."""
         self._steps = steps
         if steps.modes not in self._known:
-            self._known[steps.modes] = Leaps(self.flattened, steps.equations)
-        self.leaps = self._known[steps.modes]
-        self._numbers = self.march.lend("leap", self.leaps.record)
+            leaps = Leaps(self.flattened, steps.equations)
+            self._known[steps.modes] = leaps, Packed(leaps.record)
+        self.leaps, self._numbers = self._known[steps.modes]
+        self._numbers.reset()
+        self.march.lend("leap", self._numbers)
         return self
 
     def _made(self, seeds: tuple[float, float, float], task: int) -> int:
@@ -83,7 +88,7 @@ class LeapingStepper(MarchingStepper):
     @property
     def memory(self) -> Memory:
         """Nothing but the point matters to later steps."""
-        return Memory(None, self.marcher.remembered())
+        return _MEMORY
 
     def recall(self, memory: Memory) -> None:
         """There is nothing to go on from but the point."""

@@ -123,7 +123,6 @@ def sampled(m: March) -> int:
         enter_inputs(law, m.done - 1, m.done)
 
 
-@seldom
 def set_out(m: March, law: Law) -> bool:
     """Set out for the next sample; tell whether there is room."""
     m.stop = float(law.passed + 1) * law.period
@@ -189,7 +188,6 @@ def fixed(m: March) -> int:
     return DONE
 
 
-@seldom
 def glided(m: March) -> int:
     """Take exact steps of one length on modal states alone, but where a state is to be kept."""
     m.jumping = 0
@@ -377,7 +375,6 @@ def enter(m: March) -> None:
         draw(m)
 
 
-@seldom
 def drawn_now(m: March) -> bool:
     """Count a step; tell whether the balance is to be drawn after it."""
     m.entered += 1

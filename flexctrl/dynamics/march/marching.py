@@ -149,6 +149,7 @@ class Marcher:
         self.steps, self.clock = m.cell("done"), m.cell("t")
         self._kept = _NOTHING
         self._heeded: tuple[Sampling, Packed] | None = None
+        self._last: tuple[Sampling, Packed] | None = None
         self.width = 1 + len(model.outputs)
         self.rows = m.rows.reshape(-1, self.width)
         self.times: Any = m.rows.data[:: self.width]
@@ -311,8 +312,13 @@ class Marcher:
         """Take the feed's controller, which can be lowered, into the loops; return it, and its numbers there."""
         if self._heeded is None or self._heeded[0].feed is not feed:
             assert isinstance(self.model.backend, Compiled)
-            sampling = Sampling(feed, self.model.backend, self.flattened.flat.u, _CAPACITY)
-            self._heeded = sampling, self.march.lend("law", sampling.law)
+            if self._last is None or not self._last[0].serves(feed):
+                sampling = Sampling(feed, self.model.backend, self.flattened.flat.u, _CAPACITY)
+                self._last = sampling, Packed(sampling.law)
+            self._heeded = self._last
+            self._heeded[0].serve(feed)
+            self._heeded[1].reset()
+            self.march.lend("law", self._heeded[1])
         return self._heeded
 
     def sampled(self, pacing: Pacing | None) -> int:

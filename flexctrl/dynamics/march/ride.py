@@ -153,7 +153,7 @@ class _Ride:
         self.supply = Supply(self.marcher.flattened.flat.u.copy(), sampling.state.copy(), self.supply.rate)
         if m.done:
             self.legs.parts.append(Told(self.supply.rate, table.copy(), inputs, law.period, pacing))
-            rows = law.rows[: m.done * inputs].reshape(m.done, inputs).copy()
+            rows = law.rows[: m.done * inputs].reshape(m.done, inputs)
             j.rows.sampled(self.marcher.rows[: m.done], rows, self.marcher.states(), 1e-6 * mark.size)
 
     def _even(self, stop: float) -> bool:
