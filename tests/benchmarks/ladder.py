@@ -113,8 +113,8 @@ def saved() -> str:
             f"The bridge crane's minimal set within 1 % keeps {', '.join(found.minimal_set)}: outputs within "
             f"{100.0 * found.minimal_change.outputs_worst:.2f} %. It is linear and integrated exactly, "
             f"with {found.modes} vibrations. `fc.ledger` itself, which times every set a few times, says "
-            f"{found.speedup:.1f} × for the scene as it is shipped, {scene.simulation.until:g} s (there, held, and back). "
-            "Shorter and longer runs tell what a second costs beside what a run costs.",
+            f"{found.speedup:.1f} × for the scene as it is shipped, {scene.simulation.until:g} s (there, held, and "
+            "back). Shorter and longer runs tell what a second costs beside what a run costs.",
             "",
             "| run | full [ms] | minimal [ms] | faster |",
             "|---|---|---|---|",

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.kernels.kernel import Compiled
-from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
+from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.model.flat.flat import clear
 
 if TYPE_CHECKING:

@@ -54,6 +54,10 @@ class Leaper(Marcher):
         self.march.lend("leap", self._numbers)
         return self
 
+    def recall(self, memory: Remembered) -> None:
+        """There is nothing to go on from but the point."""
+        return
+
     def _made(self, seeds: tuple[float, float, float], task: int) -> int:
         h, steps = self.march.h, self._steps
         assert steps is not None
