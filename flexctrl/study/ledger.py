@@ -278,7 +278,7 @@ class _Auditor:
         assert isinstance(minimal, _Trial)
         minimal = self._reduced(minimal)
         names = {o.name for o in gone}
-        self._measure([*self.bases.values(), *trials.values(), minimal])
+        self._measure([minimal, *self.bases.values(), *trials.values(), minimal])
         entries = tuple(self._entry(o, trials[o.name], o.name not in names) for o in self.items)
         self.progress(1.0)
         return Ledger(
