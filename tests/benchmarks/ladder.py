@@ -32,7 +32,7 @@ process, the shortest of several runs in turn; all that `simulate` does is in. W
 the run, however long, follows from a run of half the length. A scene has no rung that changes nothing of it (no shafts:
 no rung of shafts).
 
-```{{image}} ../_static/fidelity_ladder_2.png
+```{{image}} ../_static/fidelity_ladder_3.png
 :alt: Error against time of every rung, one panel a scene
 ```
 
@@ -70,7 +70,7 @@ def main() -> None:
     figure = Figure(figsize=(5.0 * len(found), 4.4), layout="constrained")
     for ax, ladder in zip(np.atleast_1d(figure.subplots(1, len(found))), found, strict=True):
         rungs_chart(ax, ladder)
-    figure.savefig(ROOT / "docs" / "_static" / "fidelity_ladder_2.png", dpi=100)
+    figure.savefig(ROOT / "docs" / "_static" / "fidelity_ladder_3.png", dpi=100)
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "casadi", "llvmlite"))
     text = PAGE.format(
         tables="\n\n".join(table(fc.load_scene(str(p)), ladder) for p, ladder in zip(SCENES, found, strict=True)),
