@@ -52,6 +52,7 @@ _LEFT = 0.02
 _SURE = 1e-4
 _DOUBT = 4.0
 _TRUSTED = 8
+_QUIET, _SMALLEST = 1e-6, 1e-14
 _MASSLESS = 1e-14
 
 
@@ -294,11 +295,15 @@ def accept(m: March) -> None:
     shared = zero
     square = zero
     far = zero
+    steady = zero
+    pull = zero
     for i in range(0, f.padded, 8):
         rate = eight(f.rate[i:])
         change = rate - eight(m.rate[i:])
         still = still + abs(change) * eight(m.weight[i:])
         before = eight(m.trend[i:])
+        steady = larger(steady, (abs(change + before) - abs(change - before)) * eight(m.weight[i:]))
+        pull = larger(pull, abs(rate) * eight(m.weight[i:]))
         onward = onward + abs(change - before) * eight(m.weight[i:])
         told = eight(m.weight[i:]) * before
         shared = shared + told * eight(m.weight[i:]) * change
@@ -314,8 +319,8 @@ def accept(m: March) -> None:
     m.reached = max(m.reached, largest(far))
     if m.parts > 1:
         follow(m)
-    tighten(m, total(still), total(onward))
     lean(m, total(shared), total(square))
+    tighten(m, total(onward) / max(total(still), _TINY), 0.5 * largest(steady), largest(pull))
     m.t = later(m.t, m.h)
     enter(m)
     note(m)
@@ -330,14 +335,17 @@ def follow(m: March) -> None:
 
 
 @seldom
-def tighten(m: March, still: float, onward: float) -> None:
+def tighten(m: March, rough: float, steady: float, pull: float) -> None:
     """Choose Newton's tolerance for the next step.
 
     What he leaves kicks the rates by two over the step, while the method's own error does so by how fast it
-    changes: the smoother the motion, the more exactly steps are to be solved.
+    changes: the smoother the motion, the more exactly steps are to be solved. Changes of acceleration that turn
+    back in the next step are no error to go by: they may be what he left. And what he leaves is an acceleration,
+    which adds up: it is to be small beside those there are.
     """
-    smooth = min(1.0, onward / still) if still > 0.0 else 0.0
-    m.tolerance = min(max(m.least, m.share * m.error * smooth), m.loosest)
+    floor = min(m.least, max(_QUIET * m.beta * m.h * m.h * pull, _SMALLEST))
+    error = abs(m.beta - 1.0 / 6.0) * m.h * m.h * steady
+    m.tolerance = min(max(floor, m.share * error * min(1.0, rough)), m.loosest)
 
 
 @seldom

@@ -50,7 +50,7 @@ from flexctrl.model.state import State
 
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
-_SHARE, _CONTROLLED, _KEEPING = 1e-2, 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
+_SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
 _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed")
 _MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
@@ -275,7 +275,7 @@ class Marcher:
     def travel(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
         """Take up to ``count`` steps of one length or as paced; return how it ended, and how many there were."""
         m = self.march
-        m.wanted, m.done, m.kept, m.share = count, 0, 0, self._share(isinstance(pacing, Pacing))
+        m.wanted, m.done, m.kept = count, 0, 0
         if isinstance(pacing, Pacing):
             m.size, m.largest, m.stop, m.until, m.relative, m.absolute = pacing
             status = self._through(CONTROLLED)
@@ -284,16 +284,9 @@ class Marcher:
             status = self._through(FIXED)
         return status, m.done
 
-    def _share(self, controlled: bool) -> float:
-        """How exactly steps are solved: steps of controlled error may be long, and what is left in each then shows."""
-        if not self.method.coefficients.damping:
-            return _KEEPING
-        return _CONTROLLED if controlled else _SHARE
-
     def begin(self) -> None:
         """Begin rows and states of steps of one length anew; see `on`."""
         self.march.done = self.march.kept = 0
-        self.march.share = self._share(controlled=False)
         self._task[0] = FIXED
 
     def on(self, h: float, wanted: int) -> int:
@@ -324,7 +317,7 @@ class Marcher:
     def sampled(self, pacing: Pacing | None) -> int:
         """Go on from sample to sample of the law as it is set, by its steps or as paced; return how it ended."""
         m = self.march
-        m.done, m.kept, m.wanted, m.share = 0, 0, 0, self._share(pacing is not None)
+        m.done, m.kept, m.wanted = 0, 0, 0
         if pacing is not None:
             m.size, m.largest, m.stop, m.until, m.relative, m.absolute = pacing
         return self._through(SAMPLED)
@@ -481,7 +474,7 @@ def _march(F: Flattened, method: Method) -> March:
         gamma=c.gamma,
         least=method.least,
         loosest=max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
-        share=_KEEPING,
+        share=_SHARE if c.damping else _KEEPING,
         price=_MADE + probes.groups if flat.tangents or probes.groups else _ASKED,
         asking=int(not flat.tangents and not probes.groups),
         tolerance=method.least,
