@@ -163,6 +163,8 @@ class Watch:
         Values of corners below these are zero but for round-off.
     sides : numpy.ndarray
         The side each gauge is on: ±1; 0 while it has not left zero.
+    span : int
+        How many steps are taken at once before it is looked at whether an event has happened.
     """
 
     feed: Feed
@@ -175,6 +177,7 @@ class Watch:
     dust: np.ndarray
     sides: np.ndarray = field(default_factory=lambda: np.zeros(0))
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    span: int = 64
 
     def __post_init__(self) -> None:
         model = self.feed.model
@@ -257,6 +260,10 @@ class Watch:
         if self.corner_names:
             dust[-len(self.dust) :] = self.dust
         return dust
+
+    def dusts_of(self, sizes: np.ndarray) -> np.ndarray:
+        """What counts as zero of events of some sizes."""
+        return _DUST * sizes
 
     def switched(self) -> None:
         """Note that every switching law of force holds."""

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.foresight import calm_steps
 from flexctrl.dynamics.march.law import Sampling
 from flexctrl.dynamics.march.legs import Held, Leg, Legs, Told, same
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT
-from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.errors import ControllerError
@@ -33,6 +35,8 @@ _SECONDS = 0.1
 _FIRST = 8
 _MORE = 256.0
 _SHARE = 0.2
+_FEWEST, _WIDEST = 8, 1024
+_EVENT = -1  # how a march ends where an event may be near
 
 
 def ride(journey: Journey) -> bool:
@@ -41,11 +45,30 @@ def ride(journey: Journey) -> bool:
     Between samples only, where some freedom has no mass: the march has no rule for how its place jumps.
     """
     stepper, plan = journey.stepper, journey.plan
-    if not isinstance(stepper, MarchingStepper) or not journey.watch.quiet:
+    if not isinstance(stepper, MarchingStepper) or journey.watch.names:
+        return False
+    if journey.watch.events and _near_stop(journey):
         return False
     if plan.feed.sample_time and quasistatic(plan.model).size:
         return False
     return _Ride(journey, stepper).go()
+
+
+def _near_stop(journey: Journey) -> bool:
+    """Tell whether there are so few steps to the next stop that events are better looked for in each of them."""
+    plan, mark = journey.plan, journey.mark
+    return min(journey.stops.next, plan.until) - journey.point.state.t < _FEWEST * mark.size
+
+
+class Begun(NamedTuple):
+    """Where a leg started: what it takes to take its steps again, and what had been counted."""
+
+    point: Any
+    memory: Memory
+    sums: Sums
+    due: float
+    newton: int
+    rejected: int
 
 
 class _Ride:
@@ -69,7 +92,7 @@ class _Ride:
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
-        self.mute = False
+        self.mute, self.wary = False, bool(j.watch.events)
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
@@ -77,7 +100,9 @@ class _Ride:
         well = True
         while well and m.t < self.until - self.tick and time.perf_counter() - began < _SECONDS:
             stop = self.journey.stops.next
-            if stop - m.t <= self.tick:
+            if self.wary:
+                well = stop - m.t > self.tick and self._leg(stop)
+            elif stop - m.t <= self.tick:
                 well = self._renew(stop)
             elif self._lowered(stop):
                 well = self._told(began + _SECONDS)
@@ -96,10 +121,39 @@ class _Ride:
         pacing, count = self._paced(t, stop)
         if not count:
             return False
-        status, done = self.marcher.travel(pacing, count)
+        status, done = self._wary(pacing, count) if self.wary else self.marcher.travel(pacing, count)
         if done:
             self._passed(Leg(self.supply, t, pacing, done), stop)
         return status == DONE and done > 0
+
+    def _wary(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
+        """Take steps up to the first one in which an event may happen; return how it ended, and how many there were."""
+        watch, begun = self.journey.watch, self._begun()
+        status, done = self.marcher.travel(pacing, min(count, watch.span))
+        calm = calm_steps(watch, begun.point, self.marcher.rows[:done], self.supply.u)
+        watch.span = min(_WIDEST, 2 * watch.span) if calm == done else max(_FEWEST, 2 * calm)
+        if calm == done:
+            return status, done
+        self._back(begun)
+        return _EVENT, self.marcher.travel(pacing, calm)[1] if calm else 0
+
+    def _begun(self) -> Begun:
+        m, j = self.marcher.march, self.journey
+        point = self.stepper.leave(self.supply)
+        sums = self.marcher.books(j.books.sums)
+        return Begun(point, self.stepper.memory, sums, m.due, m.newton, m.rejected)
+
+    def _back(self, begun: Begun) -> None:
+        """Go back to where a leg started."""
+        m, books = self.marcher.march, self.journey.books
+        keeping, spacing = bool(m.keeping), m.spacing
+        self.stepper.recall(begun.memory)
+        self.stepper.enter(begun.point)
+        m.newton, m.rejected = begun.newton, begun.rejected
+        self.marcher.open(books.first, begun.sums.moved, books.dissipates)
+        self.marcher.go_on(begun.sums)
+        self.marcher.watch(self.journey.watch.corner_sides, begun.point.state)
+        self.marcher.keep(keeping, begun.due, spacing)
 
     def _lowered(self, stop: float) -> bool:
         """Tell whether the controller can be asked by the loops themselves from here on."""
