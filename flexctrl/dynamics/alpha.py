@@ -20,7 +20,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.spectrum import told_damping
-from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
+from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.flows import flow_rates, flowing, without_flows
 from flexctrl.model.model import Model
@@ -330,6 +330,8 @@ class AdaptiveAlpha:
         [s]
     largest_step : float
         [s]
+    most_steps : float
+        Of a run; one whose steps have become so short that it would take more ends, and says so.
 
     Raises
     ------
@@ -340,11 +342,13 @@ class AdaptiveAlpha:
     rho: float = 0.8
     first_step: float = 1e-4
     largest_step: float = np.inf
+    most_steps: float = field(default=MOST_STEPS, repr=False)
 
     def __post_init__(self) -> None:
         _check_rho(self.rho)
         check_seconds(self.first_step, "first_step", "AdaptiveAlpha")
         check_seconds(self.largest_step, "largest_step", "AdaptiveAlpha", endless=True)
+        check_number(self.most_steps, "most_steps", "AdaptiveAlpha", above=0.0)
 
     @property
     def order(self) -> int:
@@ -360,7 +364,7 @@ class AdaptiveAlpha:
 
     @property
     def pace(self) -> Controlled:
-        return Controlled(self.first_step, self.largest_step, steepness=3)
+        return Controlled(self.first_step, self.largest_step, 3, self.most_steps)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
         newton = min(1e-8, max(1e-3 * tolerance.absolute, _LAST))

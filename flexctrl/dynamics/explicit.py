@@ -18,11 +18,11 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
-from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Pace, Point, StepError, check_step
+from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Pace, Point, StepError, check_step
 from flexctrl.errors import MechanismError, SingularMatrixError
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import check_seconds
+from flexctrl.structure.freedoms import check_number, check_seconds
 
 __all__ = ["ExplicitRungeKutta"]
 
@@ -45,6 +45,8 @@ class ExplicitRungeKutta:
         Where steps are chosen [s].
     largest_step : float
         Where steps are chosen [s].
+    most_steps : float
+        Of a run; one whose steps have become so short that it would take more ends, and says so.
 
     Raises
     ------
@@ -55,12 +57,14 @@ class ExplicitRungeKutta:
     step: float | None = None
     first_step: float = 1e-3
     largest_step: float = np.inf
+    most_steps: float = field(default=MOST_STEPS, repr=False)
 
     def __post_init__(self) -> None:
         if self.step is not None:
             check_step(self.step, "ExplicitRungeKutta")
         check_seconds(self.first_step, "first_step", "ExplicitRungeKutta")
         check_seconds(self.largest_step, "largest_step", "ExplicitRungeKutta", endless=True)
+        check_number(self.most_steps, "most_steps", "ExplicitRungeKutta", above=0.0)
 
     @property
     def order(self) -> int:
@@ -78,7 +82,7 @@ class ExplicitRungeKutta:
     def pace(self) -> Pace:
         if self.step is not None:
             return Fixed(self.step)
-        return Controlled(self.first_step, self.largest_step, _STEEPNESS)
+        return Controlled(self.first_step, self.largest_step, _STEEPNESS, self.most_steps)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
         return _Stepper(model, feed)

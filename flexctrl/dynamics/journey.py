@@ -35,6 +35,7 @@ _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
 _LEAD, _LEAD_MOST = 1e-9, 1e-6
 _NUDGES = 8
 _CHATTER = 20
+_FORESEEN = 20_000
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,7 @@ class Journey:
     _memory: Any = None
     _told: float = 0.0
     _kept: float = 0.0
+    _seen: tuple[int, float] = (0, 0.0)
 
     def travel(self) -> None:
         """Go on to the end, or as far as it goes."""
@@ -166,11 +168,29 @@ class Journey:
 
     def _report(self, now: float) -> None:
         self.plan.tell(self.point.state.t / self.plan.until)
+        self._foresee()
         autosave = self.plan.autosave
         if autosave is not None and now - self._kept > autosave.seconds:
             self._kept = now
             self.rows.recorder.flush()
             (self.saved or self.snapshot()).save(autosave.path)
+
+    def _foresee(self) -> None:
+        """Raise StepError if the run would take more steps than it may, at the pace of the latter half of them."""
+        pace, steps, t = self.plan.method.pace, self.mark.steps, self.point.state.t
+        before, since = self._seen
+        if not isinstance(pace, Controlled) or steps < max(_FORESEEN, 2 * before):
+            return
+        self._seen = steps, t
+        mean = (t - since) / (steps - before)
+        left = (self.plan.until - t) / mean if mean > 0.0 else math.inf
+        if before and steps + left > pace.most:
+            raise StepError(
+                self.stepper.counts.worst,
+                f"steps are {mean:.1e} s long on average at t = {t:.6g} s: {left:.1e} more of them to "
+                f"{self.plan.until:g} s; look for rates beyond what is meant, stiff parts or a contact that chatters, "
+                f"give a larger Tolerance or a shorter run, or allow them with most_steps (now {pace.most:g})",
+            )
 
     def snapshot(self) -> Checkpoint:
         """Return where the run stands."""

@@ -7,6 +7,7 @@ stopping at samples, breaks and events is the run's business, the same for all m
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -19,6 +20,7 @@ from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
 
 __all__ = [
+    "MOST_STEPS",
     "Controlled",
     "Counts",
     "Fixed",
@@ -104,12 +106,18 @@ class Controlled:
         Length of the first and of the largest step [s].
     steepness : int
         Power of the step with which the estimated error grows.
+    most : float
+        Steps that a run may take; one that is seen to need more ends.
     """
 
     first: float
     largest: float
     steepness: int
+    most: float = math.inf
 
+
+MOST_STEPS = 1e8
+"""Hours of steps: what needs more is more likely a mistake than meant."""
 
 Pace = Fixed | Controlled
 P = TypeVar("P", bound=Point)
