@@ -20,11 +20,13 @@ from flexctrl.study.loop import Loop, check_loop
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Crossing", "Margins", "Peak", "loop_grid", "margins", "peak_gain"]
+__all__ = ["Crossing", "Margins", "Peak", "loop_grid", "margins", "peak_gain", "phase_crossings"]
 
 MOST_POINTS = 20_000
 ON_AXIS = 1e-12
 NOISE = 1e-11
+PAST = 30.0
+FAINT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -158,10 +160,8 @@ def margins(loop: Loop) -> Margins:
     """
     omega, L = loop_grid(check_loop(loop, "margins"))
     through_one = _roots(lambda w: np.log(abs(loop.at(w))), omega, np.log(abs(L)))
-    through_axis = _roots(lambda w: np.sin(np.angle(loop.at(w))), omega, np.sin(np.angle(L)))
     gains = tuple(Crossing(w, _wrapped(np.angle(_one(loop, w)) + np.pi)) for w in through_one)
-    phases = tuple(Crossing(w, -1.0 / value.real) for w in through_axis if (value := _one(loop, w)).real < 0)
-    phases += _at_nyquist(loop)
+    phases = phase_crossings(loop, omega, L)
     lags = [Crossing(g.omega, (g.margin % (2 * np.pi)) / g.omega) for g in gains]
     nothing = Crossing(np.inf, np.inf)
     distance = _lowest(lambda w: abs(1 + loop.at(w)), omega, abs(1 + L))
@@ -179,6 +179,24 @@ def margins(loop: Loop) -> Margins:
         phase_crossings=phases,
         loop=loop,
     )
+
+
+def phase_crossings(loop: Loop, omega: np.ndarray, L: np.ndarray) -> tuple[Crossing, ...]:
+    """Where a loop crosses the negative real axis, with the gain factors −1/L.
+
+    Parameters
+    ----------
+    loop : Loop
+    omega, L : numpy.ndarray
+        From :func:`loop_grid`.
+
+    Returns
+    -------
+    tuple of Crossing
+    """
+    through_axis = _roots(lambda w: np.sin(np.angle(loop.at(w))), omega, np.sin(np.angle(L)))
+    phases = tuple(Crossing(w, -1.0 / value.real) for w in through_axis if (value := _one(loop, w)).real < 0)
+    return phases + _at_nyquist(loop)
 
 
 def _at_nyquist(loop: Loop) -> tuple[Crossing, ...]:
@@ -241,8 +259,19 @@ def _wide_span(loop: Loop, low: float, high: float) -> tuple[float, float]:
             high *= 10.0
         if abs(_one(loop, low)) < 10.0 and abs(_one(loop, 0.1 * low)) > 3.0 * abs(_one(loop, low)):
             low *= 0.1
-    high = min(high, nyquist)
+    high = min(_past_poles(loop, low, high), nyquist)
     return min(low, 1e-3 * high), high
+
+
+def _past_poles(loop: Loop, low: float, high: float) -> float:
+    """Stretched to where every pole, a real one too, has turned the phase; not to where nothing is left of L."""
+    last = PAST * float(abs(_continuous(loop.poles, loop.dt)).max(initial=0.0))
+    if last <= high:
+        return high
+    floor = FAINT * min(1.0, float(abs(loop.at(np.geomspace(low, high, 50))).max()))
+    further = np.geomspace(high, last, 4 + int(4.0 * np.log10(last / high)))[1:]
+    heard = np.logical_and.accumulate(abs(loop.at(further)) > floor)
+    return float(further[heard].max(initial=high))
 
 
 def _roots(function: Callable[[np.ndarray], np.ndarray], omega: np.ndarray, values: np.ndarray) -> list[float]:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
 from flexctrl.errors import StructureError
-from flexctrl.study.frequency import NOISE, loop_grid
+from flexctrl.study.frequency import NOISE, Crossing, loop_grid, phase_crossings
 from flexctrl.study.loop import Loop, check_loop
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ TURN = 0.15
 SHORT = 0.01
 CLOSEST = 1e-4
 TREMBLE = 1e-10
+SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,9 @@ def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) ->
 def critical_gains(loop: Loop, locus: RootLocus | None = None) -> tuple[CriticalGain, ...]:
     """Gains at which a branch of the root locus crosses the stability boundary, ascending.
 
-    Bracketed by the branches, bisected on the eigenvalue, and finished on 1 + k L(iω) = 0 itself.
+    Bracketed by the branches, bisected on the eigenvalue, and finished on 1 + k L(iω) = 0 itself; and, whatever the
+    branches show, where L(iω) crosses the negative real axis. Up to the largest gain of the locus; gains chosen
+    by `root_locus` reach beyond every crossing, and beyond 1.
 
     Parameters
     ----------
@@ -189,6 +192,21 @@ def critical_gains(loop: Loop, locus: RootLocus | None = None) -> tuple[Critical
     if locus is not None and not isinstance(locus, RootLocus):
         raise StructureError(f"critical_gains: locus = {locus!r}; expected what root_locus(loop) returns, or nothing")
     locus = root_locus(loop) if locus is None else locus
+    found = _on_branches(loop, locus) + _on_response(loop, float(locus.gains[-1]))
+    apart: list[CriticalGain] = []
+    for c in sorted((c for c in found if _is_crossing(loop, c)), key=lambda c: c.gain):
+        if not any(_same(c, known) for known in apart):
+            apart.append(c)
+    return tuple(apart)
+
+
+def _same(one: CriticalGain, other: CriticalGain) -> bool:
+    near = abs(one.gain - other.gain) <= SAME * one.gain and one.unstable_above == other.unstable_above
+    return near and abs(one.omega - other.omega) <= SAME * max(one.omega, other.omega) + 1e-9
+
+
+def _on_branches(loop: Loop, locus: RootLocus) -> list[CriticalGain]:
+    """Where a branch is inside the boundary at one gain and outside at the next."""
     outside = _depth(locus.loci, loop.dt)
     # poles of an undamped machine run along the boundary and only tremble by their rounding
     outside = np.where(abs(outside) > TREMBLE * abs(locus.loci), outside, 0.0)
@@ -200,8 +218,36 @@ def critical_gains(loop: Loop, locus: RootLocus | None = None) -> tuple[Critical
             gain, pole = _crossing(loop, (locus.gains[i + 1], locus.gains[i + 2]), (here, there))
             omega = abs(np.angle(pole)) / loop.dt if loop.dt else abs(pole.imag)
             found.append(CriticalGain(gain, omega, bool(outside[i + 2, j] > 0)))
-    finished = [_finished(loop, c) for c in found]
-    return tuple(sorted((c for c in finished if _is_crossing(loop, c)), key=lambda c: c.gain))
+    return [_finished(loop, c) for c in found]
+
+
+def _on_response(loop: Loop, most: float) -> list[CriticalGain]:
+    """Where L is −1/k up to a gain; steps between gains, however chosen, hide none of these.
+
+    With s(k) the pole, 1 + k L(s(k)) = 0: ds/dk = 1 / (k² dL/ds), so it leaves where Im L grows with ω.
+    """
+    found = []
+    for crossing in (*phase_crossings(loop, *loop_grid(loop)), *_at_zero(loop)):
+        w, step = crossing.omega, 1e-6 * crossing.omega or 1e-6 * _slowest(loop)
+        if crossing.margin <= most:
+            before, after = loop.at(np.array([w - step, w + step])).imag
+            found.append(CriticalGain(crossing.margin, w, bool(after > before)))
+    return found
+
+
+def _at_zero(loop: Loop) -> tuple[Crossing, ...]:
+    """The crossing of a real pole through s = 0 (z = 1)."""
+    if loop.at_rest(loop.poles).any():
+        return ()
+    value = float(loop.at(np.zeros(1))[0].real)
+    return (Crossing(0.0, -1.0 / value),) if value < 0.0 else ()
+
+
+def _slowest(loop: Loop) -> float:
+    """The smallest rate of the open loop's poles, rest left out."""
+    moving = loop.poles[~loop.at_rest(loop.poles)]
+    rates = abs(np.log(moving[moving != 0])) / loop.dt if loop.dt else abs(moving)
+    return float(rates.min(initial=np.inf))
 
 
 def _checked(gains: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -223,14 +269,16 @@ def _gain_range(loop: Loop) -> np.ndarray:
     What an integrator adds far below the slowest other pole is no peak.
     """
     omega, values = loop_grid(loop)
-    moving = loop.poles[~loop.at_rest(loop.poles)]
-    rates = abs(np.log(moving[moving != 0])) / loop.dt if loop.dt else abs(moving)
-    size = abs(values[omega >= 0.01 * rates.min(initial=np.inf)]) if rates.size else abs(values)
+    slowest = _slowest(loop)
+    size = abs(values[omega >= 0.01 * slowest]) if np.isfinite(slowest) else abs(values)
     size = size[size > 0] if (size > 0).any() else abs(values[abs(values) > 0])
     if not size.size:
         raise StructureError("the loop's response is zero: its input does not reach its output")
     least = 0.01 / size.max()
-    return np.geomspace(least, min(10.0 / np.quantile(size, 0.25), DECADES * least), START)
+    turned = (CriticalGain(p.margin, p.omega, True) for p in (*phase_crossings(loop, omega, values), *_at_zero(loop)))
+    last = [c.gain for c in turned if _is_crossing(loop, c)]
+    most = max(10.0 / np.quantile(size, 0.25), 2.0 * max([1.0, *last]))
+    return np.geomspace(least, min(most, DECADES * least), START)
 
 
 def _followed(poles_at: Callable[[float], np.ndarray], gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

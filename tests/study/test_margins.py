@@ -44,6 +44,21 @@ def test_third_order_loop_in_closed_form():
     assert not margins(open_loop(ct.tf([6 * 1.01], [1, 3, 2, 0]))).stable
 
 
+def test_a_crossing_far_beyond_all_resonances_is_a_margin():
+    """(s + 0.1)/((s + 1)³ (s/100 + 1)) is small where it crosses, beyond the slow poles: python-control agrees."""
+    plant, law = ct.tf([1.0], [1, 3, 3, 1]), ct.tf([1, 0.1], [0.01, 1])
+    found = margins(open_loop(ct.ss(plant), law))
+    np.testing.assert_allclose(found.gain_up.margin, ct.margin(plant * law)[0], rtol=1e-8)
+
+
+@pytest.mark.parametrize("lag", [0.1, 1e-2, 1e-3, 1e-4])
+def test_fast_roll_off_poles_bound_the_gain(lag):
+    """(10 s + 5)/(5 s² (lag s + 1)²): stable below k = 1/lag − 1, by Routh."""
+    loop = open_loop(plant([[5.0]], [[0.0]], [[1.0]], [[1.0]]), ct.tf([10.0, 5.0], [lag**2, 2 * lag, 1]))
+    # 5 lag² s⁴ + 10 lag s³ + 5 s² + 10 k s + 5 k: Routh: (50 lag − 50 lag² k) 10 k = 500 lag² k
+    np.testing.assert_allclose(margins(loop).gain_up.margin, 1 / lag - 1, rtol=1e-9)
+
+
 @pytest.mark.parametrize("gain", [0.05, 0.4])
 def test_small_loops_agree_with_python_control(gain):
     """A crane with drag: few states, where python-control's polynomials still hold."""

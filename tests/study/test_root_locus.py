@@ -156,3 +156,54 @@ def test_an_integrators_pole_at_rest_takes_no_gains_and_crosses_nothing():
     (critical,) = root_locus(loop, np.geomspace(3e-14, 8e12, 50)).critical
     assert critical.omega > 1.0
     assert abs(1 + critical.gain * loop.at(np.array([critical.omega]))[0]) < 1e-9
+
+
+def unstable(loop, gain: float) -> int:
+    """Closed-loop poles beyond the boundary."""
+    poles = loop.closed_poles(gain)
+    return int(np.count_nonzero(abs(poles) > 1 + 1e-9 if loop.dt else poles.real > 1e-9))
+
+
+@pytest.mark.parametrize("gains", [[1, 4, 7, 9, 20], [1, 4, 8, 10, 20], [1, 4, 8.0000000001, 10], [1.0, 8.0]])
+def test_a_gain_of_ones_own_on_the_boundary_hides_no_crossing(gains):
+    """1/(s + 1)³ is critical at k = 8, whether that is among the gains or not."""
+    (found,) = root_locus(open_loop(ct.ss(ct.tf([1.0], [1, 3, 3, 1]))), gains).critical
+    np.testing.assert_allclose([found.gain, found.omega], [8.0, np.sqrt(3)], rtol=1e-9)
+    assert found.unstable_above
+
+
+@pytest.mark.parametrize("gains", [[0.1, 0.5, 0.6, 0.7, 5.0], [0.1, 2 / 3, 5.0], None])
+def test_a_real_pole_through_the_origin_is_found_whatever_the_gains(gains):
+    """(s + 1.5)/((s² − 1)(s/100 + 1)): L(0) = −1.5, and s > 0 leaves as k passes 2/3."""
+    loop = open_loop(ct.ss(ct.tf([1.0], [1, 0, -1])), ct.tf([1, 1.5], [0.01, 1]))
+    first = root_locus(loop, gains).critical[0]
+    np.testing.assert_allclose([first.gain, first.omega], [2 / 3, 0.0], atol=1e-9)
+    assert not first.unstable_above
+
+
+LOOPS = [
+    open_loop(ct.ss(ct.tf([1.0], [1, 3, 3, 1])), ct.tf([1, 0.1], [0.01, 1])),
+    open_loop(ct.ss(ct.tf([1.0], [1, 0.02, 1, 0])), ct.tf([1, 0.1], [0.01, 1])),
+    open_loop(ct.ss(ct.tf([1.0, 0.2, 25], [1, 0.1, 16, 0, 0])), ct.tf([1, 0.1], [0.01, 1])),
+    open_loop(chain(4, beta=0.02), ct.tf([5, 1], [1e-4, 0.02, 1]), "force", "x1"),
+    open_loop(chain(3, beta=0.02), ct.sample_system(ct.tf([5, 1], [0.05, 1]), 0.1, "tustin"), "force", "x1"),
+    open_loop(ct.sample_system(ct.ss(ct.tf([1.0], [1, 0.02, 1])), 0.1), ct.tf([2, -1.8], [1, 0.2], 0.1)),
+]
+
+
+@pytest.mark.parametrize("loop", LOOPS, ids=range(len(LOOPS)))
+def test_critical_gains_are_where_the_number_of_unstable_poles_changes(loop):
+    """Counted from eigenvalues at gains over ten decades: as many changes, at these gains; every one is a margin."""
+    found = critical_gains(loop)
+    edges = np.geomspace(1e-3, 1e7, 400)
+    counts = [unstable(loop, k) for k in edges]
+    changes = [(a, b) for a, b, i, j in zip(edges, edges[1:], counts, counts[1:], strict=False) if i != j]
+    assert changes
+    for a, b in changes:
+        assert any(a * (1 - 1e-6) <= c.gain <= b * (1 + 1e-6) for c in found)
+    for c in found:
+        more = unstable(loop, c.gain * (1 + 1e-4)) - unstable(loop, c.gain * (1 - 1e-4))
+        assert np.sign(more) == (1 if c.unstable_above else -1)
+    factors = [p.margin for p in margins(loop).phase_crossings]
+    for c in found:
+        assert c.omega == 0.0 or min(abs(c.gain / k - 1) for k in factors) < 1e-6
