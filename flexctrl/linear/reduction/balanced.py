@@ -34,8 +34,8 @@ class BalancedTruncation:
     pure integrators, unstable and undamped modes stay untouched (undamped ones that no input moves or no output
     sees are left out), and the stable rest is balanced from Gramian factors (never from squared Gramians, so that
     damping ratios of 1e-6 do no harm). The result is first order. ‖G − G_r‖∞ ≤ 2 Σ σ_i over the Hankel singular
-    values left out, but for rounding: poles p of a first-order form are known to about ε max|p|, which shows at the
-    peak of a pole much slower than that. The ``bound`` contains both.
+    values left out, but for rounding: poles p of a first-order form of n states are known to about √n ε max|p|, which shows
+    at the peak of a pole much slower than that. The ``bound`` contains both.
 
     Models of more than 1000 coordinates are first cut to their lowest modes with static correction; then
     there is no bound, only the measured error.
@@ -118,14 +118,14 @@ def _balanced(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray,
 
 
 def _rounding(full: LinearModel, A: np.ndarray) -> np.ndarray:
-    """What ε max|p| in the place of a pole makes of the response at its peak, channel by channel: |G| |δp|/|Re p|."""
+    """What √n ε max|p| in the place of a pole makes of the response at its peak, channel by channel: |G| |δp|/|Re p|."""
     if not (len(A) and _complete(full)):
         return np.zeros(full.D.shape)
     poles = eigvals(A)
     poles = poles[poles.imag >= 0.0]
     top = float(abs(poles).max())
     peaks = abs(transfer(full, top)(1j * abs(poles)))
-    return np.asarray((peaks * (np.finfo(float).eps * top / abs(poles.real))).max(axis=-1))
+    return np.asarray((peaks * (np.finfo(float).eps * np.sqrt(len(A)) * top / abs(poles.real))).max(axis=-1))
 
 
 def _truncated(stable: Triple, bases: Balanced, room: int, match_dc: bool) -> tuple[Triple, np.ndarray]:
