@@ -16,7 +16,6 @@ from flexctrl.linear.reduction.low_frequency import low_frequency, undamped, uns
 from flexctrl.linear.reduction.modal import modal_model
 from flexctrl.linear.reduction.states import ReducedStates, Triple
 from flexctrl.linear.statespace import FirstOrder, modal_first_order
-from flexctrl.linear.transfer import transfer
 
 __all__ = ["BalancedTruncation", "hankel_singular_values"]
 
@@ -34,8 +33,8 @@ class BalancedTruncation:
     pure integrators, unstable and undamped modes stay untouched (undamped ones that no input moves or no output
     sees are left out), and the stable rest is balanced from Gramian factors (never from squared Gramians, so that
     damping ratios of 1e-6 do no harm). The result is first order. ‖G − G_r‖∞ ≤ 2 Σ σ_i over the Hankel singular
-    values left out, but for rounding: poles p of a first-order form of n states are known to about √n ε max|p|, which shows
-    at the peak of a pole much slower than that. The ``bound`` contains both.
+    values left out, but for rounding: poles p of a first-order form of n states are known to about 2√n ε max|p|,
+    which shows at the peak of a pole much slower than that. The ``bound`` contains both.
 
     Models of more than 1000 coordinates are first cut to their lowest modes with static correction; then
     there is no bound, only the measured error.
@@ -114,18 +113,17 @@ def _balanced(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray,
     """The model split, its stable part balanced, and its rounding: the same for every order that a search tries."""
     exact, stable, feedthrough = _split(full, pool)
     bases = balance(stable.A, stable.B, stable.C, len(stable.A))
-    return exact, stable, feedthrough, bases, _rounding(full, stable.A)
+    return exact, stable, feedthrough, bases, _rounding(full, stable)
 
 
-def _rounding(full: LinearModel, A: np.ndarray) -> np.ndarray:
-    """What √n ε max|p| in the place of a pole makes of the response at its peak, channel by channel: |G| |δp|/|Re p|."""
-    if not (len(A) and _complete(full)):
+def _rounding(full: LinearModel, stable: Triple) -> np.ndarray:
+    """What 2√n ε max|p| in the place of a pole makes of its own share R/(s − p) at its peak: |R| |δp|/|Re p|²."""
+    if not (len(stable.A) and _complete(full)):
         return np.zeros(full.D.shape)
-    poles = eigvals(A)
-    poles = poles[poles.imag >= 0.0]
-    top = float(abs(poles).max())
-    peaks = abs(transfer(full, top)(1j * abs(poles)))
-    return np.asarray((peaks * (np.finfo(float).eps * np.sqrt(len(A)) * top / abs(poles.real))).max(axis=-1))
+    poles, shapes = eig(stable.A)
+    off = 2.0 * np.finfo(float).eps * np.sqrt(len(poles)) * abs(poles).max()
+    share = off * abs(np.linalg.solve(shapes, stable.B)) / (poles.real**2)[:, None]
+    return np.asarray((abs(stable.C @ shapes)[:, :, None] * share).max(axis=1))
 
 
 def _truncated(stable: Triple, bases: Balanced, room: int, match_dc: bool) -> tuple[Triple, np.ndarray]:
