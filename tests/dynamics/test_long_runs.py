@@ -14,6 +14,7 @@ import pytest
 from long_running import CASES, FIXED, Servo, arm, ends, ran
 
 import flexctrl as fc
+from flexctrl.dynamics.march import ride
 
 HERE = Path(__file__).parent
 UNTIL = 0.4
@@ -200,6 +201,20 @@ def test_books_do_not_depend_on_where_a_run_was_stopped(name, tmp_path):
     assert stopped.report.energy == once.report.energy
     assert stopped.report.energy_residual == once.report.energy_residual > 0.0
     assert stopped.report.closure_error == once.report.closure_error
+
+
+@pytest.mark.parametrize("name", ["marched", "sampled", "adaptive", "exact", "exact_sampled"])
+def test_the_clock_on_the_wall_has_no_say(name, tmp_path, monkeypatch):
+    """How long compiled rides go on at a time is its business; where they end, nothing changes."""
+    runs = []
+    for seconds in (1e-9, 3e-4, 10.0):
+        monkeypatch.setattr(ride, "_SECONDS", seconds)
+        runs.append(ran(name, 0.2, tmp_path, f"{seconds:g}"))
+    rows = {(tmp_path / f"{name}_{seconds}.csv").read_bytes() for seconds in ("1e-09", "0.0003", "10")}
+    assert len(rows) == 1
+    for run in runs[1:]:
+        assert all(np.array_equal(value, ends(run)[part]) for part, value in ends(runs[0]).items())
+        assert run.report.energy == runs[0].report.energy
 
 
 def test_a_stream_of_something_else_is_not_gone_on_with(tmp_path):

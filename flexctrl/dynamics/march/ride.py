@@ -96,18 +96,21 @@ class _Ride:
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
-        began, m = time.perf_counter(), self.marcher.march
+        deadline, m = time.perf_counter() + _SECONDS, self.marcher.march
         well = True
-        while well and m.t < self.until - self.tick and time.perf_counter() - began < _SECONDS:
+        while well and m.t < self.until - self.tick:
             stop = self.journey.stops.next
+            if not self.wary and stop - m.t <= self.tick:  # not the clock's business: samples are taken here
+                well = self._renew(stop)
+                continue
+            if self.legs.parts and time.perf_counter() >= deadline:
+                break
             if self.wary:
                 well = stop - m.t > self.tick and self._leg(stop)
-            elif stop - m.t <= self.tick:
-                well = self._renew(stop)
             elif self._lowered(stop):
-                well = self._told(began + _SECONDS)
+                well = self._told(deadline)
             elif self._even(stop):
-                well = self._samples(began + _SECONDS)
+                well = self._samples(deadline)
             else:
                 well = self._leg(stop)
         some = self._end()
@@ -176,7 +179,7 @@ class _Ride:
         paced = self.pace or self._paced(m.t, math.inf)[0]
         pacing = paced if isinstance(paced, Pacing) else None
         status, wanted, done = DONE, _FIRST, 1
-        while status == DONE and done and self._ahead and time.perf_counter() < deadline:
+        while status == DONE and done and self._ahead:
             law.passed, law.legs, law.wanted, law.away = stops.passed, 0, min(wanted, law.room), 0
             if not law.first <= stops.passed < law.first + law.samples:
                 law.first, law.samples = sampling.ahead(stops.passed, self.until)
@@ -187,7 +190,7 @@ class _Ride:
             wanted = max(1, int(wanted * min(_MORE, _SHARE * _SECONDS / took)))
             done = m.done
             self._enter_told(law, sampling, pacing)
-            if mark.left:
+            if mark.left or time.perf_counter() >= deadline:
                 break
         self.mute = status == SILENT
         if m.jumping:
@@ -230,7 +233,7 @@ class _Ride:
         held = Held(self.supply.rate, [])
         t, h, u, x, done, status = clock[0], mark.size, self.supply.u.tolist(), self.supply.x, 0, DONE
         marcher.begin()
-        while time.perf_counter() < deadline:
+        while True:
             stop = (stops.passed + 1) * sample
             count = math.ceil((stop - t) / pace - 1e-6) or 1
             wanted = done + count
@@ -254,6 +257,8 @@ class _Ride:
                 break
             if u != before:
                 marcher.jumps(u)
+            if time.perf_counter() >= deadline:
+                break
         mark.size, self.supply = h, Supply(np.array(u), x, held.rate)
         return self._sampled(held, done, status)
 
