@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -120,6 +120,13 @@ class ModalPoint(Point):
     course: np.ndarray
 
 
+class Slope(NamedTuple):
+    """How what a continuous controller leaves open changes with its commands at the nodes of a step."""
+
+    matrix: np.ndarray
+    h: float
+
+
 @dataclass
 class ExactStepper:
     """Steps of a modal form."""
@@ -130,9 +137,7 @@ class ExactStepper:
     modes: int | None = None
     step_length: float = 0.0
     counts: Counts = field(default_factory=Counts)
-    memory: None = None
-    _slope: np.ndarray | None = None
-    _made_for: float = 0.0
+    memory: Slope | None = None
 
     def __post_init__(self) -> None:
         self.yard = yardsticks(self.model)
@@ -144,9 +149,9 @@ class ExactStepper:
                 self.propagator = Propagator(self.equations.first)
         self.turnover = Turnover(self.model, self.equations)
 
-    def recall(self, memory: None) -> None:
-        """There is nothing to go on from but the point."""
-        return
+    def recall(self, memory: Slope | None) -> None:
+        """Go on with the slope that the commands of another stepper were found with."""
+        self.memory = memory
 
     def nominal(self, h: float) -> float:
         """Return the step asked for, or that between samples, where h is that but for round-off of times."""
@@ -205,9 +210,9 @@ class ExactStepper:
         last = np.inf
         for sweep in range(_SWEEPS):
             gap = self._gap(point, h, found)
-            if self._slope is None or self._made_for != h or (sweep and self._large(gap) > 0.1 * last):
-                self._slope, self._made_for = self._derivative(point, h, found, gap), h
-            found = found - np.linalg.solve(self._slope, gap.ravel()).reshape(found.shape)
+            if self.memory is None or self.memory.h != h or (sweep and self._large(gap) > 0.1 * last):
+                self.memory = Slope(self._derivative(point, h, found, gap), h)
+            found = found - np.linalg.solve(self.memory.matrix, gap.ravel()).reshape(found.shape)
             self.counts.newton += 1
             last = self._large(gap)
             if last <= _SETTLED * max(1.0, float(np.abs(found).max(initial=0.0))):

@@ -68,6 +68,21 @@ class Damper:
         return y[:1]
 
 
+class Leaning:
+    """A controller of the same tip that never stops looking, with a state; not linear in time."""
+
+    inputs, outputs = ("tip",), ("push",)
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(1)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([np.cos(3.0 * t) - 20.0 * (y[0] - x[0])])
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return 5.0 * (y[:1] - x)
+
+
 def small() -> fc.Model:
     """A cantilever that moves little, with a mass on it."""
     section = fc.Section(EA=1e5, EI_y=10.0, EI_z=10.0, GJ=10.0, rhoA=1.0, rhoJ=1e-3)
@@ -94,6 +109,7 @@ CASES = {
     "midpoint": (lambda: arm(), Servo, fc.ConservingMidpoint(SAMPLE), {}),
     "exact": (lambda: small(), None, fc.Exact(SAMPLE), {"push": 0.8}),
     "exact_sampled": (lambda: small(), Damper, fc.Exact(SAMPLE), {}),
+    "exact_continuous": (lambda: small(), Leaning, fc.Exact(10 * SAMPLE), {}),
     "explicit": (lambda: arm(), Servo, fc.ExplicitRungeKutta(SAMPLE), {}),
 }
 

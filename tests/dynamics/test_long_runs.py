@@ -192,7 +192,7 @@ def test_a_run_that_was_stopped_at_its_end_has_one_last_row(tmp_path):
         assert np.array_equal(whole.y, half.y)
 
 
-@pytest.mark.parametrize("name", ["marched", "sampled", "adaptive", "exact", "exact_sampled"])
+@pytest.mark.parametrize("name", ["marched", "sampled", "adaptive", "exact", "exact_sampled", "exact_continuous"])
 def test_books_do_not_depend_on_where_a_run_was_stopped(name, tmp_path):
     once, way = ran(name, 0.4, tmp_path, "once"), None
     for until in (0.0013, 0.0457, 0.0999, 0.3, 0.4):
