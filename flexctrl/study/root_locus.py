@@ -229,7 +229,7 @@ def _on_response(loop: Loop, most: float) -> list[CriticalGain]:
     found = []
     for crossing in (*phase_crossings(loop, *loop_grid(loop)), *_at_zero(loop)):
         w, step = crossing.omega, 1e-6 * crossing.omega or 1e-6 * _slowest(loop)
-        if crossing.margin <= most:
+        if crossing.margin <= most * (1.0 + 1e-9):
             before, after = loop.at(np.array([w - step, w + step])).imag
             found.append(CriticalGain(crossing.margin, w, bool(after > before)))
     return found

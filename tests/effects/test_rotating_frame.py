@@ -87,7 +87,8 @@ def test_the_jacobi_integral_is_kept(effects):
     kinetic, stored, _ = model.energy(start)
     missed = []
     for step in (1e-3, 1.25e-4):
-        run = fc.simulate(model, until=0.2, start=start, method=fc.GeneralizedAlpha(step=step, rho=1.0))
+        method, tight = fc.GeneralizedAlpha(step=step, rho=1.0), fc.Tolerance(absolute=1e-11)
+        run = fc.simulate(model, until=0.2, start=start, method=method, tolerance=tight)
         energies = np.array([model.energy(run.at(t).state) for t in np.linspace(2e-3, 0.2, 100)])
         missed.append(np.abs(energies[:, 0] + energies[:, 1] - kinetic - stored).max() / kinetic)
     assert np.log2(missed[0] / missed[1]) / 3.0 == pytest.approx(2.0, abs=0.1)
