@@ -146,16 +146,25 @@ def assembly(function: Callable[..., int]) -> str:
     Raises
     ------
     KernelError
-        If a function uses what cannot be compiled; says what and where.
+        If a function uses what cannot be compiled, says what and where; if two of them have one name.
     """
-    waiting, parts, libraries = [function], {}, set()
+    known, parts, libraries = {function.__name__: function}, [], set()
+    waiting = [function]
     while waiting:
-        one = waiting.pop()
-        translation = Translation(one)
-        parts[one.__name__] = translation.assembly()
+        translation = Translation(waiting.pop())
+        parts.append(translation.assembly())
         libraries |= translation.libraries
-        waiting += [f for name, f in translation.callees.items() if name not in parts]
-    return "\n".join([*parts.values(), *DECLARATIONS, *sorted(libraries), _ENTRY.format(name=function.__name__)])
+        waiting += [f for f in translation.callees if f.__name__ not in known]
+        for callee in translation.callees:
+            _check_name(known.setdefault(callee.__name__, callee), callee)
+    return "\n".join([*parts, *DECLARATIONS, *sorted(libraries), _ENTRY.format(name=function.__name__)])
+
+
+def _check_name(known: Callable[..., Any], callee: Callable[..., Any]) -> None:
+    """Raise KernelError for two functions of one name: machine code has no modules."""
+    if callee is not known:
+        one, other = (f"{f.__module__}.{f.__name__}" for f in (known, callee))
+        raise KernelError(f"{one} and {other} cannot be compiled together: they have one name; rename one of them")
 
 
 @cache

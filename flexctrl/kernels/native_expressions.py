@@ -35,8 +35,8 @@ class Expressions:
 
     Attributes
     ----------
-    callees : dict
-        The functions it needs.
+    callees : list of callable
+        The functions it needs, each once.
     libraries : set of str
         Declarations of functions of the C library it needs.
     """
@@ -44,7 +44,7 @@ class Expressions:
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
         self.names = function.__globals__
-        self.callees: dict[str, Callable[..., Any]] = {}
+        self.callees: list[Callable[..., Any]] = []
         self.libraries: set[str] = set()
         self.lines: list[str] = []
         self.slots: dict[str, Value] = {}
@@ -258,7 +258,8 @@ class Expressions:
             raise self._fail(f"{callee.__name__} takes {len(parameters)} arguments")
         given = [self._cast(a, kind) for a, (_, kind) in zip(arguments, parameters, strict=True)]
         text = ", ".join(f"{llvm_type(a.type)} {a.text}" for a in given)
-        self.callees[callee.__name__] = callee
+        if callee not in self.callees:
+            self.callees.append(callee)
         call = f"call {llvm_type(result)} @{callee.__name__}({text})"
         if result is not None:
             return self._value(result, call)

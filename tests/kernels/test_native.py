@@ -15,6 +15,7 @@ from flexctrl.errors import KernelError
 from flexctrl.kernels.eights import Eight, eight, larger, largest, lost, put, rounded, total
 from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel
 from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly
+from flexctrl.model.flat.flat import clear as cleared
 
 pytest.importorskip("llvmlite")
 
@@ -237,6 +238,35 @@ def test_what_cannot_be_compiled_is_refused_with_its_line(function, what):
     with pytest.raises(KernelError, match=what) as error:
         assembly(function)
     assert "test_native.py:" in str(error.value)
+
+
+def clear(n: int, x: Reals) -> None:
+    for i in range(n):
+        x[i] = 1.0
+
+
+def with_two_of_a_name(m: Small) -> int:
+    clear(m.n, m.x)
+    cleared(m.n, m.x)
+    return 0
+
+
+def with_one_further_down(m: Small) -> int:
+    clear(m.n, m.x)
+    return passed_on(m)
+
+
+def passed_on(m: Small) -> int:
+    cleared(m.n, m.x)
+    return 0
+
+
+@pytest.mark.parametrize("function", [with_two_of_a_name, with_one_further_down])
+def test_two_functions_of_one_name_are_refused(function):
+    """Machine code has no modules: one would do for both without a word."""
+    with pytest.raises(KernelError, match=r"flexctrl\.model\.flat\.flat\.clear") as error:
+        assembly(function)
+    assert f"{__name__}.clear" in str(error.value)
 
 
 def test_a_bound_function_keeps_its_record_alive():
