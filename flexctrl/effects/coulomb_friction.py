@@ -59,7 +59,8 @@ class CoulombFriction(Effect):
     Parameters
     ----------
     laws : mapping of str to Coulomb or float
-        Place (see `ViscousFriction`) → law; a number is F_k = F_s, in N m of the motor for a drive.
+        Place (see `ViscousFriction`) → law; a number is F_k = F_s, in N m of the motor for a drive. F_s = 0: no
+        friction, as if the place were not named.
 
     Raises
     ------
@@ -88,13 +89,18 @@ class CoulombFriction(Effect):
         """A linear model has no stick."""
         check_large(others, "CoulombFriction")
 
+    @property
+    def acting(self) -> tuple[tuple[str, Coulomb], ...]:
+        """The laws that hold against anything at all."""
+        return tuple((where, law) for where, law in self.laws if law.static)
+
     def inner(self, structure: Structure) -> tuple[Inner, ...]:
         """A phase each."""
-        return (Inner(""),) * len(self.laws)
+        return (Inner(""),) * len(self.acting)
 
     def left_out(self, structure: Structure, beside: Sequence[Effect]) -> tuple[str, ...]:
         """What equilibria and linear models leave out."""
-        places = ", ".join(where for where, law in self.laws if law.static)
+        places = ", ".join(where for where, _ in self.acting)
         note = f"dry friction at {places} acts in simulations only, not in equilibria and linear models"
         return (note,) if places else ()
 

@@ -21,7 +21,7 @@ class MotorLag(Effect):
     Parameters
     ----------
     time_constants : mapping of str to float
-        Drive → T ≥ 0 [s].
+        Drive → T ≥ 0 [s]. Zero: no lag, as if it were not named.
 
     Raises
     ------
@@ -39,6 +39,11 @@ class MotorLag(Effect):
         """Look for every drive."""
         check_drives(structure, tuple(name for name, _ in self.time_constants), "MotorLag")
 
+    @property
+    def acting(self) -> tuple[tuple[str, float], ...]:
+        """The motors whose torque takes any time."""
+        return tuple((name, T) for name, T in self.time_constants if T)
+
     def inner(self, structure: Structure) -> tuple[Inner, ...]:
         """A torque each."""
-        return tuple(Inner(f"{name}_lag") for name, _ in self.time_constants)
+        return tuple(Inner(f"{name}_lag") for name, _ in self.acting)

@@ -154,7 +154,7 @@ def _lagging(s: Structure, effects: tuple[Effect, ...], motion: Motion, drive: i
     """The load on the inner freedom of a motor whose torque builds up."""
     inner, name = motion.inner_base, s.drives[drive].name
     for effect in effects:
-        lagged = [n for n, _ in effect.time_constants] if isinstance(effect, MotorLag) else []
+        lagged = [n for n, _ in effect.acting] if isinstance(effect, MotorLag) else []
         if name in lagged:
             return [(inner + lagged.index(name), lag_compliance(s.drives[drive]))]
         inner += len(effect.inner(s))

@@ -136,10 +136,29 @@ def test_a_rigid_part_is_one_piece_with_no_elastic_force():
     assert kinds["rigid_beam"] < 0.3 * kinds1["beam"]
 
 
-def test_zero_strength_is_absence():
-    """Not only the answer: a damping of zero leaves no instruction behind."""
-    effects = [*BARE, fc.Gravity(), fc.Flexible()]
-    assert counted(machine(), effects) == counted(machine(), [*effects, fc.RayleighDamping(0.0, 0.0)])
-    assert counted(machine(), effects) == counted(machine(), [*effects, fc.Backlash({"motor": 0.0})])
-    assert counted(machine(), effects) == counted(machine(), [*effects, fc.Wind({"load": 0.0}, (10, 0, 0))])
-    assert counted(machine(), effects) == counted(machine(), [*effects, fc.ViscousFriction({"motor": 0.0})])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        fc.Gravity((0.0, 0.0, 0.0)),
+        fc.RayleighDamping(0.0, 0.0),
+        fc.ModalDamping(0.0),
+        fc.ViscousFriction({"motor": 0.0}),
+        fc.CoulombFriction({"motor": 0.0}),
+        fc.MotorLag({"motor": 0.0}),
+        fc.Backlash({"motor": 0.0}),
+        fc.Wind({"load": 0.0}, (10, 0, 0)),
+        fc.Wind({"load": 1.0}, (10, 0, 0), density=0.0),
+        fc.RotatingFrame((0.0, 0.0, 0.0)),
+    ],
+    ids=lambda effect: type(effect).__name__,
+)
+def test_zero_strength_is_absence(effect):
+    """Not only the answer: an effect of no strength leaves no state, entry, instruction or switch behind."""
+    shaft = [*BARE, fc.ShaftElasticity()]
+    bristle = fc.LuGreFriction({"motor": fc.LuGre(1e3, 0.05)})
+    for effects in (BARE, shaft, [*shaft, fc.BeamFlexibility(), fc.RopeStretch(), bristle]):
+        without, with_it = (fc.assemble(machine(), [*effects, *more]) for more in ([], [effect]))
+        assert counted(machine(), [*effects, effect]) == counted(machine(), effects)
+        assert with_it.coordinates == without.coordinates
+        assert with_it.switches.names == without.switches.names == ()
+        assert with_it.kinks.names == without.kinks.names

@@ -47,7 +47,7 @@ def friction_families(structure: Structure, effects: Sequence[Effect]) -> tuple[
         if isinstance(effect, ViscousFriction):
             found += _rubbing(structure, "viscous", [(w, [c]) for w, c in effect.coefficients if c], None)
         elif isinstance(effect, CoulombFriction):
-            found += _rubbing(structure, "dry", [(w, _dry(law)) for w, law in effect.laws], inner)
+            found += _rubbing(structure, "dry", [(w, _dry(law)) for w, law in effect.acting], inner)
         elif isinstance(effect, LuGreFriction):
             found += _rubbing(structure, "lugre", [(w, _lugre(law)) for w, law in effect.laws], inner)
         elif isinstance(effect, MotorLag):
@@ -112,16 +112,16 @@ def pieces(
 
 def _lags(s: Structure, effect: MotorLag, inner: int) -> Family:
     numbers = {d.name: i for i, d in enumerate(s.drives)}
-    slots = [[numbers[name], inner + k] for k, (name, _) in enumerate(effect.time_constants)]
-    parameters = [[T, lag_compliance(s.drives[numbers[name]])] for name, T in effect.time_constants]
-    return pieces(LAG, [name for name, _ in effect.time_constants], [[]] * len(slots), slots, parameters)
+    slots = [[numbers[name], inner + k] for k, (name, _) in enumerate(effect.acting)]
+    parameters = [[T, lag_compliance(s.drives[numbers[name]])] for name, T in effect.acting]
+    return pieces(LAG, [name for name, _ in effect.acting], [[]] * len(slots), slots, parameters)
 
 
 def lag_blocks(structure: Structure, effects: Sequence[Effect], motion: Motion) -> Iterator[tuple[str, Block]]:
     """Yield the stiffness blocks of motors whose torque builds up."""
     place = motion.inner_base
     for effect in effects:
-        for k, (name, _) in enumerate(effect.time_constants if isinstance(effect, MotorLag) else ()):
+        for k, (name, _) in enumerate(effect.acting if isinstance(effect, MotorLag) else ()):
             drive = structure.part(name)
             assert isinstance(drive, Drive)
             yield name, (np.array([place + k]), np.array([[lag_compliance(drive)]]))

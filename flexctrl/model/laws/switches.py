@@ -56,7 +56,7 @@ class Switches:
         structure, effects = self.model.structure, self.model.effects
         at = next((i for i, e in enumerate(effects) if isinstance(e, CoulombFriction)), len(effects))
         first = sum(len(e.inner(structure)) for e in effects[:at])
-        laws = [where for e in effects[at:] if isinstance(e, CoulombFriction) for where, _ in e.laws]
+        laws = [where for e in effects[at:] if isinstance(e, CoulombFriction) for where, _ in e.acting]
         return tuple(laws[int(i) - first] for i in self._slips.order)
 
     @cached_property
