@@ -59,6 +59,7 @@ def test_rows_after_a_rope_went_slack_lie_between_the_steps():
     assert np.abs(run["z"] - fine["z"]).max() <= 1e-4
 
 
+@pytest.mark.slow
 def test_an_interrupted_stream_is_the_file_of_a_run_never_stopped(tmp_path):
     model, method = pendulum(), fc.GeneralizedAlpha(1e-4)
     start = model.rest.with_(v=np.array([2.0]))
