@@ -10,7 +10,7 @@ import numpy as np
 from flexctrl.effects.backlash import gaps_of
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
+from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS
@@ -82,7 +82,6 @@ class Gauges:
     tensions: Runs
 
 
-@seldom
 def read(g: Gauges, z: Reals, y: Reals) -> None:
     """Read all outputs; angles not far from where they were last."""
     for i in range(g.rows):
@@ -111,7 +110,6 @@ def show(g: Gauges, z: Reals, y: Reals) -> None:
         y[at[0]] = g.shown[k]
 
 
-@seldom
 def turned(R: Reals, base: Reals, axis: Reals, about: float) -> float:
     """Return the angle about an axis that is left of a rotation when the tilt of the axis is undone."""
     sine = 0.0
@@ -128,7 +126,6 @@ def turned(R: Reals, base: Reals, axis: Reals, about: float) -> float:
     return angle + _TURN * math.floor((about - angle) / _TURN + 0.5)
 
 
-@seldom
 def across(base: Reals, R: Reals, i: int, j: int) -> float:
     """Return an entry of baseᵀ R."""
     return base[i] * R[j] + base[3 + i] * R[3 + j] + base[6 + i] * R[6 + j]

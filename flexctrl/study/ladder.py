@@ -113,7 +113,8 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     """Return the rungs that a scene has, by name, from the least physics to the most.
 
     Every rung is run as the scene is, but for the linear one, which is integrated exactly, and the refined one: twice
-    the elements, half the steps or an eighth of the tolerance.
+    the elements and half the steps. Where steps are controlled, these follow from an eighth of the tolerance, and none
+    is longer than half a sample of the controller.
 
     Parameters
     ----------
@@ -128,12 +129,14 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     exact = Exact(spacing_of(scene))
     fewest = dict(reversed(found))  # component modes of the lowest order
     named = [(n, replace(s, method=exact) if s.fidelity is Fidelity.LINEAR else s) for n, s in reversed(fewest.items())]
-    return (*named, ("refined", Setting(Fidelity.FULL, _FINER, *_finer(method, tolerance))))
+    return (*named, ("refined", Setting(Fidelity.FULL, _FINER, *_finer(scene, method, tolerance))))
 
 
-def _finer(method: Integrator, tolerance: Tolerance) -> tuple[Integrator, Tolerance]:
+def _finer(scene: Subject, method: Integrator, tolerance: Tolerance) -> tuple[Integrator, Tolerance]:
     if isinstance(method, GeneralizedAlpha):
         return replace(method, step=0.5 * method.step), tolerance
+    if isinstance(method, AdaptiveAlpha) and scene.law is not None and scene.law.sample_time:
+        method = replace(method, largest_step=min(method.largest_step, 0.5 * scene.law.sample_time))
     return method, Tolerance(tolerance.relative / 8.0, tolerance.absolute / 8.0)
 
 

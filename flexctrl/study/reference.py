@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Run, Status, Tolerance
-from flexctrl.dynamics.steps import Fixed
+from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.errors import FlexctrlError
 from flexctrl.study.answers import Curves, outputs_apart
 from flexctrl.study.omissions import Subject
@@ -65,7 +66,9 @@ def finest_of(settings: Sequence[Setting]) -> Setting:
     if steps and len(steps) >= len(controlled):
         return Setting(Fidelity.FULL, mesh, GeneralizedAlpha(0.25 * min(steps)), Tolerance())
     least = min(controlled or [s.tolerance for s in settings], key=lambda t: t.relative)
-    return Setting(Fidelity.FULL, mesh, AdaptiveAlpha(), Tolerance(0.1 * least.relative, 0.1 * least.absolute))
+    largest = min((s.method.largest_step for s in settings if isinstance(s.method, AdaptiveAlpha)), default=math.inf)
+    finest = AdaptiveAlpha(largest_step=0.5 * largest)
+    return Setting(Fidelity.FULL, mesh, finest, Tolerance(0.1 * least.relative, 0.1 * least.absolute))
 
 
 def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> Reference:
@@ -140,7 +143,7 @@ def _shorter(setting: Setting) -> Setting:
     if isinstance(method, GeneralizedAlpha):
         return replace(setting, method=replace(method, step=0.5 * method.step))
     t = setting.tolerance
-    return replace(setting, tolerance=Tolerance(0.1 * t.relative, 0.1 * t.absolute))
+    return replace(setting, method=_held(method, 0.5), tolerance=Tolerance(0.1 * t.relative, 0.1 * t.absolute))
 
 
 def _longer(setting: Setting) -> Setting:
@@ -148,7 +151,12 @@ def _longer(setting: Setting) -> Setting:
     if isinstance(method, GeneralizedAlpha):
         return replace(setting, method=replace(method, step=2.0 * method.step))
     t = setting.tolerance
-    return replace(setting, tolerance=Tolerance(5.0 * t.relative, 5.0 * t.absolute))
+    return replace(setting, method=_held(method, 2.0), tolerance=Tolerance(5.0 * t.relative, 5.0 * t.absolute))
+
+
+def _held(method: Integrator, factor: float) -> Integrator:
+    """A method whose largest step is held to another length."""
+    return replace(method, largest_step=factor * method.largest_step) if isinstance(method, AdaptiveAlpha) else method
 
 
 def _other(setting: Setting, run: Run) -> Setting:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.kernels.native import Reals, Wholes, seldom
+from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.flat import Flat
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.model import Model
@@ -63,7 +63,6 @@ def corners_of(model: Model) -> Corners:
     return Corners(*counts, *places, kinks.dust, sides, np.zeros(3 * kinks.sheaves))
 
 
-@seldom
 def passes(c: Corners, f: Flat) -> bool:
     """Tell whether the step under way passes a corner."""
     for k in range(c.lines + c.turns):
@@ -80,7 +79,6 @@ def passes(c: Corners, f: Flat) -> bool:
     return False
 
 
-@seldom
 def stretch(c: Corners, f: Flat, k: int) -> float:
     """Return how far a line is beyond its corner."""
     start = f.z[c.ends[2 * k] :]
@@ -91,7 +89,6 @@ def stretch(c: Corners, f: Flat, k: int) -> float:
     return math.sqrt(square) - c.lengths[k]
 
 
-@seldom
 def through(c: Corners, f: Flat, k: int) -> bool:
     """Tell whether a line to a sheave may have come through it over the step."""
     a = c.ends[2 * k]
@@ -105,7 +102,6 @@ def through(c: Corners, f: Flat, k: int) -> bool:
     return along < 0.0
 
 
-@seldom
 def turn(c: Corners, f: Flat, k: int) -> float:
     """Return how far a drive is beyond its corner."""
     i = c.drives[k]
@@ -113,7 +109,6 @@ def turn(c: Corners, f: Flat, k: int) -> float:
     return c.sums[3 * k] * f.found[i] + c.sums[3 * k + 1] * own - c.sums[3 * k + 2]
 
 
-@seldom
 def within(c: Corners, k: int, value: float) -> bool:
     """Tell whether a value is on the side it was on."""
     return abs(value) <= c.dust[k] or value * c.sides[k] > 0.0

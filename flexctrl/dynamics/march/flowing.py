@@ -60,7 +60,6 @@ def flows_of(F: Flattened) -> Flows:
     return Flows(inner.size, F.plan.position[inner], F.plan.places(inner, inner), ease, rates, changes, mass)
 
 
-@seldom
 def flow_on(w: Flows, f: Flat, h: float) -> None:
     """Give the motion under way the rates that they have; work out how these change in a small share of a step."""
     t = _SHARE * h
@@ -78,7 +77,6 @@ def flow_on(w: Flows, f: Flat, h: float) -> None:
     place(f)
 
 
-@seldom
 def flow(w: Flows, f: Flat) -> None:
     """Give them the rates that they have where the motion under way is."""
     released(w, f.v)

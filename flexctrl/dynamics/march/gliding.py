@@ -57,7 +57,6 @@ def glide(m: March) -> int:
     return DONE
 
 
-@seldom
 def spin(m: March) -> None:
     """Turn the nodes whose rotations are shown."""
     e = m.leap
@@ -66,7 +65,6 @@ def spin(m: March) -> None:
         about(e.sight[first + 3 * k :], e.upright[9 * k :], m.flat.z[e.spun[k] :])
 
 
-@seldom
 def about(theta: Reals, before: Reals, after: Reals) -> None:
     """Turn a rotation by a rotation vector (Rodrigues)."""
     square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
@@ -84,7 +82,6 @@ def about(theta: Reals, before: Reals, after: Reals) -> None:
         after[6 + j] = z + once * (theta[0] * y - theta[1] * x) + twice * (theta[2] * along - square * z)
 
 
-@seldom
 def sees_corner(m: March) -> bool:
     """Tell whether the step passes a corner of a line's law of force."""
     c = m.corners
@@ -107,7 +104,6 @@ def back(m: March) -> None:
     e.lost = 0.0
 
 
-@seldom
 def way(m: March, j: int) -> float:
     """Return the way of an input: what its work is done along."""
     f = m.flat
@@ -175,7 +171,6 @@ def lost_apart(m: March) -> float:
     return found
 
 
-@seldom
 def lost(m: March) -> float:
     """Return the energy dissipated over the step that is about to be taken.
 
@@ -259,7 +254,6 @@ def land(m: March) -> None:
     e.aloft = 0
 
 
-@seldom
 def level(m: March) -> None:
     """Bring degrees of freedom to where the modal state is; not by a step: to the bit the same always."""
     e = m.leap

@@ -93,7 +93,6 @@ def made_again(m: March) -> int:
     return refactored(m)
 
 
-@seldom
 def sampled(m: March) -> int:
     """Go from sample to sample of the law as long as there is room, and as it says numbers."""
     law = m.law
@@ -148,7 +147,6 @@ def set_out(m: March, law: Law) -> bool:
     return True
 
 
-@seldom
 def hurried(m: March) -> int:
     """Let the inputs jump if they are to, then take steps of controlled error."""
     if m.jumping == 1:
@@ -159,7 +157,6 @@ def hurried(m: March) -> int:
     return controlled(m)
 
 
-@seldom
 def fixed(m: March) -> int:
     """Take steps of one length until all wanted are done or no state can be kept; or one needs a tangent or fails.
 
@@ -206,7 +203,6 @@ def glided(m: March) -> int:
     return DONE
 
 
-@seldom
 def controlled(m: March) -> int:
     """Take steps of controlled error until all wanted are done, the stop is reached or the end would be passed."""
     again = False
@@ -246,7 +242,6 @@ def controlled(m: March) -> int:
     return DONE
 
 
-@seldom
 def fitted(h: float, left: float) -> float:
     """Return a step that ends at the stop or leaves room for another."""
     if h > 0.99 * left:
@@ -254,7 +249,6 @@ def fitted(h: float, left: float) -> float:
     return 0.5 * left if h > 0.5 * left else h
 
 
-@seldom
 def growth(error: float) -> float:
     """Return by what a step may be longer for an error of 1: it grows with the cube."""
     return math.pow(max(error, 1e-9), -1.0 / 3.0)
@@ -334,7 +328,6 @@ def follow(m: March) -> None:
         m.farthest[m.part[i]] = max(m.farthest[m.part[i]], way + 1.0 - max(way, 1.0))
 
 
-@seldom
 def tighten(m: March, rough: float, steady: float, pull: float) -> None:
     """Choose Newton's tolerance for the next step.
 
@@ -348,7 +341,6 @@ def tighten(m: March, rough: float, steady: float, pull: float) -> None:
     m.tolerance = min(max(floor, m.share * error * min(1.0, rough)), m.loosest)
 
 
-@seldom
 def lean(m: March, shared: float, square: float) -> None:
     """Choose the share of the last change of accelerations that the next one is expected to be."""
     m.lean = min(1.0, max(-1.0, shared / square)) if square > 0.0 else 1.0
@@ -401,7 +393,6 @@ def draw(m: March) -> None:
     m.turnover = max(m.turnover, max(turned, swung))
 
 
-@seldom
 def note(m: March) -> None:
     """Write down outputs and, where it is wanted, the state."""
     f = m.flat
@@ -453,7 +444,6 @@ def settle(m: March) -> int:
     return DONE
 
 
-@seldom
 def jump(m: March) -> int:
     """Let the accelerations follow a jump of the inputs: solve for them with the mass, kept as tangents are.
 
@@ -502,7 +492,6 @@ def run_on(m: March) -> None:
         m.power = f.books[2]
 
 
-@seldom
 def spent(m: March) -> bool:
     """Tell whether the mass was believed in as long as it may, and making it takes less than looking at it again."""
     return m.asking == 0 and m.probes.groups == 0 and m.believed >= _TRUSTED

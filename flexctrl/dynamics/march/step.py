@@ -28,7 +28,6 @@ _ROUND_OFF = 1e-13
 """Corrections below this that do not shrink any more are round-off."""
 
 
-@seldom
 def step(m: March) -> int:
     """Solve a step, once more with tangents made anew if need be; after `refactored` it goes on where it was."""
     while True:
@@ -68,7 +67,6 @@ def blended(m: March, rate: Eight, before: Eight, own: Eight) -> Eight:
     return ((1.0 - m.alpha_f) * rate + m.alpha_f * before - m.alpha_m * own) * (1.0 / (1.0 - m.alpha_m))
 
 
-@seldom
 def newton(m: March) -> int:
     """Iterate until the step is solved."""
     f = m.flat
@@ -119,19 +117,16 @@ def foremost(m: March) -> int:
     return 0
 
 
-@seldom
 def to_v(m: March) -> float:
     """Return what an increment of the step adds to the rates at its end."""
     return m.gamma / (m.h * m.beta)
 
 
-@seldom
 def to_rate(m: March) -> float:
     """Return what an increment of the step adds to the accelerations at its end."""
     return (1.0 - m.alpha_m) / (m.h * m.h * m.beta * (1.0 - m.alpha_f))
 
 
-@seldom
 def reckon(m: March) -> None:
     """Enter the iterations of a step in the account of the tangent."""
     m.served += 1
@@ -139,7 +134,6 @@ def reckon(m: March) -> None:
     m.lately = m.iteration + 1.0
 
 
-@seldom
 def stale(m: March) -> bool:
     """Tell whether the tangent is of another step length or of another shape, or no longer worth keeping.
 
@@ -169,7 +163,6 @@ def refactored(m: March) -> int:
     return DONE
 
 
-@seldom
 def converged(m: March, size: float) -> bool:
     """Tell whether a correction of this size was the last that is needed.
 

@@ -183,7 +183,6 @@ def clear(n: int, x: Reals) -> None:
         x[i] = 0.0
 
 
-@seldom
 def wind(f: Flat) -> None:
     """Find the driven coordinates, with the whole turns that bring them next to what the step makes of them."""
     clear(f.drives, f.found)
@@ -250,7 +249,6 @@ def push(f: Flat) -> None:
         f.linkage[3](f.z, f.z)
 
 
-@seldom
 def pull(f: Flat) -> None:
     """Sum up the forces of the inputs alone."""
     press(f)
@@ -286,7 +284,6 @@ def tangent(f: Flat, on_place: float, on_rate: float, on_acceleration: float, en
         f.tangents[k](f.z, entries)
 
 
-@seldom
 def energy(f: Flat) -> None:
     """Work out the energies and the dissipated power of the slots."""
     clear(3, f.books)
