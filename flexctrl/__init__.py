@@ -6,6 +6,7 @@ simulation; see ``docs/`` and ``README.md``. Names are loaded when they are firs
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import importlib.util
 from typing import Any
@@ -135,7 +136,9 @@ def __getattr__(name: str) -> Any:
         return value
     if not name.startswith("_") and importlib.util.find_spec(f"flexctrl.{name}"):
         return importlib.import_module(f"flexctrl.{name}")
-    raise AttributeError(f"module 'flexctrl' has no attribute {name!r}")
+    close = difflib.get_close_matches(name, __all__, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    raise AttributeError(f"module 'flexctrl' has no attribute {name!r}{hint}")
 
 
 def __dir__() -> list[str]:

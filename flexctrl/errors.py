@@ -20,7 +20,10 @@ __all__ = [
     "SingularMatrixError",
     "StructureError",
     "did_you_mean",
+    "shortened",
 ]
+
+_MOST_NAMES = 20
 
 
 class FlexctrlError(Exception):
@@ -99,7 +102,7 @@ class MissingExtraError(FlexctrlError, ImportError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean 'x'?"`` for the closest known name, or the list of known ones.
+    """Return ``"; did you mean 'x'?"`` for the closest known name, or a list of known ones.
 
     Parameters
     ----------
@@ -114,7 +117,26 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
         A phrase to append to an error message; empty if nothing is known.
     """
     names = [str(k) for k in known]
-    close = difflib.get_close_matches(str(name), names, n=1)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; known: {', '.join(names)}" if names else ""
+    word, lowered = str(name).lower(), {k.lower(): k for k in reversed(names)}
+    close = difflib.get_close_matches(word, lowered, n=1)
+    within = [k for k in lowered if word in k]
+    if close or len(within) == 1:
+        return f"; did you mean {lowered[(close or within)[0]]!r}?"
+    more = f" … ({len(names)} in all)" if len(names) > _MOST_NAMES else ""
+    return f"; known: {', '.join(names[:_MOST_NAMES])}{more}" if names else ""
+
+
+def shortened(value: object) -> str:
+    """Return how a value is written, cut off where that grows long, to be shown in an error message.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+        At most 80 characters, on one line.
+    """
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}…"

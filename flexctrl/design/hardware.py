@@ -336,6 +336,7 @@ def _rounded(values: np.ndarray, places: np.ndarray, sizes: np.ndarray) -> np.nd
 
 
 def _bounds(limits: Limits, names: Sequence[str], what: str) -> tuple[np.ndarray, np.ndarray]:
+    check_names(limits, names, what)
     pairs = {name: _pair(value) for name, value in limits.items()}
     low = by_name({name: pair[0] for name, pair in pairs.items()}, names, -np.inf, what)
     high = by_name({name: pair[1] for name, pair in pairs.items()}, names, np.inf, what)

@@ -12,7 +12,7 @@ import numpy as np
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.piecewise import distinct
 from flexctrl.design.shaping import check_grid
-from flexctrl.design.wrapping import Stateless, Wrapper, breaks_of, check_names, discretised
+from flexctrl.design.wrapping import Stateless, Wrapper, breaks_of, check_mapping, check_names, discretised
 from flexctrl.errors import ControllerError
 
 __all__ = ["Commanded", "FeedForward", "OpenLoop", "Together", "Tracking"]
@@ -152,7 +152,7 @@ class OpenLoop(Stateless):
     sample_time: float = 0.0
 
     def __post_init__(self) -> None:
-        _indexed(self.commands, self.outputs, "OpenLoop")
+        _check_functions(self.commands, "OpenLoop")
 
     @cached_property
     def _signals(self) -> tuple[Signal, ...]:
@@ -304,12 +304,17 @@ class Together:
 
 def _indexed(signals: Mapping[str, Signal], names: tuple[str, ...], what: str) -> Pairs:
     check_names(signals, names, what)
+    _check_functions(signals, what)
+    return tuple((names.index(name), signal) for name, signal in signals.items())
+
+
+def _check_functions(signals: Mapping[str, Signal], what: str) -> None:
+    check_mapping(signals, what)
     for name, signal in signals.items():
         if not callable(signal):
             raise ControllerError(
                 f"{what}: {name!r} is given {signal!r}, no function of time; use Constant({signal!r})"
             )
-    return tuple((names.index(name), signal) for name, signal in signals.items())
 
 
 def _merged(*parts: object) -> tuple[float, ...]:

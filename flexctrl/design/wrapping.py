@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
-from flexctrl.errors import ControllerError, did_you_mean
+from flexctrl.errors import ControllerError, did_you_mean, shortened
 
 __all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised"]
 
@@ -201,8 +201,15 @@ def by_name(values: Mapping[str, float], names: Sequence[str], default: float, w
     return array
 
 
-def check_names(given: Iterable[str], names: Sequence[str], what: str) -> None:
-    """Raise a `ControllerError` for the first name that is not a signal of the controller."""
+def check_names(given: Mapping[str, object], names: Sequence[str], what: str) -> None:
+    """Raise a `ControllerError` for what is no mapping, and for the first name that is no signal of the controller."""
+    check_mapping(given, what)
     for name in given:
         if name not in names:
             raise ControllerError(f"{what}: the controller has no signal {name!r}{did_you_mean(name, names)}")
+
+
+def check_mapping(given: Mapping[str, object], what: str) -> None:
+    """Raise a `ControllerError` for what does not go by names of signals."""
+    if not isinstance(given, Mapping):
+        raise ControllerError(f"{what}: {shortened(given)}; expected values by name of signal, {{'name': …}}")

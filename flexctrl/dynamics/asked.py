@@ -10,7 +10,7 @@ from flexctrl.dynamics.events import Event
 from flexctrl.dynamics.record import Record
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Integrator
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
@@ -50,7 +50,7 @@ def check_arguments(given: Mapping[str, object]) -> None:
         if value is None or (type(value), name) in _known:
             continue
         if isinstance(value, type) or not isinstance(value, kinds):
-            raise StructureError(f"simulate: {name} = {_short(value)}; expected {expected}")
+            raise StructureError(f"simulate: {name} = {shortened(value)}; expected {expected}")
         _known.add((type(value), name))
 
 
@@ -98,10 +98,5 @@ def events_of(given: Sequence[Event]) -> tuple[Event, ...]:
     found = listed(given, "simulate: events")
     for event in found:
         if not isinstance(event, Event):
-            raise StructureError(f"simulate: events holds {_short(event)}; expected Event('name', 'signal', at=…)")
+            raise StructureError(f"simulate: events holds {shortened(event)}; expected Event('name', 'signal', at=…)")
     return tuple(found)
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}…"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
-from flexctrl.errors import ControllerError, StructureError, did_you_mean
+from flexctrl.errors import ControllerError, StructureError, did_you_mean, shortened
 from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _checked_state(given: object, count: int) -> np.ndarray:
     state = numbers(given)
     if len(state) != count or not np.isfinite(state).all():
         raise StructureError(
-            f"sampled_response: initial_state = {given!r}; expected {count} finite numbers, one for each state"
+            f"sampled_response: initial_state = {shortened(given)}; expected {count} finite numbers, one for each state"
         )
     return np.array(state)
 

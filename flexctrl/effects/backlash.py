@@ -38,7 +38,7 @@ class Backlash(Effect):
     apart: ClassVar[bool] = True
 
     def __init__(self, gaps: Mapping[str, float]) -> None:
-        object.__setattr__(self, "gaps", by_place(gaps, "Backlash", not_negative))
+        object.__setattr__(self, "gaps", by_place(gaps, "Backlash", "gap", not_negative))
 
     def check_on(self, structure: Structure) -> None:
         """Look for every drive and spring."""

@@ -78,7 +78,7 @@ class CoulombFriction(Effect):
     laws: tuple[tuple[str, Coulomb], ...]
 
     def __init__(self, laws: Mapping[str, Coulomb | float]) -> None:
-        object.__setattr__(self, "laws", by_place(laws, "CoulombFriction", _law))
+        object.__setattr__(self, "laws", by_place(laws, "CoulombFriction", "friction", _law))
 
     def check_on(self, structure: Structure) -> None:
         """Look for every place."""
@@ -105,7 +105,7 @@ class CoulombFriction(Effect):
         return (note,) if places else ()
 
 
-def _law(value: object, owner: str) -> Coulomb:
+def _law(value: object, what: str, owner: str) -> Coulomb:
     if isinstance(value, Coulomb):
         return value
-    return Coulomb(check_finite(value, "friction", owner, least=0.0))  # type: ignore[arg-type]
+    return Coulomb(check_finite(value, what, owner, least=0.0))  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from flexctrl.effects.effect import Effect, Inner
 from flexctrl.effects.places import by_place, check_large, check_static, identifier
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, shortened
 from flexctrl.structure.contacts import contact_of
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
@@ -88,7 +88,7 @@ class LuGreFriction(Effect):
     laws: tuple[tuple[str, LuGre], ...]
 
     def __init__(self, laws: Mapping[str, LuGre]) -> None:
-        object.__setattr__(self, "laws", by_place(laws, "LuGreFriction", _law))
+        object.__setattr__(self, "laws", by_place(laws, "LuGreFriction", "law", _law))
 
     def check_on(self, structure: Structure) -> None:
         """Look for every place."""
@@ -110,7 +110,7 @@ class LuGreFriction(Effect):
         return (note,) if places else ()
 
 
-def _law(value: object, owner: str) -> LuGre:
+def _law(value: object, what: str, owner: str) -> LuGre:
     if not isinstance(value, LuGre):
-        raise StructureError(f"{owner}: {value!r} is no LuGre law; give flexctrl.LuGre(…)")
+        raise StructureError(f"{owner}: {what} = {shortened(value)}; expected a flexctrl.LuGre(…)")
     return value

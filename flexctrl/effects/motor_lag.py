@@ -33,7 +33,7 @@ class MotorLag(Effect):
     time_constants: tuple[tuple[str, float], ...]
 
     def __init__(self, time_constants: Mapping[str, float]) -> None:
-        object.__setattr__(self, "time_constants", by_place(time_constants, "MotorLag", not_negative))
+        object.__setattr__(self, "time_constants", by_place(time_constants, "MotorLag", "time constant", not_negative))
 
     def check_on(self, structure: Structure) -> None:
         """Look for every drive."""

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
@@ -17,7 +17,9 @@ __all__ = ["by_place", "check_drives", "check_large", "check_static", "identifie
 T = TypeVar("T")
 
 
-def by_place(given: Mapping[str, object], owner: str, read: Callable[[object, str], T]) -> tuple[tuple[str, T], ...]:
+def by_place(
+    given: Mapping[str, object], owner: str, what: str, read: Callable[[object, str, str], T]
+) -> tuple[tuple[str, T], ...]:
     """Return (place, value) pairs of a mapping.
 
     Parameters
@@ -25,21 +27,23 @@ def by_place(given: Mapping[str, object], owner: str, read: Callable[[object, st
     given : mapping of str to object
     owner : str
         The effect, for messages.
+    what : str
+        What the values are, for messages.
     read : callable
-        (value, owner) → value, checked.
+        (value, what it is, owner) → value, checked.
 
     Returns
     -------
     tuple of (str, value)
     """
     if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
-        raise StructureError(f"{owner}: {given!r}; expected a mapping of names to values, {{'name': …}}")
-    return tuple((name, read(value, f"{owner}: {name!r}")) for name, value in given.items())
+        raise StructureError(f"{owner}: {shortened(given)}; expected a mapping of names to values, {{'name': …}}")
+    return tuple((name, read(value, f"{what} of {name!r}", owner)) for name, value in given.items())
 
 
-def not_negative(value: object, owner: str) -> float:
+def not_negative(value: object, what: str, owner: str) -> float:
     """Return a number ≥ 0."""
-    return check_finite(value, "value", owner, least=0.0)  # type: ignore[arg-type]
+    return check_finite(value, what, owner, least=0.0)  # type: ignore[arg-type]
 
 
 def check_static(static: float, kinetic: float, owner: str) -> None:

@@ -41,7 +41,7 @@ class ViscousFriction(Effect):
     coefficients: tuple[tuple[str, float], ...]
 
     def __init__(self, coefficients: Mapping[str, float]) -> None:
-        object.__setattr__(self, "coefficients", by_place(coefficients, "ViscousFriction", not_negative))
+        object.__setattr__(self, "coefficients", by_place(coefficients, "ViscousFriction", "coefficient", not_negative))
 
     def check_on(self, structure: Structure) -> None:
         """Look for every place."""

@@ -63,7 +63,7 @@ class Wind(Effect):
     def __init__(
         self, areas: Mapping[str, float], speed: Sequence[float] = (0.0, 0.0, 0.0), density: float = 1.25
     ) -> None:
-        object.__setattr__(self, "areas", by_place(areas, "Wind", not_negative))
+        object.__setattr__(self, "areas", by_place(areas, "Wind", "area", not_negative))
         object.__setattr__(self, "speed", parse_point(speed, "Wind: speed"))
         object.__setattr__(self, "density", check_finite(density, "density", "Wind", least=0.0))
 

@@ -407,6 +407,8 @@ def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, 
 
 
 def _indices(wanted: Sequence[str], known: tuple[str, ...], kind: str) -> list[int]:
+    if isinstance(wanted, str):
+        raise StructureError(f"{kind}s = {wanted!r}; expected a list, [{wanted!r}]")
     for name in wanted:
         if name not in known:
             raise StructureError(f"{kind} {name!r} is not a signal of this model{did_you_mean(name, known)}")

@@ -15,7 +15,7 @@ from flexctrl.effects.flexibility import Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.rope_mass import RopeMass
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equations import Small
 from flexctrl.model.equilibrium import equilibrium
@@ -55,7 +55,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
         For something that is no effect, an effect given twice, or effects that make no sense together.
     """
     if not isinstance(structure, Structure):
-        raise StructureError(f"assemble: {structure!r} is no Structure")
+        raise StructureError(f"assemble: {shortened(structure)} is no Structure; give Structure(elements=…, joints=…)")
     parts = _flat(effects)
     for effect in parts:
         effect.check_beside(parts)

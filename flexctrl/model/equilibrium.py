@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.errors import EquilibriumError, StructureError
+from flexctrl.errors import EquilibriumError, StructureError, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
@@ -130,7 +130,7 @@ def equilibrium(
         For an unknown coordinate or input, or something that is no model.
     """
     if not isinstance(model, Model):
-        raise StructureError(f"equilibrium: {model!r} is no Model; give what flexctrl.assemble returns")
+        raise StructureError(f"equilibrium: {shortened(model)} is no Model; give what flexctrl.assemble returns")
     held = {model.coordinate(name): float(value) for name, value in (hold or {}).items()}
     if start is not None:
         check_state(model, start, "equilibrium: start")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import LinearizationError, MechanismError, StructureError
+from flexctrl.errors import LinearizationError, MechanismError, StructureError, shortened
 from flexctrl.linear.model import LinearModel, Place
 from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
@@ -55,9 +55,9 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
         If none was given and none is found.
     """
     if not isinstance(model, Model):
-        raise StructureError(f"linearize: {model!r} is no Model; give what flexctrl.assemble returns")
+        raise StructureError(f"linearize: {shortened(model)} is no Model; give what flexctrl.assemble returns")
     if at is not None and not isinstance(at, Rest | State):
-        raise LinearizationError(f"linearize: at = {at!r}; expected a Rest (from equilibrium) or a State")
+        raise LinearizationError(f"linearize: at = {shortened(at)}; expected a Rest (from equilibrium) or a State")
     if not model.n:
         raise LinearizationError(
             "linearize: the machine has no degrees of freedom, so there is nothing to linearise: its supports hold all "

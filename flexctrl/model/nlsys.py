@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
+from flexctrl.errors import MechanismError, SingularMatrixError, StructureError, shortened
 from flexctrl.model.audit import Freedom, audit
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.linkages.chart import Chart
@@ -142,7 +142,7 @@ def equations_of(model: Model, at: Rest | State | None = None) -> Equations:
         With ``states``, ``rate(t, x, u)``, ``output(t, x, u)`` and ``state(x)``, the machine's `State`.
     """
     if at is not None and not isinstance(at, Rest | State):
-        raise StructureError(f"to_nlsys: at = {at!r}; expected a Rest (from equilibrium) or a State")
+        raise StructureError(f"to_nlsys: at = {shortened(at)}; expected a Rest (from equilibrium) or a State")
     reference = model.rest if at is None else at.state if isinstance(at, Rest) else at
     held = {model.coordinate(name) for name in at.held} if isinstance(at, Rest) else set()
     chart = chart_of(model, reference)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from flexctrl.errors import FlexctrlError, SceneError, did_you_mean
+from flexctrl.errors import FlexctrlError, SceneError, did_you_mean, shortened
 
 T = TypeVar("T")
 
@@ -39,7 +39,7 @@ class Place:
 
     def expected(self, what: str, got: object) -> SceneError:
         """Return the error for a value that is not what was expected."""
-        return SceneError(f"{self} = {_shown(got)}; expected {what}")
+        return SceneError(f"{self} = {shortened(got)}; expected {what}")
 
     def refuse(self, problem: str) -> SceneError:
         """Return the error for a table or key that cannot be used."""
@@ -47,11 +47,6 @@ class Place:
 
 
 Reader = Callable[[Any, Place], Any]
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}…"
 
 
 def number(value: Any, place: Place) -> float:

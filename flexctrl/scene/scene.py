@@ -19,7 +19,7 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import Flexible
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.errors import SceneError, StructureError, did_you_mean
+from flexctrl.errors import SceneError, StructureError, did_you_mean, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
@@ -80,7 +80,7 @@ class Simulation:
             ("rigid_twin", self.rigid_twin, bool, "True or False"),
         ):
             if isinstance(value, type) or not isinstance(value, kinds):
-                raise SceneError(f"simulation: {name} = {value!r}; expected {expected}")
+                raise SceneError(f"simulation: {name} = {shortened(value)}; expected {expected}")
 
 
 @dataclass(frozen=True)

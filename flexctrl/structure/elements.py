@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.structure.freedoms import (
     ALL,
     HUGE,
@@ -53,7 +53,9 @@ class Node:
 def check_node(node: Node, owner: str) -> Node:
     """Return ``node`` if it is one."""
     if not isinstance(node, Node):
-        raise StructureError(f"{owner}: {node!r} is no node; give e.g. beam.start, beam.node(2) or body.point('hook')")
+        raise StructureError(
+            f"{owner}: {shortened(node)} is no node; give e.g. beam.start, beam.node(2) or body.point('hook')"
+        )
     return node
 
 
@@ -108,7 +110,7 @@ class Beam:
     ) -> None:
         owner = f"Beam {check_name(name, 'Beam')!r}"
         if not isinstance(section, Section):
-            raise StructureError(f"{owner}: section = {section!r}; expected a flexctrl.Section")
+            raise StructureError(f"{owner}: section = {shortened(section)}; expected a flexctrl.Section")
         count = check_whole(elements, "elements", owner, least=1, most=10**6)
         a, b = _position(start, owner), _position(end, owner)
         check_length(a, b, owner)
@@ -403,7 +405,9 @@ class RigidBody:
         object.__setattr__(self, "mass", check_finite(mass, "mass", owner, least=0.0))
         object.__setattr__(self, "inertia", _check_inertia(inertia, owner))
         if not isinstance(points, Mapping | None):
-            raise StructureError(f"{owner}: points = {points!r}; expected a mapping of names to places (x, y, z)")
+            raise StructureError(
+                f"{owner}: points = {shortened(points)}; expected a mapping of names to places (x, y, z)"
+            )
         named = {check_name(k, f"{owner}, point"): parse_point(p, owner) for k, p in (points or {}).items()}
         object.__setattr__(self, "points", named)
 
@@ -444,7 +448,9 @@ def _check_inertia(inertia: object, owner: str) -> tuple[Vector, Vector, Vector]
     full = np.array(rows) if [len(row) for row in rows] == [3, 3, 3] else np.full((3, 3), np.nan)
     tensor = np.diag(flat) if len(flat) == 3 and np.isfinite(flat).all() else full
     if not np.abs(tensor - tensor.T).max() <= 1e-9 * np.abs(tensor).max() < HUGE:
-        raise StructureError(f"{owner}: inertia = {inertia!r}; expected 3 moments or a symmetric 3 × 3 tensor [kg m²]")
+        raise StructureError(
+            f"{owner}: inertia = {shortened(inertia)}; expected 3 moments or a symmetric 3 × 3 tensor [kg m²]"
+        )
     moments = np.linalg.eigvalsh(tensor)
     if moments[0] < -1e-9 * abs(moments[2]) or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise StructureError(

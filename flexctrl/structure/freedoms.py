@@ -6,12 +6,13 @@ import math
 import os
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from numbers import Integral, Real
 from typing import TypeAlias
 
 import numpy as np
 
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -23,6 +24,7 @@ IDENTIFIERS = ("u", "v", "w", "rx", "ry", "rz")
 
 _INDEX = {name: i for i, name in enumerate(FREEDOMS)} | {name: i for i, name in enumerate(IDENTIFIERS)}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_AXIS_HINT = "; u v w are displacements along x y z, rx ry rz rotations about them"
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 HUGE = 1e50
@@ -43,7 +45,8 @@ def parse_freedoms(text: str | Iterable[str], owner: str) -> frozenset[int]:
     unknown = [w for w in words if not isinstance(w, str) or w not in _INDEX]
     if unknown:
         known = (*FREEDOMS, *IDENTIFIERS[3:], "all")
-        raise StructureError(f"{owner}: no freedom {unknown[0]!r}{did_you_mean(unknown[0], known)}")
+        hint = _AXIS_HINT if unknown[0] in list(_AXES) else did_you_mean(unknown[0], known)
+        raise StructureError(f"{owner}: no freedom {unknown[0]!r}{hint}")
     if not words:
         raise StructureError(f"{owner}: names no freedom; give some of {' '.join(FREEDOMS)} or 'all'")
     return frozenset(_INDEX[w] for w in words)
@@ -68,7 +71,7 @@ def parse_point(point: Sequence[float], owner: str) -> Vector:
     """Read three finite numbers."""
     values = numbers(point)
     if len(values) != 3 or not all(abs(p) < HUGE for p in values):
-        raise StructureError(f"{owner}: expected three finite numbers (x, y, z), got {point!r}")
+        raise StructureError(f"{owner}: expected three finite numbers (x, y, z), got {shortened(point)}")
     return (values[0], values[1], values[2])
 
 
@@ -91,10 +94,10 @@ def check_signal(name: str, kind: str) -> str:
 
 def listed(items: Iterable, owner: str) -> list:
     """Return the items of a list."""
-    try:
-        return list(items)
-    except TypeError:
-        raise StructureError(f"{owner} = {items!r}; expected a list") from None
+    if not isinstance(items, str):
+        with suppress(TypeError):
+            return list(items)
+    raise StructureError(f"{owner} = {shortened(items)}; expected a list")
 
 
 def numbers(values: object) -> tuple[float, ...]:
@@ -118,7 +121,7 @@ def check_number(value: float, what: str, owner: str, *, least: float = -math.in
     number = _number(value)
     if math.isnan(number) or number < least or number <= above:
         bound = f" > {above:g}" if above > -math.inf else f" ≥ {least:g}" if least > -math.inf else ""
-        raise StructureError(f"{owner}: {what} = {value!r}; expected a number{bound}")
+        raise StructureError(f"{owner}: {what} = {shortened(value)}; expected a number{bound}")
     return number
 
 
@@ -126,7 +129,7 @@ def check_finite(value: float, what: str, owner: str, *, least: float = -math.in
     """Return ``value`` as a finite float within the bounds."""
     number = check_number(value, what, owner, least=least, above=above)
     if abs(number) >= HUGE:
-        raise StructureError(f"{owner}: {what} = {value!r}; expected a finite number below {HUGE:g}")
+        raise StructureError(f"{owner}: {what} = {shortened(value)}; expected a finite number below {HUGE:g}")
     return number
 
 
@@ -134,7 +137,7 @@ def check_seconds(value: float, what: str, owner: str, *, endless: bool = False)
     """Return ``value`` as a float if it is a time above zero, which may be infinite if ``endless``."""
     seconds = _number(value)
     if not seconds > 0.0 or (math.isinf(seconds) and not endless):
-        raise StructureError(f"{owner}: {what} = {value!r}; expected seconds > 0")
+        raise StructureError(f"{owner}: {what} = {shortened(value)}; expected seconds > 0")
     return seconds
 
 
@@ -147,5 +150,5 @@ def check_path(path: str | os.PathLike[str], owner: str) -> None:
 def check_whole(value: int, what: str, owner: str, *, least: int, most: int = 2**31) -> int:
     """Return ``value`` as an int if it is a whole number from ``least`` to ``most``."""
     if isinstance(value, bool) or not isinstance(value, Integral) or not least <= value <= most:
-        raise StructureError(f"{owner}: {what} = {value!r}; expected a whole number from {least} to {most}")
+        raise StructureError(f"{owner}: {what} = {shortened(value)}; expected a whole number from {least} to {most}")
     return int(value)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, shortened
 from flexctrl.structure.freedoms import check_finite, check_number
 
 
@@ -177,7 +177,8 @@ class Section:
         """
         radius = check_finite(radius, "radius", "Section.tube", above=0.0)
         thickness = check_finite(thickness, "thickness", "Section.tube", above=0.0)
-        inner = check_finite(radius - thickness, "radius - thickness", "Section.tube", least=0.0)
+        _check_wall(thickness, "thickness", radius, "the radius", "Section.tube")
+        inner = radius - thickness
         second = math.pi * (radius**4 - inner**4) / 4.0
         return _from_moments(material, math.pi * (radius**2 - inner**2), second, second, 2.0 * second)
 
@@ -224,13 +225,19 @@ class Section:
         height = check_finite(height, "height", "Section.box", above=0.0)
         web = check_finite(web, "web", "Section.box", above=0.0)
         flange = check_finite(flange, "flange", "Section.box", above=0.0)
-        b = check_finite(width - 2 * web, "width - 2 web", "Section.box", least=0.0)
-        h = check_finite(height - 2 * flange, "height - 2 flange", "Section.box", least=0.0)
+        _check_wall(web, "web", 0.5 * width, "half the width", "Section.box")
+        _check_wall(flange, "flange", 0.5 * height, "half the height", "Section.box")
+        b, h = width - 2 * web, height - 2 * flange
         around_y = (width * height**3 - b * h**3) / 12.0
         around_z = (height * width**3 - h * b**3) / 12.0
         mid_b, mid_h = width - web, height - flange
         torsion = 4.0 * (mid_b * mid_h) ** 2 / (2.0 * mid_b / flange + 2.0 * mid_h / web)
         return _from_moments(material, width * height - b * h, around_y, around_z, torsion)
+
+
+def _check_wall(wall: float, name: str, room: float, side: str, owner: str) -> None:
+    if wall > room:
+        raise StructureError(f"{owner}: {name} = {wall:g} m; expected at most {side}, {room:g} m")
 
 
 def _checked_law(stiffness: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
@@ -239,7 +246,9 @@ def _checked_law(stiffness: Sequence[Sequence[float]] | np.ndarray) -> np.ndarra
     except (TypeError, ValueError):
         C = np.zeros(0)
     if C.shape != (6, 6) or not np.isfinite(C).all():
-        raise StructureError(f"Section.coupled: stiffness = {stiffness!r}; expected six rows of six finite numbers")
+        raise StructureError(
+            f"Section.coupled: stiffness = {shortened(stiffness)}; expected six rows of six finite numbers"
+        )
     size = np.sqrt(np.abs(np.diag(C)))
     scaled = C / np.where(size > 0.0, np.outer(size, size), 1.0)
     if np.abs(scaled - scaled.T).max() > 1e-9:
@@ -251,7 +260,7 @@ def _checked_law(stiffness: Sequence[Sequence[float]] | np.ndarray) -> np.ndarra
 
 def _from_moments(m: Material, area: float, I_y: float, I_z: float, J: float) -> Section:
     if not isinstance(m, Material):
-        raise StructureError(f"Section: material = {m!r}; expected a flexctrl.Material, e.g. flexctrl.STEEL")
+        raise StructureError(f"Section: material = {shortened(m)}; expected a flexctrl.Material, e.g. flexctrl.STEEL")
     return Section(
         EA=m.E * area,
         EI_y=m.E * I_y,

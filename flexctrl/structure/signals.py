@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, shortened
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Node, Rope, Spring, check_node
 from flexctrl.structure.freedoms import ROTATIONS, Vector, check_signal, parse_direction
@@ -33,7 +33,7 @@ def _nodes(at: Node | Sequence[Node], owner: str, rotations: bool) -> tuple[Node
 def _name_of(part: object, kinds: tuple[type, ...], owner: str) -> str:
     if not isinstance(part, (str, *kinds)):
         names = " or ".join(k.__name__ for k in kinds)
-        raise StructureError(f"{owner} = {part!r}; expected a {names}, or the name of one")
+        raise StructureError(f"{owner} = {shortened(part)}; expected a {names}, or the name of one")
     return part if isinstance(part, str) else part.name  # type: ignore[attr-defined]
 
 

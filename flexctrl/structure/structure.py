@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.structure.drives import Drive, RotaryDrive, Winch
 from flexctrl.structure.elements import Node, Part, RigidBody, Rope, Spring, check_node
 from flexctrl.structure.freedoms import FREEDOMS, TRAVEL, check_name, listed, parse_direction
@@ -151,7 +151,7 @@ class Structure:
         ):
             known = {n.part for n in self.nodes}
             hint = "; take the node from the part of that name that the structure has"
-            hint = hint if node.part in known else did_you_mean(node.part, known)
+            hint = hint if node.part in known else f"; add {node.part} to its elements"
             raise StructureError(f"{node} at {node.position} is not in structure {self.name!r}{hint}")
         return place
 
@@ -248,7 +248,7 @@ def planar(structure: Structure, normal: str = "z") -> Structure:
         If ``normal`` is no axis, or the joints are given as a table.
     """
     if not isinstance(structure, Structure):
-        raise StructureError(f"planar: {structure!r} is no Structure")
+        raise StructureError(f"planar: {shortened(structure)} is no Structure")
     direction = parse_direction(normal, "planar")
     axis = main_axis(direction)
     if abs(direction[axis]) < 1.0 - 1e-12:
@@ -267,8 +267,15 @@ def _typed(items: Iterable, kinds: object, what: str) -> tuple:
     for item in found:
         if not isinstance(item, allowed):
             names = ", ".join(k.__name__ for k in allowed)
-            raise StructureError(f"Structure: {item!r} among {what}; expected one of {names}")
+            raise StructureError(f"Structure: {shortened(item)} among {what}; expected one of {names}{_belongs(item)}")
     return found
+
+
+def _belongs(item: object) -> str:
+    """Where what stands in a wrong list belongs."""
+    lists = {"elements": Part, "joints": Joint, "drives": Drive, "inputs": Input, "outputs": Output}
+    right = [what for what, kinds in lists.items() if isinstance(item, kinds)]
+    return f"; put a {type(item).__name__} among {right[0]}" if right else ""
 
 
 def _check_names(s: Structure) -> None:

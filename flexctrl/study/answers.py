@@ -14,7 +14,7 @@ from flexctrl.errors import ControllerError, FlexctrlError
 from flexctrl.study.broken_loop import broken_loop, linear_law
 from flexctrl.study.frequency import margins
 from flexctrl.study.gain_family import gain_family
-from flexctrl.study.omissions import Subject
+from flexctrl.study.subject import Subject
 
 __all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
 

@@ -13,11 +13,12 @@ import numpy as np
 from flexctrl.dynamics.alpha import Integrator
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.simulate import simulate
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, shortened
 from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
+from flexctrl.structure.freedoms import check_seconds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -303,8 +304,11 @@ def compare(
     """
     first, second = _halves(progress)
     if not isinstance(subject, Model):
+        if isinstance(subject, type) or not hasattr(subject, "twin"):
+            raise StructureError(f"compare: {shortened(subject)} is neither a Scene nor a Model (from assemble)")
         flexible = subject.run(subject.model, first)
         return Comparison.between(flexible, _unless_stopped(flexible, lambda: subject.run(subject.twin, second)))
+    check_seconds(until, "until", "compare")
     twin = rigid(subject)
     assert isinstance(twin, Model)
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from flexctrl.dynamics.exact import Exact
-from flexctrl.study.omissions import Subject
 from flexctrl.study.settings import spacing_of
+from flexctrl.study.subject import Subject
 
 __all__ = ["exactly", "fewer_modes"]
 

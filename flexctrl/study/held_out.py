@@ -11,7 +11,7 @@ import numpy as np
 from flexctrl.design.piecewise import Trajectory
 from flexctrl.design.tracking import Commanded, OpenLoop, Together, Tracking
 from flexctrl.design.wrapping import Wrapper, breaks_of
-from flexctrl.study.omissions import Subject
+from flexctrl.study.subject import Subject
 
 __all__ = ["load_cases"]
 

@@ -15,9 +15,9 @@ from flexctrl.dynamics.exact import Exact
 from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import FlexctrlError, StructureError
-from flexctrl.study.omissions import Subject
 from flexctrl.study.reference import Reference, certified, error_of, finished
 from flexctrl.study.settings import Fidelity, Setting, spacing_of, sweep
+from flexctrl.study.subject import Subject, prepared
 from flexctrl.study.tryouts import calibration
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ __all__ = ["Ladder", "Rung", "ladder", "rungs"]
 
 _REPEATS = 3
 _FINER = 2
-_STEPS = 1000
 
 
 @dataclass(frozen=True)
@@ -173,12 +172,7 @@ def ladder(
     FlexctrlError
         If the reference cannot be certified; see `work_precision`.
     """
-    if not tolerance > 0.0:
-        raise StructureError(f"ladder: tolerance = {tolerance}; expected a relative error > 0, e.g. 0.01")
-    if scene.simulation is None:
-        raise StructureError(f"ladder: scene {scene.name!r} has no simulation; give at least until = … (seconds)")
-    every = scene.simulation.every or scene.simulation.until / _STEPS
-    base = scene.with_(controller=scene.law, simulation=replace(scene.simulation, every=every, rigid_twin=False))
+    base = prepared(scene, tolerance, "ladder")
     chosen, tell = tuple(rungs) or _rungs(base), progress or (lambda done: None)
     reference = certified(base, [setting for _, setting in chosen], tolerance)
     tried = [_Tried(name, setting, setting.of(base)) for name, setting in chosen]

@@ -14,7 +14,8 @@ from flexctrl.dynamics.run import Run, Status
 from flexctrl.errors import FlexctrlError, StructureError, did_you_mean
 from flexctrl.study.answers import Answer, Change, answer_of, change_between
 from flexctrl.study.exactly import exactly, fewer_modes
-from flexctrl.study.omissions import Omission, Subject, omissions
+from flexctrl.study.omissions import Omission, omissions
+from flexctrl.study.subject import Subject, prepared
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -230,18 +231,8 @@ def ledger(
     FlexctrlError
         If the full scene itself cannot be run.
     """
-    if not tolerance > 0.0:
-        raise StructureError(f"ledger: tolerance = {tolerance}; expected a relative change > 0, e.g. 0.01")
-    return _Auditor(_prepared(scene), tolerance, margin_tolerance, progress or (lambda done: None)).drawn_up()
-
-
-def _prepared(scene: Subject) -> Subject:
-    """The scene with its controller built once, and outputs at even instants."""
-    simulation = scene.simulation
-    if simulation is None:
-        raise StructureError(f"ledger: scene {scene.name!r} has no simulation; give at least until = … (seconds)")
-    every = simulation.every or simulation.until / 1000
-    return scene.with_(controller=scene.law, simulation=replace(simulation, every=every, rigid_twin=False))
+    scene = prepared(scene, tolerance, "ledger")
+    return _Auditor(scene, tolerance, margin_tolerance, progress or (lambda done: None)).drawn_up()
 
 
 @dataclass

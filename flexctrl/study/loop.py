@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import eigvals, matrix_balance
 
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction import Reduced, ReducedModel, ReducedStates
 from flexctrl.linear.reduction.states import states_transfer
@@ -191,7 +191,9 @@ class Loop:
 def check_loop(loop: Loop, owner: str) -> Loop:
     """Return a loop as it is; refuse what is none, with the remedy."""
     if not isinstance(loop, Loop):
-        raise StructureError(f"{owner}: {loop!r} is no loop; give what flexctrl.open_loop or broken_loop returns")
+        raise StructureError(
+            f"{owner}: {shortened(loop)} is no loop; give what flexctrl.open_loop or broken_loop returns"
+        )
     return loop
 
 
@@ -274,7 +276,7 @@ class _Path:
         if not isinstance(controller, control.LTI):
             if not isinstance(controller, int | float | np.number) or not np.isfinite(controller):
                 raise StructureError(
-                    f"open_loop: controller = {controller!r}; expected a transfer function or state space of "
+                    f"open_loop: controller = {shortened(controller)}; expected a transfer function or state space of "
                     "python-control, or a finite number (1.0 for the plant alone)"
                 )
             gain = np.array([[float(controller)]])

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from flexctrl.design.controller import Controller
 from flexctrl.design.hardware import Sampled
 from flexctrl.design.wrapping import Wrapper
-from flexctrl.dynamics.run import Run
 from flexctrl.effects.damping import RayleighDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import ControllerError, StructureError
-from flexctrl.linear.model import LinearModel
-from flexctrl.model.model import Model
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, Part, Rope, Spring
 from flexctrl.structure.structure import Structure
+from flexctrl.study.subject import Subject
 
-__all__ = ["Omission", "Subject", "omissions"]
+__all__ = ["Omission", "omissions"]
 
 _STIFF = 1e3
 _RIGIDITIES = {"stretch": ("EA",), "torsion": ("GJ",), "bending": ("EI_y", "EI_z")}
@@ -36,50 +34,7 @@ _DASHPOTS: dict[str, tuple[type, ...]] = {
     "spring_damping": (Spring,),
 }
 
-S = TypeVar("S", bound="Subject")
 P = TypeVar("P", bound=Part | Drive)
-
-
-class Subject(Protocol):
-    """What a ledger is drawn up for: a `Scene`."""
-
-    @property
-    def structure(self) -> Structure: ...
-
-    @property
-    def effects(self) -> tuple[Effect, ...]: ...
-
-    @property
-    def law(self) -> Controller | None: ...
-
-    @property
-    def model(self) -> Model: ...
-
-    @property
-    def linear(self) -> LinearModel: ...
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def simulation(self) -> Any: ...
-
-    @property
-    def loads(self) -> Mapping[str, Any]: ...
-
-    def run(self, model: Model | None = None, progress: Callable[[float], None] | None = None) -> Run:
-        """Simulate."""
-
-    def with_(
-        self: S,
-        *,
-        structure: Structure | None = ...,
-        effects: Sequence[Effect] | None = ...,
-        controller: Any = ...,
-        loads: Mapping[str, Any] | None = ...,
-        simulation: Any = ...,
-    ) -> S:
-        """Return a copy with some fields replaced."""
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.errors import FlexctrlError
 from flexctrl.study.answers import Curves, outputs_apart
-from flexctrl.study.omissions import Subject
 from flexctrl.study.settings import Fidelity, Setting
+from flexctrl.study.subject import Subject
 
 __all__ = ["Reference", "certified", "error_of", "finest_of", "finished", "refined_by", "trusted"]
 

@@ -20,7 +20,7 @@ from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Beam, Part
 from flexctrl.structure.refine import coarsen, refine
 from flexctrl.structure.structure import Structure
-from flexctrl.study.omissions import Subject
+from flexctrl.study.subject import Subject
 
 __all__ = ["Fidelity", "Setting", "sweep"]
 

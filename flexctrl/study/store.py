@@ -12,9 +12,9 @@ import numpy as np
 
 from flexctrl.dynamics.checkpoint import machine_of
 from flexctrl.study.answers import Curves
-from flexctrl.study.omissions import Subject
 from flexctrl.study.reference import Reference, refined_by
 from flexctrl.study.settings import Setting
+from flexctrl.study.subject import Subject
 
 __all__ = ["Point", "Store", "fingerprint"]
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from flexctrl.errors import FlexctrlError, StructureError
 from flexctrl.study.answers import Curves
-from flexctrl.study.omissions import Subject
 from flexctrl.study.reference import error_of, finished
 from flexctrl.study.settings import Setting
 from flexctrl.study.store import Point
+from flexctrl.study.subject import Subject
 
 __all__ = ["calibration", "errors", "time_of", "workers_of"]
 

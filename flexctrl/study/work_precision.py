@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.run import Run
-from flexctrl.errors import StructureError
 from flexctrl.study.held_out import load_cases
-from flexctrl.study.omissions import Subject
 from flexctrl.study.reference import Reference, certified, error_of, finest_of, finished, trusted
 from flexctrl.study.settings import Setting, sweep
 from flexctrl.study.store import Point, Store, fingerprint, timed
+from flexctrl.study.subject import Subject, prepared
 from flexctrl.study.tryouts import errors, time_of, workers_of
 
 if TYPE_CHECKING:
@@ -133,15 +132,7 @@ def work_precision(
     FlexctrlError
         If the reference cannot be run, or the reference runs do not agree within a third of the tolerance.
     """
-    if not tolerance > 0.0:
-        raise StructureError(f"work_precision: tolerance = {tolerance}; expected a relative error > 0, e.g. 0.01")
-    if scene.simulation is None:
-        raise StructureError(
-            f"work_precision: scene {scene.name!r} has no simulation; give at least until = … (seconds)"
-        )
-    every = scene.simulation.every or scene.simulation.until / 1000
-    simulation = replace(scene.simulation, every=every, rigid_twin=False)
-    base = scene.with_(controller=scene.law, simulation=simulation)
+    base = prepared(scene, tolerance, "work_precision")
     tried = tuple(settings) or sweep(base)
     kept = Store(store, fingerprint(base))
     return _Study(base, tolerance, tried, kept, workers_of(workers), progress or (lambda done: None)).made()

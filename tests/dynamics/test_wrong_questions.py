@@ -37,7 +37,7 @@ def model() -> fc.Model:
         ({"tolerance": 1e-4}, "tolerance = 0.0001; expected a Tolerance, as Tolerance(relative=1e-5)"),
         ({"events": fc.Event("top", "swing")}, "expected a list: events=[Event(…)]"),
         ({"events": 3}, "events = 3; expected a list"),
-        ({"events": "a"}, "events holds 'a'; expected Event("),
+        ({"events": "a"}, "events = 'a'; expected a list"),
         ({"record": "x.csv"}, "record = 'x.csv'; expected InMemory() or CsvStream('run.csv')"),
         ({"autosave": "x"}, "autosave = 'x'; expected an Autosave, as Autosave('run.checkpoint')"),
         ({"progress": 1}, "progress = 1; expected a function"),

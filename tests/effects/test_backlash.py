@@ -209,7 +209,7 @@ def test_the_rigid_twin_has_no_play_and_says_so():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: fc.Backlash({"drive": -0.1}), "Backlash: 'drive': value = -0.1"),
+        (lambda: fc.Backlash({"drive": -0.1}), "Backlash: gap of 'drive' = -0.1"),
         (lambda: fc.Backlash(0.1), "expected a mapping"),
         (lambda: fc.assemble(geared(), [LARGE, fc.Backlash({"driv": 0.1})]), "no drive or spring 'driv'.*drive"),
         (lambda: fc.assemble(geared(), [fc.Backlash({"drive": 0.1})]), "Backlash: is not linear"),

@@ -227,7 +227,7 @@ def test_modal_damping_gives_each_mode_its_ratio(ratios):
         (lambda: fc.RayleighDamping.through(0.1, 0.0, 2.0), "RayleighDamping.through: omega1 = 0.0"),
         (lambda: fc.RayleighDamping.through(-0.1, 1.0, 2.0), "RayleighDamping.through: zeta = -0.1"),
         (lambda: fc.ModalDamping([]), "no ratios given"),
-        (lambda: fc.ModalDamping("0.1"), "ModalDamping: ratio = '0'"),
+        (lambda: fc.ModalDamping("0.1"), "ModalDamping: ratios = '0.1'; expected a list"),
         (lambda: fc.ModalDamping([0.1, -0.1]), "ModalDamping: ratio = -0.1"),
         (lambda: fc.ModalDamping(None), "ModalDamping: ratio = None"),
     ],

@@ -363,13 +363,16 @@ def test_the_rigid_twin_rubs_as_the_machine_does():
     ("make", "message"),
     [
         (lambda: fc.ViscousFriction(0.3), "expected a mapping of names to values"),
-        (lambda: fc.ViscousFriction({"motor": -1.0}), "ViscousFriction: 'motor': value = -1.0; expected a number ≥ 0"),
+        (
+            lambda: fc.ViscousFriction({"motor": -1.0}),
+            "ViscousFriction: coefficient of 'motor' = -1.0; expected a number ≥ 0",
+        ),
         (lambda: fc.Coulomb(3.0, static=2.0), "static = 2 below kinetic = 3"),
         (lambda: fc.Coulomb(-1.0), "kinetic = -1.0"),
-        (lambda: fc.CoulombFriction({"motor": "much"}), "CoulombFriction: 'motor': friction = 'much'"),
+        (lambda: fc.CoulombFriction({"motor": "much"}), "CoulombFriction: friction of 'motor' = 'much'"),
         (lambda: fc.LuGre(0.0, 1.0), "LuGre: stiffness = 0.0"),
         (lambda: fc.LuGre(1.0, 2.0, static=1.0), "static = 1 below kinetic = 2"),
-        (lambda: fc.LuGreFriction({"motor": 2.0}), "2.0 is no LuGre law"),
+        (lambda: fc.LuGreFriction({"motor": 2.0}), "LuGreFriction: law of 'motor' = 2.0; expected a flexctrl.LuGre"),
     ],
 )
 def test_impossible_friction_is_refused(make, message):

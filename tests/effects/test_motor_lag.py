@@ -115,7 +115,7 @@ def test_a_machine_at_rest_under_a_torque_has_it_built_up():
 @pytest.mark.parametrize(
     ("lag", "message"),
     [
-        (lambda: fc.MotorLag({"motor": -0.1}), "MotorLag: 'motor': value = -0.1"),
+        (lambda: fc.MotorLag({"motor": -0.1}), "MotorLag: time constant of 'motor' = -0.1"),
         (lambda: fc.MotorLag(0.1), "expected a mapping"),
         (lambda: fc.assemble(arm(), [fc.MotorLag({"moter": 0.1})]), "MotorLag: there is no drive 'moter'.*motor"),
     ],

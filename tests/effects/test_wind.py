@@ -104,7 +104,7 @@ def test_the_wind_frame_is_the_machines():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: fc.Wind({"load": -1.0}), "Wind: 'load': value = -1"),
+        (lambda: fc.Wind({"load": -1.0}), "Wind: area of 'load' = -1"),
         (lambda: fc.Wind({"load": 1.0}, speed=(1.0, 2.0)), "Wind: speed: expected three finite numbers"),
         (lambda: fc.assemble(load(), [fc.Wind({"laod": 1.0})]), "Wind: .*no element 'laod'.*load"),
     ],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flexctrl.errors import ReductionError
+from flexctrl.errors import ReductionError, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.balanced import BalancedTruncation, hankel_singular_values
 from flexctrl.linear.reduction.craig_bampton import CraigBampton
@@ -73,5 +73,7 @@ def reduce(
             )
         return smallest(linear.condense(), to, using)
     if isinstance(to, type) or not hasattr(to, "apply"):
-        raise ReductionError(f"reduce: {to!r} is no method; expected e.g. ModalTruncation(8) or RelativeError(0.01)")
+        raise ReductionError(
+            f"reduce: {shortened(to)} is no method; expected e.g. ModalTruncation(8) or RelativeError(0.01)"
+        )
     return to.apply(linear.condense())

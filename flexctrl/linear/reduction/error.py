@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from flexctrl.errors import ReductionError, StructureError
+from flexctrl.errors import ReductionError, StructureError, shortened
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import COMPLETE, Modes
@@ -195,7 +195,9 @@ def _attempt(full: LinearModel, using: Callable[[int], Method], order: int) -> R
     try:
         method = using(order)
         if isinstance(method, type) or not hasattr(method, "apply"):
-            raise StructureError(f"reduce: using({order}) gave {method!r}, no method; expected e.g. ModalTruncation(8)")
+            raise StructureError(
+                f"reduce: using({order}) gave {shortened(method)}, no method; expected e.g. ModalTruncation(8)"
+            )
         return method.apply(full)
     except ReductionError:
         if order >= 2 * len(full.coordinates):

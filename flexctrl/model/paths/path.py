@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
@@ -194,7 +194,7 @@ def equilibrium_path(
         For an unknown name, or a load of nothing.
     """
     if not isinstance(model, Model):
-        raise StructureError(f"equilibrium_path: {model!r} is no Model; give what flexctrl.assemble returns")
+        raise StructureError(f"equilibrium_path: {shortened(model)} is no Model; give what flexctrl.assemble returns")
     pushed = model.input_vector(load)
     if not pushed.any():
         raise StructureError("equilibrium_path: the load is nothing; name an input, e.g. load={'push': 1.0}")

@@ -1,0 +1,94 @@
+"""What the studies of cost and accuracy are made of: a scene that can be run, changed, and run again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol, TypeVar
+
+from flexctrl.design.controller import Controller
+from flexctrl.dynamics.run import Run
+from flexctrl.effects.effect import Effect
+from flexctrl.errors import StructureError, shortened
+from flexctrl.linear.model import LinearModel
+from flexctrl.model.model import Model
+from flexctrl.structure.freedoms import check_number
+from flexctrl.structure.structure import Structure
+
+__all__ = ["Subject", "prepared"]
+
+_ROWS = 1000
+
+S = TypeVar("S", bound="Subject")
+
+
+class Subject(Protocol):
+    """What is studied: a `Scene`."""
+
+    @property
+    def structure(self) -> Structure: ...
+
+    @property
+    def effects(self) -> tuple[Effect, ...]: ...
+
+    @property
+    def law(self) -> Controller | None: ...
+
+    @property
+    def model(self) -> Model: ...
+
+    @property
+    def linear(self) -> LinearModel: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def simulation(self) -> Any: ...
+
+    @property
+    def loads(self) -> Mapping[str, Any]: ...
+
+    def run(self, model: Model | None = None, progress: Callable[[float], None] | None = None) -> Run:
+        """Simulate."""
+
+    def with_(
+        self: S,
+        *,
+        structure: Structure | None = ...,
+        effects: Sequence[Effect] | None = ...,
+        controller: Any = ...,
+        loads: Mapping[str, Any] | None = ...,
+        simulation: Any = ...,
+    ) -> S:
+        """Return a copy with some fields replaced."""
+
+
+def prepared(scene: Subject, tolerance: float, study: str) -> Subject:
+    """Return a scene with its controller built once, outputs at even instants, and no twin beside it.
+
+    Parameters
+    ----------
+    scene : Scene
+    tolerance : float
+        Largest relative change or error that the study is asked for.
+    study : str
+        Who asks, for the message.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    StructureError
+        For a tolerance that is not positive, what is no scene, or a scene without a simulation.
+    """
+    check_number(tolerance, "tolerance (relative, as 0.01)", study, above=0.0)
+    if isinstance(scene, type) or not hasattr(scene, "simulation"):
+        raise StructureError(f"{study}: {shortened(scene)} is no Scene; give flexctrl.Scene(…) or load_scene('….toml')")
+    plan = scene.simulation
+    if plan is None:
+        raise StructureError(f"{study}: scene {scene.name!r} has no simulation; give at least until = … (seconds)")
+    every = plan.every or plan.until / _ROWS
+    return scene.with_(controller=scene.law, simulation=replace(plan, every=every, rigid_twin=False))

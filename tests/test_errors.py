@@ -1,0 +1,49 @@
+"""What error messages are made of."""
+
+from __future__ import annotations
+
+import pytest
+
+import flexctrl as fc
+from flexctrl.errors import FlexctrlError, did_you_mean, shortened
+
+NODES = [f"arm_{i}_u" for i in range(30)]
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "phrase"),
+    [
+        ("torqe", ["torque", "push"], "; did you mean 'torque'?"),
+        ("Kp", ["kp", "ki", "kd", "measured"], "; did you mean 'kp'?"),
+        ("motor", ["arm_0_rz", "motor_source"], "; did you mean 'motor_source'?"),
+        ("q", ["u", "v"], "; known: u, v"),
+        ("load", [], ""),
+        ("load", NODES, f"; known: {', '.join(NODES[:20])} … (30 in all)"),
+    ],
+)
+def test_the_closest_name_is_offered_or_some_that_there_are(name, known, phrase):
+    assert did_you_mean(name, known) == phrase
+
+
+def test_values_are_shown_on_one_short_line():
+    assert shortened("10 kg") == "'10 kg'"
+    assert shortened([0] * 100).endswith("…")
+    assert len(shortened([0] * 100)) == 78
+    beam = fc.Beam("arm", (0, 0, 0), (1, 0, 0), fc.Section.tube(fc.STEEL, 0.03, 0.002))
+    assert "\n" not in shortened([beam, {"a": [1, 2]}])
+
+
+def test_a_public_name_with_a_slip_is_offered():
+    with pytest.raises(AttributeError, match="no attribute 'Beem'; did you mean 'Beam'"):
+        _ = fc.Beem
+
+
+@pytest.mark.parametrize("study", [fc.ledger, fc.work_precision, fc.ladder])
+def test_studies_want_a_scene(study):
+    with pytest.raises(FlexctrlError, match=f"{study.__name__}: 'crane' is no Scene; give flexctrl.Scene"):
+        study("crane")
+
+
+def test_comparing_wants_a_scene_or_a_model():
+    with pytest.raises(FlexctrlError, match="compare: 'crane' is neither a Scene nor a Model"):
+        fc.compare("crane")
