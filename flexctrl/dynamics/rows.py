@@ -9,7 +9,8 @@ import numpy as np
 
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed, Supply
-from flexctrl.dynamics.frames import Frames
+from flexctrl.dynamics.frames import Frames, Later
+from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.record import Recorder
 from flexctrl.dynamics.steps import Fixed, Pace, Point
 from flexctrl.model.state import State
@@ -78,6 +79,38 @@ class Rows:
                 return
             self._write(state, supply.u)
 
+    def between(self, weaver: Weaver, table: np.ndarray, inputs: np.ndarray, to_jump: bool) -> None:
+        """Write the rows within many steps whose states a weaver knows, and at their ends.
+
+        Parameters
+        ----------
+        weaver : Weaver
+        table : numpy.ndarray, shape (steps, 1 + outputs)
+            Time and outputs after each step.
+        inputs : numpy.ndarray, shape (steps + 1, inputs)
+            In force over each step, and after the last one.
+        to_jump : bool
+            Whether inputs are about to jump at the end of the last one.
+        """
+        times, every = table[:, 0], self.every
+        assert every is not None
+        weaver.times(times)
+        near = _NEAR * np.diff(times, prepend=weaver.t) + _ROUND_OFF * times
+        due = every * np.arange(self.count, int((times[-1] + near[-1]) / every) + 2)
+        due = due[due <= times[-1] + near[-1]]
+        steps = np.searchsorted(times + near, due)
+        ends = np.abs(times[steps] - due) <= near[steps]
+        wanted = ~ends | (steps < len(table) - to_jump)
+        steps, due, ends = steps[wanted], due[wanted], ends[wanted]
+        if len(due):
+            rows, drawn = weaver.rows(steps, np.where(ends, times[steps], due), ends, *self.due())
+            rows[ends] = table[steps[ends]]
+            for states in drawn:
+                self.frames.take(states)
+            self.count += len(due)
+            self.recorder.rows(rows, inputs[steps + ends])
+        weaver.go_on(len(table))
+
     def on_steps(self, pace: Pace, sample: float, t: float) -> bool:
         """Tell whether rows are due at the ends of steps only, as these are from a time on."""
         if self.every is None or (sample > 0.0 and _whole(self.every / sample)):
@@ -141,8 +174,13 @@ class Rows:
 
     def frame(self, state: State) -> None:
         """Keep a state for drawing, if one is due."""
-        if not self.frames or state.t >= self.frames.last + self.until / _FRAMES * (1 - 1e-9):
+        if state.t >= self.due()[0]:
             self.frames.append(state)
+
+    def drawn(self, later: Later) -> None:
+        """Keep a state for drawing that is to be made yet, if one is due."""
+        if later.last >= self.due()[0]:
+            self.frames.take(later)
 
 
 def _near(t: float, h: float) -> float:

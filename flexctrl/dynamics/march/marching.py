@@ -39,6 +39,8 @@ from flexctrl.dynamics.march.record import (
     March,
     no_leap,
 )
+from flexctrl.dynamics.march.shelf import states_of, width_of
+from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.scales import components, farthest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import Compiled
@@ -216,8 +218,13 @@ class Marcher:
         return list(self.rows[:, 1:])
 
     @cached_property
+    def weaver(self) -> Weaver:
+        """What finds rows between steps whose states have been kept."""
+        return Weaver(self.model, self.march.states)
+
+    @cached_property
     def _state_width(self) -> int:
-        return _state_width(self.flattened)
+        return width_of(self.flattened)
 
     def entered(self, point: AlphaPoint) -> Marcher:
         """Put a point at the start; return the march."""
@@ -412,32 +419,13 @@ class Marcher:
         if not count:
             return ()
         table = self.march.states[: count * width].reshape(count, width).copy()
-        return Later(count, float(table[-1, -1]), partial(_states, self.flattened, table))
-
-
-def _states(F: Flattened, table: np.ndarray) -> list[State]:
-    """The states that loops have written down, row by row."""
-    f, count, width = F.flat, *table.shape
-    n, nodes = f.n, 12 * f.nodes
-    poses = table[:, :nodes].reshape(count, -1, 12)
-    x, R = poses[:, :, :3].copy(), poses[:, :, 3:].copy().reshape(count, -1, 3, 3)
-    q, v = np.empty((2, count, n))
-    q[:, F.plan.order] = table[:, nodes : nodes + n]
-    v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
-    driven, shown = np.split(table[:, nodes + 2 * f.padded : width - 1].copy(), [f.drives], axis=1)
-    t, dry = table[:, width - 1].tolist(), F.model.rest.dry
-    return [State(x[i], R[i], q[i], v[i], driven[i], t[i], dry, shown[i]) for i in range(count)]
-
-
-def _state_width(F: Flattened) -> int:
-    f = F.flat
-    return 12 * f.nodes + 2 * f.padded + f.drives + F.gauges.turning + 1
+        return Later(count, float(table[-1, -1]), partial(states_of, self.flattened, table))
 
 
 def _march(F: Flattened, method: Method) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
-    state, part, probes = _state_width(F), components(F.model), probes_of(F, method.weight)
+    state, part, probes = width_of(F), components(F.model), probes_of(F, method.weight)
     shelf = int(min(_SHELF, max(1, _BYTES // (8 * state))))
     return March(
         flat=flat,

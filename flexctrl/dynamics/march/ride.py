@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.dense import Dense
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.foresight import calm_steps
 from flexctrl.dynamics.march.law import Sampling
@@ -20,6 +21,7 @@ from flexctrl.dynamics.march.legs import Held, Leg, Legs, Told, same
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
+from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.errors import ControllerError
@@ -89,6 +91,10 @@ class _Ride:
         self.marcher.keep(
             not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time, j.point.state.t), *j.rows.due()
         )
+        self.weaver: Weaver | None = None
+        if self.marcher.march.keeping and not isinstance(stepper, Dense):
+            self.weaver = self.marcher.weaver
+            self.weaver.set_out(j.point.state)
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
@@ -163,7 +169,12 @@ class _Ride:
         feed = self.journey.plan.feed
         if feed.lowered is None or self.mute or stop > self.until + self.tick:
             return False
-        return self._even(stop) if self.pace else not self.marcher.march.keeping
+        return self._even(stop) if self.pace else self._woven
+
+    @property
+    def _woven(self) -> bool:
+        """Whether rows are at the ends of steps, or there is who finds them in between."""
+        return self.weaver is not None or not self.marcher.march.keeping
 
     @property
     def _ahead(self) -> bool:
@@ -176,6 +187,7 @@ class _Ride:
         j, marcher, mark, stops = self.journey, self.marcher, self.journey.mark, self.journey.stops
         m, (sampling, law) = marcher.march, marcher.heed(j.plan.feed)
         law.pace, law.last, law.nearly = self.pace, self.until + self.tick, self.until - self.tick
+        law.room = marcher.room
         paced = self.pace or self._paced(m.t, math.inf)[0]
         pacing = paced if isinstance(paced, Pacing) else None
         status, wanted, done = DONE, _FIRST, 1
@@ -207,11 +219,19 @@ class _Ride:
         mark.steps += m.done
         mark.size = m.size if pacing is not None else m.h
         mark.left = m.wanted - m.done if self.pace and law.legs and m.done else 0
+        before = self.supply.u
         self.supply = Supply(self.marcher.flattened.flat.u.copy(), sampling.state.copy(), self.supply.rate)
         if m.done:
             self.legs.parts.append(Told(self.supply.rate, table.copy(), inputs, law.period, pacing))
-            rows = law.rows[: m.done * inputs].reshape(m.done, inputs)
-            j.rows.sampled(self.marcher.rows[: m.done], rows, self.marcher.states(), 1e-6 * mark.size)
+            self._written(m.done, before, law.rows[: m.done * inputs].reshape(m.done, inputs))
+
+    def _written(self, done: int, before: np.ndarray, commands: np.ndarray) -> None:
+        """Write rows after samples: inputs before, and in force from each step's end on."""
+        rows, table = self.journey.rows, self.marcher.rows[:done]
+        if self.weaver is not None:
+            rows.between(self.weaver, table, np.vstack([before, commands]), False)
+        else:
+            rows.sampled(table, commands, self.marcher.states(), 1e-6 * self.journey.mark.size)
 
     def _even(self, stop: float) -> bool:
         """Tell whether steps of one length go to a sample from where the last one was taken."""
@@ -219,7 +239,7 @@ class _Ride:
         if not self.pace or not self.journey.plan.feed.sample_time:
             return False
         fits = stop <= self.until + self.tick and (stop - self.marcher.march.t) / self.pace < self.marcher.room
-        return fits and mark.left == 0 and not self.marcher.march.keeping
+        return fits and mark.left == 0 and self._woven
 
     def _samples(self, deadline: float) -> bool:
         """Go from sample to sample while there is room for rows; tell whether all is well.
@@ -230,7 +250,7 @@ class _Ride:
         last, nearly, pace, room = self.until + self.tick, self.until - self.tick, self.pace, marcher.room
         told, reads, sample = self.journey.plan.feed.told, self.journey.plan.feed.reads, stops.sample
         clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.readings
-        held = Held(self.supply.rate, [])
+        held, first = Held(self.supply.rate, []), self.supply.u
         t, h, u, x, done, status = clock[0], mark.size, self.supply.u.tolist(), self.supply.x, 0, DONE
         marcher.begin()
         while True:
@@ -260,16 +280,15 @@ class _Ride:
             if time.perf_counter() >= deadline:
                 break
         mark.size, self.supply = h, Supply(np.array(u), x, held.rate)
-        return self._sampled(held, done, status)
+        return self._sampled(held, first, done, status)
 
-    def _sampled(self, held: Held, done: int, status: int) -> bool:
+    def _sampled(self, held: Held, first: np.ndarray, done: int, status: int) -> bool:
         """Enter samples in marks and rows, and let the inputs jump if they are about to; tell whether all is well."""
         marcher, m, mark = self.marcher, self.marcher.march, self.journey.mark
         mark.steps += done
         if done:
             self.legs.parts.append(held)
-            commands = held.commands(self.supply.u)
-            self.journey.rows.sampled(marcher.rows[:done], commands, marcher.states(), 1e-6 * mark.size)
+            self._written(done, first, held.commands(self.supply.u))
         if m.jumping:
             self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
             m.jumping = 0
@@ -297,8 +316,12 @@ class _Ride:
         mark.left -= leg.steps if mark.left > 0 else 0
         if isinstance(leg.pacing, Pacing):
             mark.size = marcher.march.size
-        states = marcher.states()
         to_jump = stop - marcher.march.t <= self.tick
+        if self.weaver is not None:
+            inputs = np.tile(leg.supply.u, (leg.steps + 1, 1))
+            rows.between(self.weaver, marcher.rows[: leg.steps], inputs, to_jump)
+            return
+        states = marcher.states()
         rows.ridden(self.last, marcher.rows[: leg.steps], states, leg.supply, to_jump)
         self.last = states[-1] if len(states) == leg.steps else self.last
 
@@ -316,7 +339,12 @@ class _Ride:
             self.faults.append(fault)
             return False
         u = self.supply.u
-        if j.rows.row(stop, y, u, 1e-6 * j.mark.size) and abs(self.last.t - stop) < self.tick:
+        if self.weaver is not None:
+            self.weaver.at(stop)
+        written = j.rows.row(stop, y, u, 1e-6 * j.mark.size)
+        if written and self.weaver is not None:
+            j.rows.drawn(self.weaver.last)
+        elif written and abs(self.last.t - stop) < self.tick:
             j.rows.frame(self.last)
         self.jumped = same(u, before.u) or self.marcher.jump(u) == DONE
         return self.jumped

@@ -6,7 +6,7 @@ from flexctrl.model.flat.layout import Flattened, Layout
 from flexctrl.model.flat.small_layout import SmallLayout
 from flexctrl.model.model import Model
 
-__all__ = ["Flattened", "can_be_flat", "flatten"]
+__all__ = ["Flattened", "can_be_flat", "flatten", "layout_of"]
 
 
 def can_be_flat(model: Model) -> bool:
@@ -31,7 +31,12 @@ def flatten(model: Model) -> Flattened:
     -------
     Flattened
     """
+    return layout_of(model).made()
+
+
+def layout_of(model: Model) -> Layout:
+    """Return where everything stands in the workspace of a model that `can_be_flat`."""
     layout = model.__dict__.get("_layout")
     if layout is None:
         layout = model.__dict__["_layout"] = (Layout if model.large else SmallLayout)(model)
-    return layout.made()
+    return layout

@@ -173,8 +173,9 @@ class Layout:
         found[self.linked] = self.padded + np.arange(len(self.linked))
         return found
 
-    def made(self) -> Flattened:
-        z = _aligned(self.length)
+    def made(self, spare: int = 0) -> Flattened:
+        """Return the model on a workspace of its own, with so many entries more behind it."""
+        z = _aligned(self.length + spare)
         part = {name: z[start : start + self.sizes[name]] for name, start in self.starts.items()}
         for hidden in {"slots", "drawn"} & set(part):
             del part[hidden]
@@ -203,7 +204,7 @@ class Layout:
         return axes_of(self.model, self.plan, self.pattern[:2])
 
     @cached_property
-    def _own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Nodes that are not placed by the linkage; those that move, and those that turn."""
         m = self.motion
         own = np.setdiff1d(np.arange(len(m.place)), [] if m.plain else m.nodes)
@@ -213,13 +214,13 @@ class Layout:
     @cached_property
     def _whole(self) -> np.ndarray:
         """Nodes whose six degrees of freedom are their own and follow each other."""
-        own = self._own[0]
+        own = self.own[0]
         cells = self.position[self.motion.place[own]]
         return own[(np.diff(cells, axis=1) == 1).all(axis=1) & (cells[:, -1] < self.motion.n)]
 
     @cached_property
     def _tables(self) -> dict[str, Any]:
-        m, (own, moved, turned) = self.motion, (np.setdiff1d(nodes, self._whole) for nodes in self._own)
+        m, (own, moved, turned) = self.motion, (np.setdiff1d(nodes, self._whole) for nodes in self.own)
         cells = self.position[m.place[own]]
         nodes, freedoms = np.nonzero(cells < m.n)
         loads = self.model.signals.loads.tocoo()
@@ -271,7 +272,7 @@ class Layout:
 
     @cached_property
     def _runs(self) -> dict[str, Any]:
-        m, turned = self.motion, self._own[2]
+        m, turned = self.motion, self.own[2]
         own_tangents = m.plain and not self.model.signals.follows
         damped = bool(self.model.viscous.nnz)
         return {

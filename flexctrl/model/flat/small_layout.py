@@ -69,7 +69,7 @@ class SmallLayout(Layout):
         return Axes(0, 0, 0, 0, none, none, none, none)
 
     @cached_property
-    def _own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         none = np.zeros(0, dtype=int)
         return none, none, none
 

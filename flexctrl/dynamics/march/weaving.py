@@ -1,0 +1,157 @@
+"""Rows between the steps of a march: from what it has kept to rows and states for drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from flexctrl.dynamics.frames import Later
+from flexctrl.dynamics.march.shelf import row_of, states_of, width_of
+from flexctrl.dynamics.march.weave import Weave, weave
+from flexctrl.kernels.native import Packed
+from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.flat.widened import widened
+from flexctrl.model.linkages.chart import Chart, Follower
+from flexctrl.model.linkages.charting import chart_of
+from flexctrl.model.model import Model
+from flexctrl.model.state import State
+
+__all__ = ["Weaver"]
+
+_ROOM, _FRAMES = 512, 130
+_PAIR = 24
+
+
+class Weaver:
+    """Finds rows between steps, as `flexctrl.dynamics.dense.Hermite` does, many at once.
+
+    Parameters
+    ----------
+    model : Model
+    kept : numpy.ndarray
+        Where a march writes down the states after its steps.
+    """
+
+    def __init__(self, model: Model, kept: np.ndarray) -> None:
+        chart = chart_of(model, model.rest) if model.large else None
+        self.flattened, spare, places = widened(model, chart)
+        self.flattened.enter(model.rest)
+        self.width = width_of(self.flattened)
+        self.columns = 1 + len(model.outputs)
+        self.weave = Packed(_woven(self.flattened, chart, spare, places, kept, self.width))
+        self._run = self.weave.bound(weave)
+
+    def set_out(self, state: State) -> None:
+        """Take up the state that the next steps start from."""
+        self.weave.first[:] = row_of(self.flattened, state)
+
+    @property
+    def t(self) -> float:
+        """When the next steps start."""
+        return float(self.weave.first[-1])
+
+    @property
+    def last(self) -> Later:
+        """The state that the next steps start from, to be made when it is looked at."""
+        row = self.weave.first.copy()
+        return Later(1, float(row[-1]), partial(states_of, self.flattened, row[None]))
+
+    def rows(
+        self, steps: np.ndarray, times: np.ndarray, ends: np.ndarray, due: float, spacing: float
+    ) -> tuple[np.ndarray, Sequence[Sequence[State]]]:
+        """Find rows within steps, and the states among them that are due for drawing.
+
+        Parameters
+        ----------
+        steps : numpy.ndarray of int, shape (rows,)
+            In which step each is.
+        times : numpy.ndarray, shape (rows,)
+        ends : numpy.ndarray of bool, shape (rows,)
+            Which are states after a step; their outputs are left out.
+        due, spacing : float
+            When the next state for drawing is due, and their spacing.
+
+        Returns
+        -------
+        rows : numpy.ndarray, shape (rows, 1 + outputs)
+        states : list of sequences of State
+        """
+        w, found, drawn = self.weave, np.zeros((len(times), self.columns)), []
+        w.due, w.spacing = due, spacing
+        for start in range(0, len(times), _ROOM):
+            part = slice(start, start + _ROOM)
+            count = w.wanted = len(times[part])
+            w.steps[:count], w.times[:count], w.ends[:count] = steps[part], times[part], ends[part]
+            self._run()
+            found[part] = w.rows[: count * self.columns].reshape(count, -1)
+            if w.kept:
+                table = w.drawn[: w.kept * self.width].reshape(w.kept, -1).copy()
+                drawn.append(Later(len(table), float(table[-1, -1]), partial(states_of, self.flattened, table)))
+        return found, drawn
+
+    def times(self, times: np.ndarray) -> None:
+        """Put right when the steps of the last call end, where a clock has been set."""
+        self.weave.states[: self.width * len(times)].reshape(-1, self.width)[:, -1] = times
+
+    def go_on(self, count: int) -> None:
+        """Take the state after so many steps as the one that the next ones start from."""
+        self.weave.first[:] = self.weave.states[self.width * (count - 1) : self.width * count]
+
+    def at(self, t: float) -> None:
+        """Set the clock of that state."""
+        self.weave.first[-1] = t
+
+
+def _woven(
+    F: Flattened, chart: Chart | None, spare: np.ndarray, places: np.ndarray, kept: np.ndarray, width: int
+) -> Weave:
+    wide = F.flat.padded + spare.size
+    turns = [(r.node, *(-1 if c < 0 else places[c] for c in r.coordinates)) for r in chart.rotations] if chart else []
+    lines = chart.lines if chart else ()
+    coordinates, onward, arriving = np.zeros((3, wide))
+    place0, turning = np.zeros((2, F.flat.padded))
+    hinges, slides = (_followed(f, places) for f in ((chart.hinges, chart.slides) if chart else ((), ())))
+    return Weave(
+        flat=F.flat,
+        gauges=F.gauges,
+        wide=wide,
+        spare=spare,
+        turned=len(turns),
+        turns=np.array(turns, dtype=int).ravel(),
+        leaning=len(lines),
+        leans=np.array([(k.node, *places[list(k.freedoms)]) for k in lines], dtype=int).ravel(),
+        lean_axes=np.array([k.axes[:, [k.main, *_others(k.main)]].T for k in lines], dtype=float).ravel(),
+        hinged=len(hinges[0]) // 2,
+        hinges=hinges[0],
+        hinge_axes=hinges[1],
+        slid=len(slides[0]) // 2,
+        slides=slides[0],
+        slide_axes=slides[1],
+        first=np.zeros(width),
+        states=kept,
+        steps=np.zeros(_ROOM, dtype=int),
+        times=np.zeros(_ROOM),
+        ends=np.zeros(_ROOM, dtype=int),
+        rows=np.zeros(_ROOM * (1 + F.gauges.outputs)),
+        drawn=np.zeros(_FRAMES * width),
+        place0=place0,
+        coordinates=coordinates,
+        onward=onward,
+        arriving=arriving,
+        turning=turning,
+        pair=np.zeros(_PAIR),
+        width=width,
+        nodes=F.flat.nodes,
+    )
+
+
+def _others(main: int) -> list[int]:
+    return [k for k in range(3) if k != main]
+
+
+def _followed(follows: Sequence[Follower], places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Masters and coordinates; axes."""
+    numbers = np.array([(f.master, places[f.freedom]) for f in follows], dtype=int).ravel()
+    return numbers, np.array([f.axis for f in follows], dtype=float).ravel()
