@@ -4,16 +4,16 @@ Long-travel motors at both ends carry the load 5 m: (a) PD on the motor angles, 
 shaped by ZVD, (c) state feedback designed by LQR on the rigid twin. All run at 100 Hz with limited torque. The
 crane's data are assumed (see ``flexctrl.cranes.bridge_crane``).
 
-    python examples/bridge_crane_closed_loop.py results
+    python examples/bridge_crane_closed_loop.py --out results
 
 prints settling time, residual sway, peak torque and the gain margin at a motor, and draws
-``results/bridge_crane_closed_loop.png``. Along the path flexible and rigid hardly differ: what flexibility costs
+``bridge_crane_closed_loop.png``. Along the path flexible and rigid hardly differ: what flexibility costs
 is margin: the rigid twin promises five to ten times what there is.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -143,4 +143,6 @@ def main(out: Path | None = None) -> dict[str, fc.Comparison]:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    parser = argparse.ArgumentParser(description="Three controllers of a bridge crane, flexible and rigid.")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="directory for the picture")
+    main(parser.parse_args().out)

@@ -1,9 +1,11 @@
 """The first tutorial: from a cantilever to a crane that carries a swinging load.
 
-python examples/cantilever.py [DIRECTORY for the pictures]
+    python examples/cantilever.py --out results
+
+prints what the tutorial shows and draws ``bode.png`` and ``move.png``.
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -139,7 +141,9 @@ def draw(directory: Path) -> None:
     figure.savefig(directory / "move.png", dpi=90)
 
 
-if __name__ == "__main__" and len(sys.argv) > 1:
-    out = Path(sys.argv[1])
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description="From a cantilever to a crane that carries a swinging load.")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="directory for the pictures")
+    out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     draw(out)

@@ -3,14 +3,14 @@
 Two legs of 120 on hinges carry a dead load 24 from their corner. Under load control the frame gives way at 18.6e3;
 the path of equilibria goes on past the limit, back to negative loads, and up again.
 
-    python examples/lee_frame.py results
+    python examples/lee_frame.py --out results
 
-prints both limit points and what load control says, and draws ``results/lee_frame.png``.
+prints both limit points and what load control says, and draws ``lee_frame.png``.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import flexctrl as fc
@@ -47,7 +47,9 @@ try:
 except EquilibriumError as error:
     print(str(error).split(" (")[0])
 
-if __name__ == "__main__" and len(sys.argv) > 1:
-    results = Path(sys.argv[1])
-    results.mkdir(parents=True, exist_ok=True)
-    path.plot("height").savefig(results / "lee_frame.png", dpi=120)
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description="A frame that snaps through and back.")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="directory for the picture")
+    out = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    path.plot("height").savefig(out / "lee_frame.png", dpi=120)

@@ -3,15 +3,15 @@
 The girder is that of ``flexctrl.cranes.bridge_crane`` (assumed data), its ends held; the trolley's wheels are driven
 by a motor whose angle follows a move of 15 m, plain and shaped by ZVD.
 
-    python examples/travelling_trolley.py results
+    python examples/travelling_trolley.py --out results
 
 prints how far the girder sinks under the trolley against the influence line of a standing load, and the sway that is
-left, and draws ``results/travelling_trolley.png``.
+left, and draws ``travelling_trolley.png``.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -108,7 +108,9 @@ def draw() -> Figure:
     return figure
 
 
-if __name__ == "__main__" and len(sys.argv) > 1:
-    results = Path(sys.argv[1])
-    results.mkdir(parents=True, exist_ok=True)
-    draw().savefig(results / "travelling_trolley.png", dpi=120)
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description="A trolley crosses a girder that bends.")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="directory for the picture")
+    out = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    draw().savefig(out / "travelling_trolley.png", dpi=120)
