@@ -20,7 +20,7 @@ from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equations import Small
 from flexctrl.model.equilibrium import equilibrium
 from flexctrl.model.laws.frictions import inner_freedoms
-from flexctrl.model.laws.gusts import check_gusts
+from flexctrl.model.laws.gusts import check_gusts, idle_gusts
 from flexctrl.model.linkages.mobility import motion_of
 from flexctrl.model.model import Model
 from flexctrl.structure.cut import cut_ropes
@@ -79,7 +79,11 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
         f"output {name} is left out: a rope that does not stretch measures no tension" for name in unmeasured
     )
     motion = replace(
-        motion, notes=motion.notes + left_out + tuple(note for e in parts for note in e.left_out(structure, parts))
+        motion,
+        notes=motion.notes
+        + left_out
+        + idle_gusts(structure, parts)
+        + tuple(note for e in parts for note in e.left_out(structure, parts)),
     )
     empty = sp.csr_matrix((motion.n, motion.n))
     model = Model(structure, parts, motion, runs, empty)

@@ -195,3 +195,24 @@ def check_gusts(structure: Structure, effects: Sequence[Effect]) -> None:
                 f"WindSpeed {signal.name!r}: direction {signal.direction} would turn in a frame that turns about "
                 f"{frame.rate}; let gusts blow along the axis, or describe the machine in axes that do not turn"
             )
+
+
+def idle_gusts(structure: Structure, effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Return what to tell of gusts that find nothing to blow on.
+
+    Parameters
+    ----------
+    structure : Structure
+    effects : sequence of Effect
+
+    Returns
+    -------
+    tuple of str
+    """
+    blown = any(isinstance(e, Wind) and e.density and e.shares(structure) for e in effects)
+    idle = [] if blown else [s.name for s in structure.inputs if isinstance(s, WindSpeed)]
+    return tuple(
+        f"input {name} does nothing: a WindSpeed blows on the areas of the effect Wind, and there are none; "
+        'give e.g. Wind({"load": 12.0})'
+        for name in idle
+    )
