@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
 
 from flexctrl.mechanics.clamped_modes import clamped_shapes
+from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
 from flexctrl.structure.drives import RotaryDrive, Winch
@@ -134,6 +135,15 @@ def bent_of(structure: Structure, coordinates: Sequence[str], values: np.ndarray
     return found
 
 
+def _posed(machine: Structure | Model, pose: Pose | None) -> tuple[Structure, Drawn]:
+    """A structure, and what is to be drawn of it; of a model's states that is how component modes bend beams, too."""
+    if isinstance(machine, Structure):
+        return machine, seen(machine, pose) if pose else Drawn.of(machine)
+    if isinstance(pose, State):
+        return machine.structure, pose_of(machine.structure, machine.coordinates, pose)
+    return _posed(machine.structure, pose)
+
+
 def best_plane(structure: Structure, poses: Sequence[Pose] = ()) -> tuple[int, int] | None:
     """Return the two axes of the plane a machine lies and moves in, or None if it needs space.
 
@@ -229,7 +239,7 @@ class Pen:
 
 def draw_machine(
     ax: Axes,
-    structure: Structure,
+    machine: Structure | Model,
     pose: Pose | None = None,
     *,
     numbers: bool = True,
@@ -244,9 +254,10 @@ def draw_machine(
     ----------
     ax : matplotlib.axes.Axes
         Plane or 3-D, see `add_machine_axes`; a plane picture shows the plane the machine lies in.
-    structure : Structure
+    machine : Structure or Model
     pose : State, optional
-        Deformed; default: as drawn.
+        Deformed; default: as drawn. How component modes bend beams is shown if ``machine`` is the model of that state:
+        a structure does not know which numbers of a state are theirs.
     numbers : bool
         Whether to write the join table's node numbers (of a large machine: where parts are joined).
     symbols : bool
@@ -263,7 +274,7 @@ def draw_machine(
     matplotlib.axes.Axes
         The same axes.
     """
-    shown = seen(structure, pose) if pose else Drawn.of(structure)
+    structure, shown = _posed(machine, pose)
     plane = None if ax.name == "3d" else plane or best_plane(structure) or (0, 2)
     pen = Pen(ax, plane)
     for part in structure.elements:
@@ -400,14 +411,21 @@ def _frame(ax: Any, structure: Structure, plane: tuple[int, int] | None) -> None
 
 
 def draw_deformed(
-    ax: Axes, structure: Structure, pose: Pose, color: str, *, label: str = "", plane: tuple[int, int] | None = None
+    ax: Axes,
+    machine: Structure | Model,
+    pose: Pose,
+    color: str,
+    *,
+    label: str = "",
+    plane: tuple[int, int] | None = None,
 ) -> Axes:
     """Draw a machine as it is drawn, pale, and deformed over it.
 
     Parameters
     ----------
     ax : matplotlib.axes.Axes
-    structure : Structure
+    machine : Structure or Model
+        The model of that state, if component modes are to be seen; see `draw_machine`.
     pose : State
     color : str
     label : str
@@ -420,8 +438,8 @@ def draw_deformed(
     matplotlib.axes.Axes
         The same axes.
     """
-    draw_machine(ax, structure, numbers=False, symbols=False, color=PALE, width=1.4, plane=plane)
-    draw_machine(ax, structure, pose, numbers=False, symbols=False, color=color, plane=plane)
+    draw_machine(ax, machine, numbers=False, symbols=False, color=PALE, width=1.4, plane=plane)
+    draw_machine(ax, machine, pose, numbers=False, symbols=False, color=color, plane=plane)
     if label:
         ax.set_title(label, fontsize=10, color=INK, pad=2.0)
     for axis in (getattr(ax, f"{name}axis") for name in _NAMES[: 3 if ax.name == "3d" else 2]):

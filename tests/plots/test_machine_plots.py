@@ -159,9 +159,10 @@ def test_frames_of_runs_and_equilibria_show_component_modes_bent():
     sag = 100.0 * 9.81 * 10.0**4 / (384.0 * 1e6)
     run = fc.simulate(model, until=0.01, start=rest)
     pose = pose_of(structure, model.coordinates, run.frames[-1])
-    axes = add_machine_axes(Figure(), structure, [pose])
-    draw_deformed(axes, structure, pose, "blue", plane=(0, 2))
-    assert min(line.get_ydata().min() for line in axes.lines) == pytest.approx(-sag, rel=0.02)
+    for machine, shown in ((structure, pose), (model, run.frames[-1])):
+        axes = add_machine_axes(Figure(), structure, [pose])
+        draw_deformed(axes, machine, shown, "blue", plane=(0, 2))
+        assert min(line.get_ydata().min() for line in axes.lines) == pytest.approx(-sag, rel=0.02)
     drawn = rest.plot().axes[0]
     scale = float(drawn.get_title().split("× ")[1]) if "×" in drawn.get_title() else 1.0
     assert min(line.get_ydata().min() for line in drawn.lines) == pytest.approx(-sag * scale, rel=0.02)
