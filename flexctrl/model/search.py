@@ -69,70 +69,22 @@ class Newton:
         self.balance, self.tolerance, self.reach = balance, tolerance, reach
         self.mixed = balance.model.forces.mixed if balance.model.large else None
         self._plan: Plan | None = None
-        self._left = np.zeros(0)
 
     def run(self, start: State, most: int, shift: float = 0.0, watch: bool = False) -> Found:
         """Search from a start; a positive ``shift`` (1/s²) adds masses to K and fades as the forces do.
 
         ``watch`` ends it at the first tangent that does not resist every displacement.
         """
-        balance = self.balance
-        scale = balance.scale(start)
-        here = _Iterate(start, None, balance.force(start), 0.0)
-        here.left = least = balance.relative(here.force, scale)
-        best, floor, before, iteration = start, 1e-7 * shift, np.inf, 0
-        steady = contracting = True
-        stalled, small = 0, balance.astray(start) == 0.0 and here.left <= _TARGET
-        while not small and iteration < most:
-            iteration += 1
-            K = balance.slope(here.state, here.excess)
-            if watch and not balance.holds(here.state, K):
-                steady = False
-                break
-            try:
-                step = self._step(K, here, shift)
-            except SingularMatrixError:
-                if not shift:
-                    break
-                shift = 10.0 * max(shift, floor)
-                continue
-            size = balance.moved(step)
-            share = min(1.0, self.reach / size) if size > 0.0 else 1.0
-            if shift and share < _TOO_FAR:
-                shift = 10.0 * max(shift, floor)
-                continue
-            there = self._after(here, step, share, scale)
-            if not there.left <= 1e3 * max(here.left, self.tolerance):
-                if not shift:
-                    break
-                shift = 10.0 * max(shift, floor)
-                continue
-            contracting = contracting and share == 1.0 and size <= max(_CONTRACTION * before, 1e-6)
-            shift = max(
-                shift * (0.1 if there.left < here.left else 0.3 if there.left < 10.0 * here.left else 3.0), floor
-            )
-            before, here = size, there
-            true = balance.relative(here.force, scale)
-            stalled = 0 if true < 0.7 * least else stalled + 1
-            if true < least or share < 1.0 or iteration == 1:
-                best, least = here.state, true
-            small = share == 1.0 and (true <= _TARGET or (size <= _SETTLED and shift <= floor))
-            if stalled > 8 and size < 1e-6 and balance.settled(best, self.tolerance):
-                break
-        done = balance.astray(best) <= 1e-12 and balance.settled(best, self.tolerance)
-        if not done and here.state is not best and balance.astray(here.state) <= 1e-12:
-            # round-off in stiff pieces may hide how much nearer the last state is
-            done = balance.settled(here.state, self.tolerance)
-            best, least = (here.state, balance.residual(here.state)) if done else (best, least)
-        if not done and small and shift and balance.residual(here.state) <= _SPREAD * self.tolerance:
-            # free motions may have carried what is left from where it is round-off to heavier places
-            self._step(balance.slope(here.state), here, shift)
-            done = balance.relative(self._left, scale) <= self.tolerance
-            best, least = (here.state, balance.residual(here.state)) if done else (best, least)
-        return Found(best, least, iteration, done, steady, contracting)
+        search = _Search(self, start, shift)
+        while not search.small and search.iterations < most and search.iterate(watch):
+            pass
+        return search.found()
 
-    def _step(self, K: sp.csr_matrix, here: _Iterate, shift: float) -> np.ndarray:
-        """The whole step of all coordinates; held ones go to their places."""
+    def step(self, K: sp.csr_matrix, here: _Iterate, shift: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the whole step of all coordinates, held ones to their places, and the forces on the free ones.
+
+        Where there is a shift, the forces are less what only drives free motions by round-off.
+        """
         balance = self.balance
         step = np.zeros(balance.model.n)
         step[balance.fixed] = balance.gap(here.state)
@@ -144,9 +96,9 @@ class Newton:
         if self._plan is None or not self._plan.fits(matrix):
             self._plan = plan(matrix)
         solve = factorise(matrix, self._plan)
-        found, self._left = self._without_drift(matrix, solve, force, here, shift) if shift else (solve(force), force)
+        found, left = self._without_drift(matrix, solve, force, here, shift) if shift else (solve(force), force)
         step[balance.free] = found
-        return step
+        return step, left
 
     def _without_drift(
         self,
@@ -178,8 +130,8 @@ class Newton:
             step = solve(force)
         return step, force
 
-    def _after(self, here: _Iterate, step: np.ndarray, share: float, scale: float) -> _Iterate:
-        """The next iterate after a share of a step: stresses go the same share of their way."""
+    def after(self, here: _Iterate, step: np.ndarray, share: float, scale: float) -> _Iterate:
+        """Return the next iterate after a share of a step: stresses go the same share of their way."""
         balance, model = self.balance, self.balance.model
         state = model.advance(here.state, share * step, balance.still, 0.0)
         force = balance.force(state)
@@ -192,6 +144,78 @@ class Newton:
         excess = self.mixed.excess(state, borne - now)
         left = force + model.motion.collect(state, excess.raw)[balance.free]
         return _Iterate(state, excess, force, balance.relative(left, scale))
+
+
+class _Search:
+    """A search under way: the iterate, the best state met, and how the steps went."""
+
+    def __init__(self, newton: Newton, start: State, shift: float) -> None:
+        balance = newton.balance
+        force, self.scale = balance.force(start), balance.scale(start)
+        self.newton, self.balance = newton, balance
+        self.shift, self.floor = shift, 1e-7 * shift
+        self.best, self.least = start, balance.relative(force, self.scale)
+        self.here = _Iterate(start, None, force, self.least)
+        self.before, self.iterations, self.stalled = np.inf, 0, 0
+        self.steady = self.contracting = True
+        self.small = balance.astray(start) == 0.0 and self.least <= _TARGET
+
+    def iterate(self, watch: bool) -> bool:
+        """Go one step, or hold faster where it would go astray; return whether another one may help."""
+        newton, here = self.newton, self.here
+        self.iterations += 1
+        K = self.balance.slope(here.state, here.excess)
+        if watch and not self.balance.holds(here.state, K):
+            self.steady = False
+            return False
+        try:
+            step, _ = newton.step(K, here, self.shift)
+        except SingularMatrixError:
+            return self._held_faster()
+        size = self.balance.moved(step)
+        share = min(1.0, newton.reach / size) if size > 0.0 else 1.0
+        if self.shift and share < _TOO_FAR:
+            return self._held_faster()
+        there = newton.after(here, step, share, self.scale)
+        if not there.left <= 1e3 * max(here.left, newton.tolerance):
+            return self._held_faster()
+        return self._moved(there, size, share)
+
+    def _held_faster(self) -> bool:
+        self.shift = 10.0 * max(self.shift, self.floor)
+        return self.shift > 0.0
+
+    def _moved(self, there: _Iterate, size: float, share: float) -> bool:
+        """Take stock after a step; return whether another one may help."""
+        before, self.here = self.here, there
+        self.contracting = self.contracting and share == 1.0 and size <= max(_CONTRACTION * self.before, 1e-6)
+        fading = 0.1 if there.left < before.left else 0.3 if there.left < 10.0 * before.left else 3.0
+        self.shift, self.before = max(self.shift * fading, self.floor), size
+        true = self.balance.relative(there.force, self.scale)
+        self.stalled = 0 if true < 0.7 * self.least else self.stalled + 1
+        if true < self.least or share < 1.0 or self.iterations == 1:
+            self.best, self.least = there.state, true
+        self.small = share == 1.0 and (true <= _TARGET or (size <= _SETTLED and self.shift <= self.floor))
+        return not (self.stalled > 8 and size < 1e-6 and self.balance.settled(self.best, self.newton.tolerance))
+
+    def found(self) -> Found:
+        """Return where it ended: at the best state, or the last where round-off alone makes that look worse."""
+        best, least, last = self.best, self.least, self.here.state
+        done = self._in_balance(best)
+        if not done and ((last is not best and self._in_balance(last)) or self._in_balance_but_for_drift()):
+            best, least, done = last, self.balance.residual(last), True
+        return Found(best, least, self.iterations, done, self.steady, self.contracting)
+
+    def _in_balance(self, state: State) -> bool:
+        return self.balance.astray(state) <= 1e-12 and self.balance.settled(state, self.newton.tolerance)
+
+    def _in_balance_but_for_drift(self) -> bool:
+        """Whether free motions have carried what is left from where it is round-off to heavier places."""
+        last, tolerance = self.here.state, self.newton.tolerance
+        if not self.small or not self.shift or self.balance.residual(last) > _SPREAD * tolerance:
+            return False
+        _, left = self.newton.step(self.balance.slope(last), self.here, self.shift)
+        return self.balance.relative(left, self.scale) <= tolerance
 
 
 def follow(balance: Balance, start: State, tolerance: float, strict: bool) -> tuple[Found, float]:
