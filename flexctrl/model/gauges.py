@@ -15,8 +15,9 @@ from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS
 from flexctrl.model.laws.families import winch_parameters
-from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, rope_pull, spring_pull
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.laws.loose_kinds import loose_spring
+from flexctrl.model.laws.part_kinds import rope_pull, spring_pull
 from flexctrl.model.model import Model
 from flexctrl.model.signals import winch_tension
 from flexctrl.structure.drives import Winch

@@ -19,8 +19,8 @@ from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.mechanics import beam, pieces
 from flexctrl.mechanics.beam_tangent import beam_slope
-from flexctrl.model.laws import kinds
-from flexctrl.model.laws.kinds import Kind
+from flexctrl.model.laws import part_kinds
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kind, moved, symbols_of
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ class _Elastic:
 def _beam_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX) -> ca.SX:
     import casadi as ca
 
-    first, second = kinds.moved(kind, symbols, ca.SX(kind.width, 1), ca.SX(3, 1))
-    m = beam.beam_motion(first, second, parameters, kinds.modes_in(symbols[kinds.NODE_SLOT * kind.nodes :]))
+    first, second = moved(kind, symbols, ca.SX(kind.width, 1), ca.SX(3, 1))
+    m = beam.beam_motion(first, second, parameters, part_kinds.modes_in(symbols[NODE_SLOT * kind.nodes :]))
     seen, local = beam.seen_deformed(m)
     now = ca.vertcat(m.stretch, *m.theta, *m.modal[:1])
     stress = sum((e.beam_stress(local) for e in effects), ca.SX(6, 1))
@@ -75,18 +75,18 @@ def _modal_geometric(kind: Kind, symbols: ca.SX, parameters: ca.SX, stress: ca.S
     import casadi as ca
 
     increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
-    amplitudes = symbols[kinds.NODE_SLOT * kind.nodes :: kinds.DRIVE_SLOT] + increment[-kind.drives :]
+    amplitudes = symbols[NODE_SLOT * kind.nodes :: DRIVE_SLOT] + increment[-kind.drives :]
     still = ca.SX.zeros(kind.drives)
     first, second = _still(kind, symbols, increment)
     m = beam.beam_motion(first, second, parameters, (amplitudes, still, still))
-    force = kinds.whole_force(m, beam.stress_force(m, stress))
+    force = part_kinds.whole_force(m, beam.stress_force(m, stress))
     return ca.substitute(ca.jacobian(force, increment), increment, zero), ca.substitute(force, increment, zero)
 
 
 def _line_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX) -> ca.SX:
     import casadi as ca
 
-    pull = kinds.spring_pull if kind is kinds.SPRING else kinds.rope_pull
+    pull = part_kinds.spring_pull if kind is part_kinds.SPRING else part_kinds.rope_pull
     increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
     first, second = _still(kind, symbols, increment)
     stress = pull(effects, pieces.line_motion(first, second, parameters))
@@ -106,7 +106,7 @@ def _line_geometric(
 
 
 _BEAM, _LINE = _Elastic(6, _beam_stress, _beam_geometric), _Elastic(1, _line_stress, _line_geometric)
-_ELASTIC = {kinds.BEAM.physics: _BEAM, kinds.SPRING.physics: _LINE, kinds.ROPE.physics: _LINE}
+_ELASTIC = {part_kinds.BEAM.physics: _BEAM, part_kinds.SPRING.physics: _LINE, part_kinds.ROPE.physics: _LINE}
 """The physics of pieces that strain."""
 
 
@@ -114,7 +114,7 @@ _ELASTIC = {kinds.BEAM.physics: _BEAM, kinds.SPRING.physics: _LINE, kinds.ROPE.p
 def _stress_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     import casadi as ca
 
-    symbols, parameters = kinds.symbols_of(kind)
+    symbols, parameters = symbols_of(kind)
     outputs = _ELASTIC[kind.physics].stress(kind, effects, symbols, parameters)
     return Kernel(f"{kind.name}_stress", symbols, parameters, ca.cse(ca.densify(outputs)))
 
@@ -124,7 +124,7 @@ def _geometric_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     """The slope column by column, then the force."""
     import casadi as ca
 
-    symbols, parameters = kinds.symbols_of(kind)
+    symbols, parameters = symbols_of(kind)
     stress = ca.SX.sym("stress", _ELASTIC[kind.physics].count)
     slope, force = _ELASTIC[kind.physics].geometric(kind, effects, symbols, parameters, stress)
     outputs = ca.cse(ca.vertcat(ca.vec(ca.densify(slope)), ca.densify(force)))
@@ -132,7 +132,7 @@ def _geometric_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
 
 
 def _rates(symbols: ca.SX, node: int) -> ca.SX:
-    return symbols[kinds.NODE_SLOT * node + 12 : kinds.NODE_SLOT * node + 18]
+    return symbols[NODE_SLOT * node + 12 : NODE_SLOT * node + 18]
 
 
 def _still(kind: Kind, symbols: ca.SX, increment: ca.SX) -> list:
@@ -141,7 +141,7 @@ def _still(kind: Kind, symbols: ca.SX, increment: ca.SX) -> list:
 
     rates = ca.vertcat(*[_rates(symbols, i) for i in range(kind.nodes)])
     still = ca.substitute(symbols, rates, ca.SX.zeros(rates.numel()))
-    return kinds.moved(kind, still, increment, ca.SX([1.0, 0.0, 0.0]))
+    return moved(kind, still, increment, ca.SX([1.0, 0.0, 0.0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +204,7 @@ class Mixed:
     @cached_property
     def _ropes(self) -> np.ndarray:
         ropes = [
-            np.full(places.size, f.kernels.kind is kinds.ROPE)
+            np.full(places.size, f.kernels.kind is part_kinds.ROPE)
             for f, places in zip(self._families, self._places, strict=True)
         ]
         return np.concatenate([np.zeros(0, dtype=bool), *ropes])

@@ -19,18 +19,8 @@ from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.beam import PARAMETERS, NodeMotion, reach
 from flexctrl.mechanics.pieces import named
 from flexctrl.model.laws.families import Family
-from flexctrl.model.laws.kinds import (
-    BEAM,
-    DRIVE_SLOT,
-    HEAVY_ROPE,
-    NODE_SLOT,
-    ROPE,
-    SPRING,
-    Kernels,
-    Kind,
-    moved,
-    symbols_of,
-)
+from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, moved, symbols_of
+from flexctrl.model.laws.part_kinds import BEAM, HEAVY_ROPE, ROPE, SPRING
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.state import State

@@ -17,8 +17,8 @@ from flexctrl.mechanics.pieces import line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS, paid_out
 from flexctrl.model.laws.families import winch_parameters
 from flexctrl.model.laws.frictions import lag_compliance
-from flexctrl.model.laws.kinds import rope_pull, spring_pull
 from flexctrl.model.laws.loose_kinds import loose_spring
+from flexctrl.model.laws.part_kinds import rope_pull, spring_pull
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch

@@ -11,7 +11,8 @@ from test_beam import ENDS, parameters
 
 import flexctrl as fc
 from flexctrl.effects.effect import Effect
-from flexctrl.model.laws.kinds import BEAM, Kernels
+from flexctrl.model.laws.kinds import Kernels
+from flexctrl.model.laws.part_kinds import BEAM
 
 
 class Field(fc.RotatingFrame):

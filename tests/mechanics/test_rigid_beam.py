@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
-from flexctrl.model.laws import kinds
+from flexctrl.model.laws import part_kinds
 from flexctrl.model.laws.families import _beams, _rigid_beams
 
 EFFECTS = (fc.Gravity((0.3, -9.0, 2.0)), fc.RayleighDamping(0.3, 0.0), fc.RotatingFrame((0.2, 0.1, 0.7)))
@@ -24,7 +24,7 @@ def test_force_and_energy_are_those_of_the_element(section, effects):
     rng = np.random.default_rng(3)
     beam = fc.Beam("beam", (0.3, -0.2, 0.5), (1.4, 0.7, -0.1), SECTIONS[section], elements=1)
     s = fc.Structure([beam])
-    element = _beams(kinds.BEAM, s, effects, [beam], frozenset({"beam"}))
+    element = _beams(part_kinds.BEAM, s, effects, [beam], frozenset({"beam"}))
     body = _rigid_beams(s, effects, [beam])
     turn = Rotation.random(random_state=2).as_matrix()
     v, w, a, b = rng.normal(size=(4, 3))

@@ -11,7 +11,7 @@ from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch
 from flexctrl.mechanics.matrices import beam_mass, bending, coupling, plane_masses
-from flexctrl.model.laws import kinds
+from flexctrl.model.laws import part_kinds
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Beam, PointMass, RigidBody, Rope, Spring
@@ -79,19 +79,19 @@ def families_of(
     links = tuple(e for e in effects if not isinstance(e, RopeStretch))
     tight = [d for d in structure.drives if d.name not in loose]
     made = [
-        _beams(kinds.BEAM, structure, effects, [b for b in bent if not b.section.shears], rigid),
-        _beams(kinds.SHEARING_BEAM, structure, effects, [b for b in bent if b.section.shears], rigid),
+        _beams(part_kinds.BEAM, structure, effects, [b for b in bent if not b.section.shears], rigid),
+        _beams(part_kinds.SHEARING_BEAM, structure, effects, [b for b in bent if b.section.shears], rigid),
         *modal,
         _rigid_beams(structure, stiff, [b for b in beams if b.name in rigid]),
-        lines_family(kinds.SPRING, structure, effects, springs),
-        lines_family(kinds.ROPE, structure, effects, ropes),
-        lines_family(kinds.HEAVY_ROPE, structure, effects, [p for p in heavy if p.name not in rigid]),
-        lines_family(kinds.HEAVY_ROPE, structure, links, [p for p in heavy if p.name in rigid]),
-        _bodies(kinds.POINT, structure, effects, [p for p in parts if isinstance(p, PointMass)]),
-        _bodies(kinds.BODY, structure, effects, [p for p in parts if isinstance(p, RigidBody)]),
-        drives_family(kinds.ROTARY_DRIVE, structure, effects, [d for d in tight if isinstance(d, RotaryDrive)]),
-        drives_family(kinds.LINEAR_DRIVE, structure, effects, [d for d in tight if isinstance(d, LinearDrive)]),
-        drives_family(kinds.WINCH, structure, effects, [d for d in tight if isinstance(d, Winch)]),
+        lines_family(part_kinds.SPRING, structure, effects, springs),
+        lines_family(part_kinds.ROPE, structure, effects, ropes),
+        lines_family(part_kinds.HEAVY_ROPE, structure, effects, [p for p in heavy if p.name not in rigid]),
+        lines_family(part_kinds.HEAVY_ROPE, structure, links, [p for p in heavy if p.name in rigid]),
+        _bodies(part_kinds.POINT, structure, effects, [p for p in parts if isinstance(p, PointMass)]),
+        _bodies(part_kinds.BODY, structure, effects, [p for p in parts if isinstance(p, RigidBody)]),
+        drives_family(part_kinds.ROTARY_DRIVE, structure, effects, [d for d in tight if isinstance(d, RotaryDrive)]),
+        drives_family(part_kinds.LINEAR_DRIVE, structure, effects, [d for d in tight if isinstance(d, LinearDrive)]),
+        drives_family(part_kinds.WINCH, structure, effects, [d for d in tight if isinstance(d, Winch)]),
     ]
     return tuple(f for f in made if f.count)
 
@@ -109,20 +109,21 @@ def _modal_beams(s: Structure, effects: tuple[Effect, ...]) -> list[Family]:
     for effect in effects:
         chosen = [p for p in s.elements if isinstance(effect, ComponentModes) and effect.modes(p)]
         if isinstance(effect, ComponentModes) and chosen:
-            kind = kinds.modal_beam(effect.count)
+            kind = part_kinds.modal_beam(effect.count)
             found.append(_beams(kind, s, _kernel_effects(effects), chosen, frozenset(), inner))
         inner += len(effect.inner(s))
     return found
 
 
-def _family(
+def family(
     kind: Kind,
     effects: tuple[Effect, ...],
     parts: Sequence[str],
-    nodes: list[list[int]],
+    nodes: Sequence[Sequence[int]],
     parameters: Sequence[Sequence[float]],
-    drives: Sequence[int] | np.ndarray = (),
+    drives: Sequence[int] | Sequence[Sequence[int]] | np.ndarray = (),
 ) -> Family:
+    """Return the family of some pieces: what they belong to, and their rows of nodes, parameters and drives."""
     return Family(
         kernels_of(kind, effects),
         tuple(parts),
@@ -147,13 +148,13 @@ def _beams(
     nodes = [[s.number(b.start) + i, s.number(b.start) + j] for b, i, j in spans]
     parameters = [_beam_parameters(b, b.length * (j - i) / b.elements)[: kind.parameters] for b, i, j in spans]
     numbers = first + np.arange(len(spans) * kind.drives)
-    return _family(kind, effects, [b.name for b, _, _ in spans], nodes, parameters, numbers)
+    return family(kind, effects, [b.name for b, _, _ in spans], nodes, parameters, numbers)
 
 
 def _rigid_beams(s: Structure, effects: tuple[Effect, ...], beams: list[Beam]) -> Family:
     nodes = [[s.number(b.start), s.number(b.end)] for b in beams]
     rows = [[b.section.rhoA * b.length, *_inertia(b)[((0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2))].tolist()] for b in beams]
-    return _family(kinds.RIGID_BEAM, effects, [b.name for b in beams], nodes, rows)
+    return family(part_kinds.RIGID_BEAM, effects, [b.name for b in beams], nodes, rows)
 
 
 def _inertia(b: Beam) -> np.ndarray:
@@ -182,9 +183,9 @@ def lines_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], lines: S
     """Return the family of some ropes or springs."""
     nodes = [[s.number(line.start), s.number(line.end)] for line in lines]
     parameters = [[line.stiffness, line.length, line.damping] for line in lines]
-    if kind is kinds.HEAVY_ROPE:
+    if kind is part_kinds.HEAVY_ROPE:
         parameters = [[*p, line.mass] for p, line in zip(parameters, lines, strict=True) if isinstance(line, Rope)]
-    return _family(kind, effects, [line.name for line in lines], nodes, parameters)
+    return family(kind, effects, [line.name for line in lines], nodes, parameters)
 
 
 def _bodies(kind: Kind, s: Structure, effects: tuple[Effect, ...], bodies: Sequence[PointMass | RigidBody]) -> Family:
@@ -192,7 +193,7 @@ def _bodies(kind: Kind, s: Structure, effects: tuple[Effect, ...], bodies: Seque
     for b in bodies:
         J = b.inertia if isinstance(b, RigidBody) else ((0.0,) * 3,) * 3
         rows.append([b.mass, J[0][0], J[1][1], J[2][2], J[0][1], J[0][2], J[1][2]])
-    return _family(kind, effects, [b.name for b in bodies], [[s.number(b.node)] for b in bodies], rows)
+    return family(kind, effects, [b.name for b in bodies], [[s.number(b.node)] for b in bodies], rows)
 
 
 def drives_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], drives: Sequence[Drive]) -> Family:
@@ -200,7 +201,7 @@ def drives_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], drives:
     ground, places = len(s.nodes), {d.name: i for i, d in enumerate(s.drives)}
     sides = [[s.number(d.node), ground if d.against is None else s.number(d.against)] for d in drives]
     names = [d.name for d in drives]
-    return _family(kind, effects, names, sides, [_drive_parameters(d) for d in drives], [places[n] for n in names])
+    return family(kind, effects, names, sides, [_drive_parameters(d) for d in drives], [places[n] for n in names])
 
 
 def _drive_parameters(d: Drive) -> list[float]:

@@ -12,9 +12,8 @@ from flexctrl.effects.lugre_friction import LuGre, LuGreFriction
 from flexctrl.effects.motor_lag import MotorLag
 from flexctrl.effects.viscous_friction import ViscousFriction
 from flexctrl.model.assembly import Block
-from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.families import Family, family
 from flexctrl.model.laws.friction_kinds import LAG, SLIPS, friction_kind
-from flexctrl.model.laws.kinds import Kind, kernels_of
 from flexctrl.model.motion import Motion
 from flexctrl.structure.contacts import Contact, MotorSide, contact_of
 from flexctrl.structure.drives import Drive
@@ -73,7 +72,8 @@ def _rubbing(s: Structure, law: str, places: list[tuple[str, list[float]]], inne
         slots = [_motor(s, contacts[i]) + ([] if inner is None else [inner + i]) for i in chosen]
         parameters = [[*_axis(contacts[i]), *places[i][1]] for i in chosen]
         sides = [_sides(s, contacts[i]) for i in chosen]
-        found.append(pieces(friction_kind(law, kind), [contacts[i].part for i in chosen], sides, slots, parameters))
+        names = [contacts[i].part for i in chosen]
+        found.append(family(friction_kind(law, kind), (), names, sides, parameters, slots))
     return found
 
 
@@ -91,30 +91,11 @@ def _axis(contact: Contact) -> tuple[float, ...]:
     return (0.0, 0.0, 0.0) if isinstance(contact, MotorSide) else contact.axis
 
 
-def pieces(
-    kind: Kind,
-    parts: list[str],
-    nodes: list[list[int]],
-    slots: list[list[int]],
-    parameters: list[list[float]],
-    effects: tuple[Effect, ...] = (),
-) -> Family:
-    """Return a family whose kernels depend on the kind and a few effects alone."""
-    count = len(parts)
-    return Family(
-        kernels_of(kind, effects),
-        tuple(parts),
-        np.array(nodes, dtype=int).reshape(count, kind.nodes),
-        np.array(slots, dtype=int).reshape(count, kind.drives),
-        np.array(parameters, dtype=float).reshape(count, kind.parameters),
-    )
-
-
 def _lags(s: Structure, effect: MotorLag, inner: int) -> Family:
     numbers = {d.name: i for i, d in enumerate(s.drives)}
     slots = [[numbers[name], inner + k] for k, (name, _) in enumerate(effect.acting)]
     parameters = [[T, lag_compliance(s.drives[numbers[name]])] for name, T in effect.acting]
-    return pieces(LAG, [name for name, _ in effect.acting], [[]] * len(slots), slots, parameters)
+    return family(LAG, (), [name for name, _ in effect.acting], [[]] * len(slots), parameters, slots)
 
 
 def lag_blocks(structure: Structure, effects: Sequence[Effect], motion: Motion) -> Iterator[tuple[str, Block]]:

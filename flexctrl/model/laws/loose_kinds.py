@@ -14,7 +14,8 @@ from flexctrl.effects.flexibility import ShaftElasticity
 from flexctrl.mechanics import pieces, play
 from flexctrl.mechanics.beam import NodeMotion
 from flexctrl.model.laws.families import Family, drives_family, lines_family
-from flexctrl.model.laws.kinds import Kind, Shares, drive_shares, spring_pull
+from flexctrl.model.laws.kinds import Kind, Shares
+from flexctrl.model.laws.part_kinds import drive_shares, spring_pull
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
 from flexctrl.structure.elements import Spring
 from flexctrl.structure.structure import Structure

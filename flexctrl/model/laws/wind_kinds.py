@@ -9,9 +9,9 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.wind import Wind
 from flexctrl.mechanics.beam import NodeMotion
-from flexctrl.model.laws.families import Family
-from flexctrl.model.laws.frictions import pieces
-from flexctrl.model.laws.kinds import Kind, Shares, seen_outside
+from flexctrl.model.laws.families import Family, family
+from flexctrl.model.laws.inertial import seen_outside
+from flexctrl.model.laws.kinds import Kind, Shares
 from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:
@@ -61,6 +61,4 @@ def wind_families(structure: Structure, effects: Sequence[Effect]) -> tuple[Fami
 def _family(s: Structure, effect: Wind, frames: tuple[Effect, ...]) -> Family:
     shares = effect.shares(s)
     rows = [[0.5 * effect.density * area, *effect.speed] for _, area in shares]
-    return pieces(
-        WIND, [node.part for node, _ in shares], [[s.number(n)] for n, _ in shares], [[]] * len(shares), rows, frames
-    )
+    return family(WIND, frames, [node.part for node, _ in shares], [[s.number(n)] for n, _ in shares], rows)

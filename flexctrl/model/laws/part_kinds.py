@@ -1,0 +1,198 @@
+"""The kinds of parts and drives: the sum of what all effects do to each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+from flexctrl.effects.effect import Effect
+from flexctrl.mechanics import beam, beam_inertia, pieces, winch
+from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.beam_tangent import beam_slope
+from flexctrl.model.laws.inertial import seen_outside, standing, turning
+from flexctrl.model.laws.kinds import DRIVE_SLOT, Kind, Shares
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+
+def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    modal = modes_in(slot)
+    m = beam.beam_motion(nodes[0], nodes[1], parameters, modal)
+    force, middle = beam.no_force(), 0.5 * (nodes[0].x + nodes[1].x)
+    for effect in effects:
+        force = force + effect.beam(m)
+    stored = sum((e.beam_energy(m, middle) for e in effects), ca.SX(1, 1))
+    felt, carried = m, ca.SX(1, 1)
+    if turning(effects):
+        first, second = nodes
+        felt = beam.beam_motion(seen_outside(effects, first), seen_outside(effects, second), parameters, modal)
+        parked = (seen_outside(effects, standing(first)), seen_outside(effects, standing(second)))
+        still = tuple(0.0 * eta if k else eta for k, eta in enumerate(modal))
+        carried = beam_inertia.kinetic_energy(beam.beam_motion(*parked, parameters, still))
+    inertia = whole_force(felt, beam_inertia.inertial_force(felt))
+    return Shares(inertia, whole_force(m, force), beam_inertia.kinetic_energy(m), stored - carried)
+
+
+def modes_in(slot: ca.SX) -> tuple[ca.SX, ...]:
+    """Return amplitudes, rates and accelerations of an element's own modes; nothing where it has none."""
+    return tuple(slot[k::DRIVE_SLOT] for k in range(3)) if slot.numel() else ()
+
+
+def whole_force(m: beam.BeamMotion, force: beam.BeamForce) -> ca.SX:
+    """Return a force on the nodes of an element and then on its own modes."""
+    import casadi as ca
+
+    nodal = beam.nodal_force(m, force)
+    return ca.vertcat(nodal, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else nodal
+
+
+def _beam_slope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], parameters: ca.SX, seeds: ca.SX) -> ca.SX:
+    def force(m: beam.BeamMotion) -> beam.BeamForce:
+        return sum((e.beam(m) for e in effects), beam_inertia.inertial_force(m))
+
+    return beam_slope(nodes[0], nodes[1], parameters, seeds, force)
+
+
+def _spring(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    m = pieces.line_motion(nodes[0], nodes[1], parameters)
+    return Shares(ca.SX(6, 1), pieces.line_force(m, spring_pull(effects, m)), ca.SX(1, 1), pieces.spring_energy(m))
+
+
+def spring_pull(effects: tuple[Effect, ...], m: pieces.LineMotion) -> ca.SX:
+    """Return the tension in a spring under some effects."""
+    return sum((e.spring(m) for e in effects), pieces.spring_tension(m))
+
+
+def _rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    m = pieces.line_motion(nodes[0], nodes[1], parameters)
+    stored = sum((e.rope_energy(m) for e in effects), ca.SX(1, 1))
+    return Shares(ca.SX(6, 1), pieces.line_force(m, rope_pull(effects, m)), ca.SX(1, 1), stored)
+
+
+def _heavy_rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    """A rope with mass, the last of its parameters."""
+    import casadi as ca
+
+    rope = _rope(effects, nodes, slot, parameters[:-1])
+    half = ca.vertcat(0.5 * parameters[-1], ca.SX(6, 1))
+    ends = [_body(effects, [node], slot, half) for node in nodes]
+    first, second = nodes
+    return Shares(
+        pieces.rope_share(*(e.inertia for e in ends)),
+        rope.force + pieces.rope_share(*(e.force for e in ends)),
+        ends[0].kinetic + ends[1].kinetic - _apart(first, second, half),
+        rope.stored + ends[0].stored + ends[1].stored + _carried_apart(effects, first, second, half),
+    )
+
+
+def _apart(first: NodeMotion, second: NodeMotion, half: ca.SX) -> ca.SX:
+    """What m/12 [[5, 1], [1, 5]] lacks of the kinetic energy of half the mass at either end."""
+    relative = replace(first, v=first.v - second.v)
+    return pieces.body_energy(relative, pieces.named(pieces.BODY_PARAMETERS, half)) / 6.0
+
+
+def _carried_apart(effects: tuple[Effect, ...], first: NodeMotion, second: NodeMotion, half: ca.SX) -> ca.SX:
+    """The same of what a turning frame carries along: what the centrifugal potential at the ends has too much."""
+    import casadi as ca
+
+    if not turning(effects):
+        return ca.SX(1, 1)
+    return _apart(seen_outside(effects, standing(first)), seen_outside(effects, standing(second)), half)
+
+
+def rope_pull(effects: tuple[Effect, ...], m: pieces.LineMotion) -> ca.SX:
+    """Return the tension in a rope under some effects."""
+    import casadi as ca
+
+    return pieces.unilateral(m, sum((e.rope(m) for e in effects), ca.SX(1, 1)))
+
+
+def _body(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    p = pieces.named(pieces.BODY_PARAMETERS, parameters)
+    node = nodes[0]
+    force = sum((e.body(node, p) for e in effects), ca.SX(6, 1))
+    stored = sum((e.body_energy(node, p) for e in effects), ca.SX(1, 1))
+    if turning(effects):
+        stored = stored - pieces.body_energy(seen_outside(effects, standing(node)), p)
+    return Shares(pieces.body_inertia(seen_outside(effects, node), p), force, pieces.body_energy(node, p), stored)
+
+
+def _rigid_beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    """A body at the middle of two nodes that turn together."""
+    import casadi as ca
+
+    first, second = nodes
+    middle = replace(first, x=0.5 * (first.x + second.x), v=0.5 * (first.v + second.v), a=0.5 * (first.a + second.a))
+    shares = _body(effects, [middle], slot, parameters)
+
+    def spread(force: ca.SX) -> ca.SX:
+        return ca.vertcat(0.5 * force[:3], 0.5 * force[3:], 0.5 * force[:3], 0.5 * force[3:])
+
+    return replace(shares, inertia=spread(shares.inertia), force=spread(shares.force))
+
+
+def _point(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    shares = _body(effects, nodes, slot, parameters)
+    return Shares(shares.inertia[:3], shares.force[:3], shares.kinetic, shares.stored)
+
+
+def _rotary(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    return drive_shares(effects, pieces.rotary_motion(nodes[0], nodes[1], slot[:3], slot[3], parameters))
+
+
+def _linear(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    return drive_shares(effects, pieces.linear_motion(nodes[0], nodes[1], slot[:3], parameters))
+
+
+def drive_shares(effects: tuple[Effect, ...], m: pieces.DriveMotion) -> Shares:
+    """Return what acts on a drive."""
+    import casadi as ca
+
+    force = sum((e.drive(m) for e in effects), ca.SX(13, 1))
+    stored = sum((e.drive_energy(m) for e in effects), ca.SX(1, 1))
+    inertia = ca.vertcat(ca.SX(12, 1), -m.p["inertia"] * m.source_acceleration)
+    return Shares(inertia, force, 0.5 * m.p["inertia"] * m.source_rate**2, stored)
+
+
+def _winch(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+    import casadi as ca
+
+    m, motor = winch.paid_out(nodes[0], nodes[1], slot[:3], parameters), winch.motor(slot[:3], parameters)
+    stored = sum((e.rope_energy(m) for e in effects), ca.SX(1, 1))
+    force = winch.hoisting(m, rope_pull(effects, m), stored, motor.p["ratio"])
+    drag = sum((e.drive(motor)[12] for e in effects), ca.SX(1, 1))
+    inertia = ca.vertcat(ca.SX(6, 1), -motor.p["inertia"] * motor.source_acceleration)
+    kinetic = 0.5 * motor.p["inertia"] * motor.source_rate**2
+    return Shares(inertia, force + ca.vertcat(ca.SX(6, 1), drag), kinetic, stored)
+
+
+BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam, _beam_slope)
+SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(beam.PARAMETERS + beam.SHEARING), _beam, _beam_slope)
+
+
+@cache
+def modal_beam(count: int) -> Kind:
+    """Return the kind of beam elements with some of their own modes in each plane."""
+    return Kind(f"beam_with_{count}_modes", 2, 6, 2 * count, len(beam.PARAMETERS), _beam)
+
+
+SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
+ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
+HEAVY_ROPE = Kind("heavy_rope", 2, 3, 0, len(pieces.LINE_PARAMETERS) + 1, _heavy_rope)
+POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)
+RIGID_BEAM = Kind("rigid_beam", 2, 6, 0, len(pieces.BODY_PARAMETERS), _rigid_beam)
+BODY = Kind("body", 1, 6, 0, len(pieces.BODY_PARAMETERS), _body)
+ROTARY_DRIVE = Kind("rotary_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _rotary)
+LINEAR_DRIVE = Kind("linear_drive", 2, 6, 1, len(pieces.DRIVE_PARAMETERS), _linear)
+WINCH = Kind("winch", 2, 3, 1, len(winch.WINCH_PARAMETERS), _winch)
