@@ -13,7 +13,10 @@ from typing import Any
 
 _HOMES = {
     "flexctrl.structure.sections": ("STEEL", "Material", "Section"),
-    "flexctrl.structure.elements": ("Beam", "Node", "PointMass", "RigidBody", "Rope", "Spring"),
+    "flexctrl.structure.nodes": ("Node",),
+    "flexctrl.structure.beams": ("Beam",),
+    "flexctrl.structure.lines": ("Rope", "Spring"),
+    "flexctrl.structure.bodies": ("PointMass", "RigidBody"),
     "flexctrl.structure.chains": ("BeamChain", "arc"),
     "flexctrl.structure.joints": ("Hinge", "Pin", "Slide", "Support", "Weld"),
     "flexctrl.structure.drives": ("LinearDrive", "RotaryDrive", "Winch"),

@@ -13,8 +13,10 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.plots.machine import add_machine_axes, draw_machine
 from flexctrl.scene import load_scene
-from flexctrl.structure.elements import Beam, Part, Rope, Spring
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import IDENTIFIERS
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
 
 

@@ -17,9 +17,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass
 from flexctrl.structure.drives import LinearDrive
-from flexctrl.structure.elements import Beam, Node, PointMass, Rope
 from flexctrl.structure.joints import Joint, Pin, Support
+from flexctrl.structure.lines import Rope
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.sections import STEEL, Section
 from flexctrl.structure.signals import (
     DriveAngle,

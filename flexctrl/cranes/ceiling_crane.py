@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.structure.elements import Beam
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.joints import Pin, Support
 from flexctrl.structure.sections import Section
 from flexctrl.structure.signals import Force, Position

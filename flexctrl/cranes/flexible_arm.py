@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass
 from flexctrl.structure.drives import RotaryDrive
-from flexctrl.structure.elements import Beam, PointMass
 from flexctrl.structure.joints import Hinge, Pin, Support
 from flexctrl.structure.sections import Material, Section
 from flexctrl.structure.signals import DriveAngle, DriveSpeed, MotorTorque, Output, Position, Rotation

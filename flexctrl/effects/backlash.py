@@ -10,7 +10,7 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.places import by_place, check_large, not_negative
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.drives import Winch
-from flexctrl.structure.elements import Spring
+from flexctrl.structure.lines import Spring
 from flexctrl.structure.structure import Structure
 
 

@@ -9,8 +9,9 @@ from typing import TypeGuard
 from flexctrl.effects.effect import Inner
 from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.errors import StructureError
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Beam, Part
+from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 

@@ -11,9 +11,11 @@ from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.beam import BeamForce, BeamMotion, elastic_force, strain_energy, stresses
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion, rope_energy, shaft_energy, shaft_force, spring_tension
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
-from flexctrl.structure.elements import Beam, Part, Rope
+from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import listed
+from flexctrl.structure.lines import Rope
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -8,8 +8,9 @@ from typing import ClassVar
 
 from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.structure.elements import Part, Rope
+from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import listed
+from flexctrl.structure.lines import Rope
 from flexctrl.structure.structure import Structure
 
 

@@ -11,9 +11,10 @@ from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.places import by_place, not_negative
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Beam, Node
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.freedoms import Vector, check_finite, parse_point
 from flexctrl.structure.naming import node_of
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.structure import Structure
 
 

@@ -23,9 +23,10 @@ from flexctrl.model.laws.frictions import inner_freedoms
 from flexctrl.model.laws.gusts import check_gusts, idle_gusts
 from flexctrl.model.linkages.mobility import motion_of
 from flexctrl.model.model import Model
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.cut import cut_ropes
-from flexctrl.structure.elements import Beam, Rope
 from flexctrl.structure.freedoms import listed
+from flexctrl.structure.lines import Rope
 from flexctrl.structure.relations import Group
 from flexctrl.structure.signals import Tension
 from flexctrl.structure.structure import Structure

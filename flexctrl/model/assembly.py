@@ -13,8 +13,11 @@ from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, to_space
 from flexctrl.mechanics.modal_matrices import modal_matrices
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.motion import Motion
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.drives import Drive, RotaryDrive
-from flexctrl.structure.elements import Beam, Part, PointMass, RigidBody, Rope, Spring
+from flexctrl.structure.elements import Part
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
 
 Block = tuple[np.ndarray, np.ndarray]

@@ -21,7 +21,7 @@ from flexctrl.model.laws.part_kinds import rope_pull, spring_pull
 from flexctrl.model.model import Model
 from flexctrl.model.signals import winch_tension
 from flexctrl.structure.drives import Winch
-from flexctrl.structure.elements import Rope, Spring
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,

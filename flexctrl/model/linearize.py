@@ -18,7 +18,7 @@ from flexctrl.model.model import Model
 from flexctrl.model.stability import without_energy
 from flexctrl.model.state import State
 from flexctrl.model.tangents import TURNS, tangents
-from flexctrl.structure.elements import Beam
+from flexctrl.structure.beams import Beam
 
 _BALANCED, _ROUND_OFF = 1e-6, 1e-12
 

@@ -30,8 +30,9 @@ from flexctrl.model.motion import Motion
 from flexctrl.model.signals import Signals, signals_of
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Part, Spring
+from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import check_finite
+from flexctrl.structure.lines import Spring
 from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.consistent import extent
 from flexctrl.model.state import State
-from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import parse_point
+from flexctrl.structure.nodes import Node
 
 if TYPE_CHECKING:
     from flexctrl.model.model import Model

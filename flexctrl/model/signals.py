@@ -22,7 +22,7 @@ from flexctrl.model.laws.part_kinds import rope_pull, spring_pull
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
-from flexctrl.structure.elements import Rope, Spring
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,

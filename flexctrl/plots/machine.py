@@ -18,10 +18,13 @@ from flexctrl.mechanics.clamped_modes import clamped_shapes
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.drives import RotaryDrive, Winch
-from flexctrl.structure.elements import Beam, Part, PointMass, RigidBody, Rope, Spring
+from flexctrl.structure.elements import Part
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Hinge, Joint, Pin, Slide, Support, Weld, main_axis
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
 
 _NAMES = "xyz"

@@ -14,7 +14,8 @@ from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.plots.machine import Drawn, add_machine_axes, bent_of, best_plane, draw_deformed, draw_machine, seen
 from flexctrl.plots.style import FLEXIBLE, INK, new_figure
-from flexctrl.structure.elements import Part, PointMass, RigidBody
+from flexctrl.structure.bodies import PointMass, RigidBody
+from flexctrl.structure.elements import Part
 from flexctrl.structure.structure import Structure
 
 __all__ = ["model_figure", "rest_figure", "structure_figure"]

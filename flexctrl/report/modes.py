@@ -9,7 +9,7 @@ import numpy as np
 from flexctrl.linear.modes import Modes
 from flexctrl.plots.machine import Drawn, Pose, axis_curve, bent_of, seen
 from flexctrl.plots.modes import mode_label, mode_pose
-from flexctrl.structure.elements import Beam
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.structure import Structure
 
 __all__ = ["animation"]

@@ -26,10 +26,14 @@ from flexctrl.scene.reading import (
     vector,
     whole,
 )
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.drives import LinearDrive, RotaryDrive, Winch
-from flexctrl.structure.elements import Beam, Node, Part, PointMass, RigidBody, Rope, Spring
+from flexctrl.structure.elements import Part
 from flexctrl.structure.joints import Hinge, Pin, Slide, Support, Weld
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.naming import node_of
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.sections import STEEL, Material, Section
 from flexctrl.structure.signals import (
     AngularVelocity,

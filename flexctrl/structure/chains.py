@@ -9,9 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Beam, Node
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.freedoms import check_finite, check_whole, parse_direction, parse_point
 from flexctrl.structure.joints import Weld
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.sections import Section
 
 __all__ = ["BeamChain", "arc"]

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Hinge, Slide
 from flexctrl.structure.naming import node_of
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.structure import Structure
 
 __all__ = ["Contact", "MotorSide", "Sliding", "Spinning", "Turning", "contact_of"]

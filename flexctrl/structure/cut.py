@@ -9,10 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Node, Rope
 from flexctrl.structure.freedoms import FREEDOMS
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Joint, Pin, Support
+from flexctrl.structure.lines import Rope
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.refine import with_nodes
 from flexctrl.structure.signals import Output, Tension
 from flexctrl.structure.structure import Structure

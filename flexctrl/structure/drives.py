@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Node, check_length, check_node
 from flexctrl.structure.freedoms import Vector, check_finite, check_name, parse_direction
+from flexctrl.structure.nodes import Node, check_length, check_node
 
 
 @dataclass(frozen=True)

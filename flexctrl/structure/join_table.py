@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError
 from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector, check_whole, listed, numbers
 from flexctrl.structure.joints import Joint, main_axis
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.relations import Copy, Follow, Group, Ride, Track, Turn
 from flexctrl.structure.ties import tie
 

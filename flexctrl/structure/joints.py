@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Node, check_node
 from flexctrl.structure.freedoms import (
     ALL,
     FREEDOMS,
@@ -17,6 +16,7 @@ from flexctrl.structure.freedoms import (
     parse_direction,
     parse_freedoms,
 )
+from flexctrl.structure.nodes import Node, check_node
 
 
 def _check_nodes(kind: str, *nodes: Node) -> None:

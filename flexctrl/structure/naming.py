@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.structure.elements import Beam, Node, Part, PointMass, RigidBody
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass, RigidBody
+from flexctrl.structure.elements import Part
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.trolleys import Trolley
 
 

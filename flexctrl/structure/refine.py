@@ -8,8 +8,10 @@ from math import gcd
 from typing import Any, TypeVar
 
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.structure.elements import Beam, Node, Rope
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.join_table import JoinTable
+from flexctrl.structure.lines import Rope
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.structure import Structure
 
 T = TypeVar("T")

@@ -8,8 +8,9 @@ from typing import TypeAlias
 
 from flexctrl.errors import StructureError, shortened
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
-from flexctrl.structure.elements import Node, Rope, Spring, check_node
 from flexctrl.structure.freedoms import ROTATIONS, Vector, check_signal, parse_direction
+from flexctrl.structure.lines import Rope, Spring
+from flexctrl.structure.nodes import Node, check_node
 
 _DRIVES = (RotaryDrive, LinearDrive, Winch)
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.drives import Drive, RotaryDrive, Winch
-from flexctrl.structure.elements import Node, Rope, Spring
 from flexctrl.structure.freedoms import FREEDOMS
 from flexctrl.structure.join_table import JoinTable, Row, drive_row
 from flexctrl.structure.joints import Hinge, Slide, Support, Weld
+from flexctrl.structure.lines import Rope, Spring
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.signals import (
     AngularVelocity,
     DriveAngle,

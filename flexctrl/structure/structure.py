@@ -10,11 +10,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError, did_you_mean, shortened
+from flexctrl.structure.bodies import RigidBody
 from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Node, Part, RigidBody, check_node
+from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import FREEDOMS, TRAVEL, check_name, listed, parse_direction
 from flexctrl.structure.join_table import JoinTable, join
 from flexctrl.structure.joints import Joint, Support, main_axis
+from flexctrl.structure.nodes import Node, check_node
 from flexctrl.structure.relations import Group, Track
 from flexctrl.structure.signals import Input, Output
 from flexctrl.structure.soundness import COINCIDE, check_sound

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flexctrl.errors import StructureError
-from flexctrl.structure.elements import Node
 from flexctrl.structure.freedoms import Vector
 from flexctrl.structure.joints import Hinge, Joint, Slide, Support, main_axis
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.relations import (
     Closure,
     Copy,

@@ -9,11 +9,14 @@ from itertools import pairwise
 import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass
 from flexctrl.structure.chains import BeamChain
 from flexctrl.structure.drives import Drive, Winch
-from flexctrl.structure.elements import Beam, Node, Part, PointMass
+from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import TRANSLATIONS, TRAVEL, check_finite, check_name
 from flexctrl.structure.joints import Joint, Support, Weld
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.relations import Track
 from flexctrl.structure.signals import Force, Input, Output, Position, SwayAngle, Velocity
 

@@ -18,8 +18,10 @@ from flexctrl.effects.flexibility import BeamFlexibility, Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import ControllerError, StructureError
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
-from flexctrl.structure.elements import Beam, Part, Rope, Spring
+from flexctrl.structure.elements import Part
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
 from flexctrl.study.subject import Subject
 

@@ -16,8 +16,9 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Deforming, ShaftElasticity
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive
-from flexctrl.structure.elements import Beam, Part
+from flexctrl.structure.elements import Part
 from flexctrl.structure.refine import coarsen, refine
 from flexctrl.structure.structure import Structure
 from flexctrl.study.subject import Subject

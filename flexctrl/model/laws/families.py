@@ -13,8 +13,10 @@ from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch
 from flexctrl.mechanics.matrices import beam_mass, bending, coupling, plane_masses
 from flexctrl.model.laws import part_kinds
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
+from flexctrl.structure.beams import Beam
+from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
-from flexctrl.structure.elements import Beam, PointMass, RigidBody, Rope, Spring
+from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
 
 

@@ -16,7 +16,8 @@ from flexctrl.effects.backlash import gaps_of
 from flexctrl.model.laws.loose_kinds import loose_names
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
-from flexctrl.structure.elements import Node, Rope, Spring
+from flexctrl.structure.lines import Rope, Spring
+from flexctrl.structure.nodes import Node
 from flexctrl.structure.trolleys import Trolley
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from flexctrl.model.laws.families import Family, drives_family, lines_family
 from flexctrl.model.laws.kinds import Kind, Shares
 from flexctrl.model.laws.part_kinds import drive_shares, spring_pull
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive
-from flexctrl.structure.elements import Spring
+from flexctrl.structure.lines import Spring
 from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:
