@@ -114,6 +114,7 @@ class Stepper:
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
+        self.memory = None
         if memory is not None:
             self._factor(memory)
 

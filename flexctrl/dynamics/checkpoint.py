@@ -25,7 +25,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
 
-_FORMAT = 3
+_FORMAT = 4
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
@@ -62,7 +62,13 @@ class Checkpoint:
         Where the run began.
     sides, sizes : numpy.ndarray
         Of the gauges of events.
+    span : int
+        Steps taken at once before it is looked at whether an event has happened.
     counts : Counts
+    told : float
+        Events up to this time have been told [s].
+    balked : bool
+        Whether the next step is to be taken by itself.
     """
 
     machine: str
@@ -78,7 +84,10 @@ class Checkpoint:
     first: np.ndarray
     sides: np.ndarray
     sizes: np.ndarray
+    span: int
     counts: Counts
+    told: float
+    balked: bool
 
     @property
     def t(self) -> float:

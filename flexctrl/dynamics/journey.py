@@ -13,6 +13,7 @@ import numpy as np
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Curve, Track
+from flexctrl.dynamics.ending import ends_before
 from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
@@ -21,10 +22,11 @@ from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.midpoint import ConservingMidpoint
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
-from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Joining, Mark, Point, StepError, Stepper
+from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Joining, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
 from flexctrl.model.model import Model
+from flexctrl.model.state import State
 
 __all__ = ["SMALLEST", "Journey", "Plan"]
 
@@ -85,6 +87,10 @@ class Journey:
     rows : Rows
     track : Track
     mark : Mark
+    told : float
+        Events up to this time have been told by the run that this one goes on from [s].
+    balked : bool
+        Whether many steps at once have just ended before one that is to be taken by itself.
     """
 
     plan: Plan
@@ -101,15 +107,18 @@ class Journey:
     message: str = ""
     fault: BaseException | None = None
     notes: tuple[str, ...] = ()
+    told: float = -math.inf
+    balked: bool = False
     saved: Checkpoint | None = None
     _memory: Any = None
+    _counts: Counts = field(default_factory=Counts)
     _told: float = 0.0
     _kept: float = 0.0
     _seen: tuple[int, float] = (0, 0.0)
 
     def travel(self) -> None:
         """Go on to the end, or as far as it goes."""
-        self._memory = self.stepper.memory
+        self._pause()
         try:
             with Interruption() as interruption:
                 self._through_stops(interruption)
@@ -130,7 +139,6 @@ class Journey:
         return 1e-12 * self.plan.until
 
     def _through_stops(self, interruption: Interruption) -> None:
-        step = self._fixed if isinstance(self.plan.method.pace, Fixed) else self._controlled
         end, self._told = self.plan.until - self._tick, time.perf_counter()
         self._kept = self._told
         while self.status is Status.FINISHED:
@@ -139,10 +147,10 @@ class Journey:
                 return
             if stop - t <= self._tick:
                 self._renew(stop)
+                self._pause()
                 continue
-            if not ride(self):
-                step(stop, self.plan.until)
-            self._memory = self.stepper.memory
+            self.go(stop, self.plan.until)
+            self._pause()
             if self.books.overflown:
                 where = f"at t = {self.point.state.t:.6g} s; look at the commands and at the start"
                 raise StepError(self.stepper.counts.worst, f"energies are beyond all numbers {where}")
@@ -153,6 +161,20 @@ class Journey:
                 self._told = now
                 self._report(now)
             interruption.check()
+
+    def _pause(self) -> None:
+        """Take note of what later steps depend on, and what they have cost so far."""
+        self._memory, self._counts = self.stepper.memory, replace(self.stepper.counts)
+
+    def go(self, stop: float, until: float, most: int | None = None) -> None:
+        """Go on towards a stop, by many steps at once (``most`` of them) or by one, not passing ``until``."""
+        if not self.balked and ride(self, until, most):
+            return
+        if isinstance(self.plan.method.pace, Fixed):
+            self._fixed(stop, until)
+        else:
+            self._controlled(stop, until)
+        self.balked = False
 
     @property
     def _remedy(self) -> str:
@@ -208,7 +230,10 @@ class Journey:
             self.books.first,
             self.watch.sides.copy(),
             self.watch.sizes.copy(),
-            replace(self.stepper.counts),
+            self.watch.span,
+            self._counts,
+            self.told,
+            self.balked,
         )
 
     def _renew(self, stop: float) -> None:
@@ -233,7 +258,7 @@ class Journey:
         """Note the events that a jump of the inputs has brought about; one of them may end the run."""
         watch, point = self.watch, self.point
         for crossing in watch.leaps(point):
-            self.events.append(watch.occurrence(crossing, point.state, point.supply.u))
+            self._tell(crossing, point.state, point.supply.u)
             if watch.stops(crossing.gauge):
                 name = watch.last_word(crossing.gauge)
                 self.status, self.message = Status.STOPPED, f"{name} at t = {crossing.t:.6g} s"
@@ -249,8 +274,9 @@ class Journey:
             mark.size, mark.left = (stop - t) / count if count else length, count or -1
         room = math.floor((until - t) / mark.size + _NEAR)
         if not room:
-            self.saved = self.saved or self.snapshot()
-            return self._take(until - t, stop)
+            if not ends_before(self, stop):
+                self._take(until - t, stop)
+            return
         self._take(mark.size, stop)
         if mark.left > 0:
             mark.left -= 1
@@ -289,7 +315,8 @@ class Journey:
         h = min(size, pace.largest)
         h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
         if t + h > until + self._tick:
-            self.saved = self.saved or self.snapshot()
+            if ends_before(self, stop):
+                return
             h = until - t
         why = ""
         while True:
@@ -341,7 +368,7 @@ class Journey:
         """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
         watch, curve = self.watch, self.track.curve(before, after)
         crossings = watch.crossings(curve, before, after)
-        landing = next((c for c in crossings if watch.stops(c.gauge)), None)
+        landing = next((c for c in crossings if watch.stops(c.gauge) and not self._over(c)), None)
         switch = -1 if landing is None else landing.gauge - len(watch.events)
         if 0 <= switch < len(watch.names) and self.mark.stuck >= _CHATTER:
             name = watch.names[switch]
@@ -356,13 +383,17 @@ class Journey:
         self._note(earlier, curve, before)
         watch.settle(after)
         watch.cross(landing)
-        self.events.append(watch.occurrence(landing, after.state, after.supply.u))
+        self._tell(landing, after.state, after.supply.u)
         if end := watch.last_word(landing.gauge):
             self.status, self.message = Status.STOPPED, f"{end} at t = {landing.t:.6g} s"
             return after, None
         short = landing.t - before.state.t < 1e-6 * self.mark.size
         self.mark.stuck = self.mark.stuck + 1 if short else 0
         return (after, landing) if switch >= len(watch.names) else (self._anew(after, switch), None)
+
+    def _over(self, crossing: Crossing) -> bool:
+        """Tell whether an event asked for has been told, or is beyond the end."""
+        return crossing.gauge < len(self.watch.events) and crossing.t <= self.told
 
     def _anew(self, at: Point, switch: int) -> Point:
         """Start anew under the law of force that holds from now on."""
@@ -391,7 +422,12 @@ class Journey:
     def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:
         for c in crossings:
             self.watch.cross(c)
-            self.events.append(self.watch.occurrence(c, curve.at(c.t), before.supply.u))
+            self._tell(c, curve.at(c.t), before.supply.u)
+
+    def _tell(self, crossing: Crossing, state: State, u: np.ndarray) -> None:
+        """Note an event, unless that has been done."""
+        if crossing.t > self.told:
+            self.events.append(self.watch.occurrence(crossing, state, u))
 
     def _land(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
         """Take the step again, to where a gauge is zero; where it is at once, there is none.

@@ -141,6 +141,7 @@ class _Stepper:
         """Make the factors that were in use."""
         self.massless = memory.masses is None
         self.masses = Masses(self.model, self.counts, memory.masses)
+        self.tangent = None
         if memory.tangent is not None:
             self._factor(memory.tangent)
 

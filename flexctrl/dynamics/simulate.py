@@ -222,12 +222,14 @@ def _resumed(
             )
     stepper.recall(start.memory)
     stepper.counts.take(start.counts)
-    watch.sides, watch.sizes = start.sides.copy(), start.sizes.copy()
+    watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span
     books = Books(plan.feed, start.point.state, plan.method.order)
     books.sums, books.first = replace(start.sums), start.first
     stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed)
     rows.count = start.rows
-    return Journey(plan, stepper, start.point, stops, books, watch, rows, track, replace(start.mark))
+    journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, replace(start.mark))
+    journey.told, journey.balked = start.told, start.balked
+    return journey
 
 
 def _result(journey: Journey) -> Run:

@@ -198,6 +198,9 @@ class Marcher:
                 f.z[:], m.h = place, memory.made_for
                 self._make(mass)
         m.factorisations, m.made_for = made, memory.made_for
+        if not memory.mass.size:
+            m.mass_for = 0.0
+        self._kept = (made, m.weighings), memory.tangent, memory.mass
         for name, number in zip(_HABITS, memory.numbers, strict=True):
             setattr(m, name, number)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -37,12 +38,15 @@ _SECONDS = 0.1
 _FIRST = 8
 _MORE = 256.0
 _SHARE = 0.2
+_FAR = 100.0
 _FEWEST, _WIDEST = 8, 1024
 _EVENT = -1  # how a march ends where an event may be near
 
 
-def ride(journey: Journey) -> bool:
+def ride(journey: Journey, until: float, most: int | None = None) -> bool:
     """Take as many steps of a run as can be marched, for about a tenth of a second; tell whether there were any.
+
+    They do not go beyond ``until``; where ``most`` is given, there are no more than that, all before the next stop.
 
     Between samples only, where some freedom has no mass: the march has no rule for how its place jumps.
     """
@@ -53,13 +57,12 @@ def ride(journey: Journey) -> bool:
         return False
     if plan.feed.sample_time and quasistatic(plan.model).size:
         return False
-    return _Ride(journey, stepper).go()
+    return _Ride(journey, stepper, until, most).go()
 
 
 def _near_stop(journey: Journey) -> bool:
     """Tell whether there are so few steps to the next stop that events are better looked for in each of them."""
-    plan, mark = journey.plan, journey.mark
-    return min(journey.stops.next, plan.until) - journey.point.state.t < _FEWEST * mark.size
+    return journey.stops.next - journey.point.state.t < _FEWEST * journey.mark.size
 
 
 class Begun(NamedTuple):
@@ -70,16 +73,17 @@ class Begun(NamedTuple):
     sums: Sums
     due: float
     newton: int
+    factorisations: int
     rejected: int
 
 
 class _Ride:
     """A ride under way."""
 
-    def __init__(self, journey: Journey, stepper: MarchingStepper) -> None:
+    def __init__(self, journey: Journey, stepper: MarchingStepper, until: float, most: int | None) -> None:
         j = self.journey = journey
         self.stepper, self.marcher, self.supply = stepper, stepper.marcher, j.point.supply
-        self.tick, self.until = 1e-12 * j.plan.until, j.plan.until
+        self.tick, self.until, self.most = 1e-12 * j.plan.until, until, most
         self.faults: list[ControllerError | KeyboardInterrupt] = []
         stepper.enter(j.point)
         sums = j.books.sums
@@ -98,7 +102,7 @@ class _Ride:
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
-        self.mute, self.wary = False, bool(j.watch.events)
+        self.mute, self.wary, self.balked = False, bool(j.watch.events), False
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
@@ -111,9 +115,10 @@ class _Ride:
                 continue
             if self.legs.parts and time.perf_counter() >= deadline:
                 break
-            if self.wary:
+            if self.wary or self.most:
                 well = stop - m.t > self.tick and self._leg(stop)
-            elif self._lowered(stop):
+                break
+            if self._lowered(stop):
                 well = self._told(deadline)
             elif self._even(stop):
                 well = self._samples(deadline)
@@ -127,38 +132,57 @@ class _Ride:
     def _leg(self, stop: float) -> bool:
         """Go on towards a stop; tell whether all is well."""
         t = self.marcher.march.t
-        pacing, count = self._paced(t, stop)
+        pacing, count = self._paced(t, stop, _FAR * self.until if self.wary else self.until)
         if not count:
             return False
-        status, done = self._wary(pacing, count) if self.wary else self.marcher.travel(pacing, count)
+        status, done = self._wary(pacing, count) if self.wary else self.marcher.travel(pacing, self._limited(count))
+        if isinstance(pacing, Pacing):
+            self.journey.mark.size = self.marcher.march.size
         if done:
             self._passed(Leg(self.supply, t, pacing, done), stop)
-        return status == DONE and done > 0
+        return self._well(status) and done > 0
+
+    def _limited(self, count: int) -> int:
+        return count if self.most is None else min(count, self.most)
+
+    def _well(self, status: int) -> bool:
+        """Tell whether a march ended well; the step before which it did not is then to be taken by itself."""
+        self.balked = status not in (DONE, SILENT, _EVENT)
+        return status == DONE
 
     def _wary(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
-        """Take steps up to the first one in which an event may happen; return how it ended, and how many there were."""
-        watch, begun = self.journey.watch, self._begun()
-        status, done = self.marcher.travel(pacing, min(count, watch.span))
+        """Take steps up to the first one in which an event may happen; return how it ended, and how many there were.
+
+        What is looked at does not depend on the end of the run: a run that goes on looks at the same.
+        """
+        j, watch, begun = self.journey, self.journey.watch, self._begun()
+        sizes, span = watch.sizes.copy(), watch.span
+        status, done = self.marcher.travel(pacing, min(count, span))
         calm = calm_steps(watch, begun.point, self.marcher.rows[:done], self.supply.u)
-        watch.span = min(_WIDEST, 2 * watch.span) if calm == done else max(_FEWEST, 2 * calm)
-        if calm == done:
+        watch.span = min(_WIDEST, 2 * span) if calm == done else max(_FEWEST, 2 * calm)
+        fitting = int(np.searchsorted(self.marcher.rows[:done, 0], self.until + self.tick, "right"))
+        if fitting < calm and j.saved is None:
+            j.saved = replace(j.snapshot(), sizes=sizes, span=span)
+        wanted = self._limited(min(calm, fitting))
+        if wanted == done:
             return status, done
         self._back(begun)
-        return _EVENT, self.marcher.travel(pacing, calm)[1] if calm else 0
+        return _EVENT, self.marcher.travel(pacing, wanted)[1] if wanted else 0
 
     def _begun(self) -> Begun:
         m, j = self.marcher.march, self.journey
         point = self.stepper.leave(self.supply)
         sums = self.marcher.books(j.books.sums)
-        return Begun(point, self.stepper.memory, sums, m.due, m.newton, m.rejected)
+        return Begun(point, self.stepper.memory, sums, m.due, m.newton, m.factorisations, m.rejected)
 
     def _back(self, begun: Begun) -> None:
         """Go back to where a leg started."""
         m, books = self.marcher.march, self.journey.books
         keeping, spacing = bool(m.keeping), m.spacing
+        m.factorisations = begun.factorisations
         self.stepper.recall(begun.memory)
         self.stepper.enter(begun.point)
-        m.newton, m.rejected = begun.newton, begun.rejected
+        m.newton, m.rejected, m.size = begun.newton, begun.rejected, self.journey.mark.size
         self.marcher.open(books.first, begun.sums.moved, books.dissipates)
         self.marcher.go_on(begun.sums)
         self.marcher.watch(self.journey.watch.corner_sides, begun.point.state)
@@ -188,7 +212,7 @@ class _Ride:
         m, (sampling, law) = marcher.march, marcher.heed(j.plan.feed)
         law.pace, law.last, law.nearly = self.pace, self.until + self.tick, self.until - self.tick
         law.room = marcher.room
-        paced = self.pace or self._paced(m.t, math.inf)[0]
+        paced = self.pace or self._paced(m.t, math.inf, self.until)[0]
         pacing = paced if isinstance(paced, Pacing) else None
         status, wanted, done = DONE, _FIRST, 1
         while status == DONE and done and self._ahead:
@@ -208,7 +232,7 @@ class _Ride:
         if m.jumping:
             self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
             m.jumping = 0
-        return self.mute or (status == DONE and self.jumped and done > 0)
+        return self.mute or (self._well(status) and self.jumped and done > 0)
 
     def _enter_told(self, law: Packed, sampling: Sampling, pacing: Pacing | None) -> None:
         """Enter samples in marks and rows."""
@@ -293,19 +317,19 @@ class _Ride:
             self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
             m.jumping = 0
             mark.left = 0
-        return status == DONE and self.jumped and not self.faults
+        return self._well(status) and self.jumped and not self.faults
 
-    def _paced(self, t: float, stop: float) -> tuple[float | Pacing, int]:
+    def _paced(self, t: float, stop: float, until: float) -> tuple[float | Pacing, int]:
         """How steps are taken from here, and how many at most."""
         plan, mark = self.journey.plan, self.journey.mark
         pace, room = plan.method.pace, self.marcher.room
         if isinstance(pace, Controlled):
             tolerance = plan.tolerance
-            return Pacing(mark.size, pace.largest, stop, self.until, tolerance.relative, tolerance.absolute), room
+            return Pacing(mark.size, pace.largest, stop, until, tolerance.relative, tolerance.absolute), room
         if not mark.left:
             count = max(1, math.ceil((stop - t) / pace.step - 1e-6)) if math.isfinite(stop) else 0
             mark.size, mark.left = (stop - t) / count if count else pace.step, count or -1
-        room = min(room, math.floor((self.until - t) / mark.size + _NEAR))
+        room = min(room, math.floor((until - t) / mark.size + _NEAR))
         return mark.size, room if mark.left < 0 else min(room, mark.left)
 
     def _passed(self, leg: Leg, stop: float) -> None:
@@ -314,8 +338,6 @@ class _Ride:
         self.legs.parts.append(leg)
         mark.steps += leg.steps
         mark.left -= leg.steps if mark.left > 0 else 0
-        if isinstance(leg.pacing, Pacing):
-            mark.size = marcher.march.size
         to_jump = stop - marcher.march.t <= self.tick
         if self.weaver is not None:
             inputs = np.tile(leg.supply.u, (leg.steps + 1, 1))
@@ -329,6 +351,8 @@ class _Ride:
         """Take a sample and let the inputs jump."""
         j, m = self.journey, self.marcher.march
         m.t = stop
+        if abs(self.last.t - stop) < self.tick:
+            self.last = self.last.with_(t=stop)
         j.stops.passed += 1
         j.mark.left = 0
         y = self.marcher.rows[m.done - 1, 1:]
@@ -357,6 +381,7 @@ class _Ride:
         j.mark.rejected += m.rejected - self.rejected
         if not self.legs.parts:
             return False
+        j.balked = self.balked
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)
