@@ -13,7 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, did_you_mean
-from flexctrl.linear.model import LinearModel, PartMatrices
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.parts import PartMatrices
 
 __all__ = ["Units", "load_mat", "load_units", "save_mat"]
 

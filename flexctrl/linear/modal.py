@@ -11,8 +11,9 @@ import scipy.sparse as sp
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled, static_response
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, ROUND_OFF, Modes, refuse_unsymmetric
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.pattern import symmetric, with_entries
+from flexctrl.linear.undamped import COMPLETE, ROUND_OFF, refuse_unsymmetric
 
 __all__ = ["ModalSystem", "Relaxation", "modal_damping", "modal_system", "proper", "rayleigh"]
 

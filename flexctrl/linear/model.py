@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, StructureError, did_you_mean
 from flexctrl.linear.parts import PartMatrices, projected_parts
+from flexctrl.linear.place import Place
 
 if TYPE_CHECKING:
     import control
@@ -29,54 +30,7 @@ if TYPE_CHECKING:
     from flexctrl.linear.response import FrequencyResponse
     from flexctrl.linear.statespace import Form
 
-__all__ = ["LinearModel", "PartMatrices", "Place"]
-
-
-Shape = TypeVar("Shape")
-
-
-class Elastic(Protocol):
-    """A machine that can tell its stiffness along some motions better than a matrix of doubles holds it."""
-
-    def strain(self, state: Any, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
-        """Return ΦᵀKΦ of motions Φ, shape (n, k), about a state under inputs u."""
-
-
-Machine = TypeVar("Machine", bound=Elastic)
-
-
-@dataclass(frozen=True, eq=False)
-class Place(Generic[Machine, Shape]):
-    """The machine that a linear model is of: for drawing its modes.
-
-    Attributes
-    ----------
-    model : Model
-    state : State
-        The equilibrium.
-    basis : scipy.sparse.csc_matrix, shape (model.n, n)
-        Displacements of the machine's degrees of freedom for one of each coordinate.
-    inputs : numpy.ndarray, shape (inputs,)
-        What it is in equilibrium with.
-    """
-
-    model: Machine
-    state: Shape
-    basis: sp.csc_matrix
-    inputs: np.ndarray
-
-    def strain(self, shapes: np.ndarray) -> np.ndarray:
-        """Return ΦᵀKΦ of displacements of the coordinates, from the machine itself.
-
-        Parameters
-        ----------
-        shapes : numpy.ndarray, shape (n, k)
-
-        Returns
-        -------
-        numpy.ndarray, shape (k, k)
-        """
-        return self.model.strain(self.state, self.inputs, self.basis @ shapes)
+__all__ = ["LinearModel"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,14 +189,14 @@ class LinearModel:
         return condense(self)
 
     def modes(self, count: int | None = None) -> Modes:
-        """Undamped modes, lowest first; see :func:`flexctrl.linear.modes.modes`.
+        """Undamped modes, lowest first; see :func:`flexctrl.linear.undamped.modes`.
 
         Parameters
         ----------
         count : int, optional
             How many; left out: all of them up to 1000 coordinates, the 20 lowest beyond.
         """
-        from flexctrl.linear.modes import modes
+        from flexctrl.linear.undamped import modes
 
         return modes(self, count)
 
@@ -352,7 +306,7 @@ class LinearModel:
     @cached_property
     def _every_mode(self) -> Modes:
         from flexctrl.linear.condense import scaled
-        from flexctrl.linear.modes import modes_of
+        from flexctrl.linear.undamped import modes_of
 
         return modes_of(self, scaled(self), None)
 

@@ -11,8 +11,9 @@ from flexctrl.errors import LinearizationError
 from flexctrl.linear.condense import Scaled, scaled
 from flexctrl.linear.modal import ModalSystem, modal_damping
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, Modes, modes_of
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.statespace import first_order
+from flexctrl.linear.undamped import COMPLETE, modes_of
 
 __all__ = ["damped_poles", "second_order_roots"]
 

@@ -11,9 +11,9 @@ import numpy as np
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE
 from flexctrl.linear.poles import second_order_roots
 from flexctrl.linear.transfer import routed, transfer
+from flexctrl.linear.undamped import COMPLETE
 from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:

@@ -13,9 +13,10 @@ from flexctrl.linear.free_motion import with_free_motion_apart
 from flexctrl.linear.modal import ModalSystem, rayleigh
 from flexctrl.linear.modal_sum import divided, modal_sum, outer
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, DEFAULT_COUNT, Modes, modes_of
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.pencil import Pencil
 from flexctrl.linear.sampled import sampled_transfer
+from flexctrl.linear.undamped import COMPLETE, DEFAULT_COUNT, modes_of
 
 __all__ = ["Transfer", "direct_transfer", "modal_transfer", "residual_transfer", "routed", "transfer"]
 

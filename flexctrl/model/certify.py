@@ -13,9 +13,10 @@ from flexctrl.errors import LinearizationError
 from flexctrl.linear.certificate import Certificate
 from flexctrl.linear.eigen import RIGID_NOISE, stiffness_noise
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import EXTENDED_EPS, UNSEEN, UNSURE, Modes
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.pattern import symmetric
 from flexctrl.linear.pencil import EPS
+from flexctrl.linear.undamped import EXTENDED_EPS, UNSEEN, UNSURE
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
 

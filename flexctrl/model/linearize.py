@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, MechanismError, StructureError, shortened
-from flexctrl.linear.model import LinearModel, Place
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.place import Place
 from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
 from flexctrl.model.certify import certify, taylor_slope

@@ -9,8 +9,8 @@ from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.wind import Wind
 from flexctrl.linear.growth import growing
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import ROUND_OFF
 from flexctrl.linear.pattern import asymmetry, symmetric
+from flexctrl.linear.undamped import ROUND_OFF
 from flexctrl.model.balance import Balance
 from flexctrl.model.model import Model
 from flexctrl.model.state import State

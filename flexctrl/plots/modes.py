@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from flexctrl.linear.model import Place
 from flexctrl.linear.modes import Modes
+from flexctrl.linear.place import Place
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.plots.machine import Drawn, add_machine_axes, bent_of, best_plane, draw_deformed
 from flexctrl.plots.style import CYCLE, INK, PALE, new_figure, tidy

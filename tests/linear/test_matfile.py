@@ -10,7 +10,8 @@ from scipy.io import loadmat, savemat
 
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.matfile import Units, load_units
-from flexctrl.linear.model import LinearModel, PartMatrices
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.parts import PartMatrices
 
 
 def machine() -> LinearModel:

@@ -11,7 +11,8 @@ from fixtures import structures as s
 from flexctrl.errors import LinearizationError, MechanismError, StructureError
 from flexctrl.linear import eigen
 from flexctrl.linear.krylov import _orthonormal
-from flexctrl.linear.model import LinearModel, PartMatrices
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.parts import PartMatrices
 
 CLAMPED_FREE = np.array([1.87510406871, 4.69409113297, 7.85475743824, 10.9955407349, 14.1371683910])
 FREE_FREE = np.array([4.73004074486, 7.8532046241, 10.9956078380, 14.1371654913])

@@ -14,7 +14,8 @@ from plants import chain, crane, plant
 import flexctrl as fc
 from flexctrl.design import ControllerError, pd
 from flexctrl.errors import StructureError
-from flexctrl.linear.model import LinearModel, PartMatrices
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.parts import PartMatrices
 from flexctrl.study.confirm import Confirmation
 from flexctrl.study.gain_family import GainFamily, first_crossing, gain_family
 from flexctrl.study.loop import open_loop

@@ -10,12 +10,13 @@ from scipy.linalg import block_diag, eig, eigvals, schur, solve_sylvester
 
 from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, Modes
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.reduction.gramian import Balanced, balance
 from flexctrl.linear.reduction.low_frequency import low_frequency, undamped, unsymmetric
 from flexctrl.linear.reduction.modal import modal_model
 from flexctrl.linear.reduction.states import ReducedStates, Triple
 from flexctrl.linear.statespace import FirstOrder, modal_first_order
+from flexctrl.linear.undamped import COMPLETE
 
 __all__ = ["BalancedTruncation", "hankel_singular_values"]
 

@@ -13,12 +13,13 @@ from scipy.optimize import minimize_scalar
 from flexctrl.errors import ReductionError, StructureError, shortened
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, Modes
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.poles import second_order_roots
 from flexctrl.linear.reduction.low_frequency import low_frequency, nearest_modes, rigid_basis, undamped
 from flexctrl.linear.reduction.modal import ModalTruncation
 from flexctrl.linear.response import response_span
 from flexctrl.linear.transfer import Transfer, transfer
+from flexctrl.linear.undamped import COMPLETE
 from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import ROUND_OFF, Modes
+from flexctrl.linear.modes import Modes
+from flexctrl.linear.undamped import ROUND_OFF
 
 __all__ = [
     "LowFrequency",

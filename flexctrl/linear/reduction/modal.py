@@ -9,10 +9,11 @@ import scipy.sparse as sp
 
 from flexctrl.errors import ReductionError
 from flexctrl.linear.model import LinearModel
-from flexctrl.linear.modes import COMPLETE, Modes
+from flexctrl.linear.modes import Modes
 from flexctrl.linear.reduction.low_frequency import undamped, unsymmetric
 from flexctrl.linear.reduction.result import ReducedModel, corrected
 from flexctrl.linear.reduction.selection import BelowFrequency, Lowest, Selection
+from flexctrl.linear.undamped import COMPLETE
 
 __all__ = ["ModalTruncation"]
 

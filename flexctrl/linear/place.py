@@ -1,0 +1,57 @@
+"""Where a linear model comes from: the machine, its state, and what displacements its coordinates stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+
+__all__ = ["Place"]
+
+Shape = TypeVar("Shape")
+
+
+class Elastic(Protocol):
+    """A machine that can tell its stiffness along some motions better than a matrix of doubles holds it."""
+
+    def strain(self, state: Any, u: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of motions Φ, shape (n, k), about a state under inputs u."""
+
+
+Machine = TypeVar("Machine", bound=Elastic)
+
+
+@dataclass(frozen=True, eq=False)
+class Place(Generic[Machine, Shape]):
+    """The machine that a linear model is of: for drawing its modes, and for stiffnesses to more digits.
+
+    Attributes
+    ----------
+    model : Model
+    state : State
+        The equilibrium.
+    basis : scipy.sparse.csc_matrix, shape (model.n, n)
+        Displacements of the machine's degrees of freedom for one of each coordinate.
+    inputs : numpy.ndarray, shape (inputs,)
+        What it is in equilibrium with.
+    """
+
+    model: Machine
+    state: Shape
+    basis: sp.csc_matrix
+    inputs: np.ndarray
+
+    def strain(self, shapes: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of displacements of the coordinates, from the machine itself.
+
+        Parameters
+        ----------
+        shapes : numpy.ndarray, shape (n, k)
+
+        Returns
+        -------
+        numpy.ndarray, shape (k, k)
+        """
+        return self.model.strain(self.state, self.inputs, self.basis @ shapes)
