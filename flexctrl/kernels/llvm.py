@@ -32,7 +32,7 @@ _lock = threading.Lock()
 _codes: dict[str, Code] = {}
 _numbers = itertools.count()
 _PASSES = (
-    *("sroa", "instruction_combine", "simplify_cfg", "new_gvn", "loop_rotate", "simplify_cfg"),
+    *("always_inliner", "sroa", "instruction_combine", "simplify_cfg", "new_gvn", "loop_rotate", "simplify_cfg"),
     "dead_code_elimination",
 )
 """What loops need that are written with vectors already: a tenth of the time that LLVM's own choice takes."""

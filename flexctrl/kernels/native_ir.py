@@ -19,6 +19,9 @@ from typing import Any
 from flexctrl.kernels.native_expressions import Expressions
 from flexctrl.kernels.native_types import VECTORS, ZERO, Value, llvm_type, signature
 
+_SHORT = 150
+"""Lines of assembly without branches that are put where they are called."""
+
 
 class Translation(Expressions):
     """A function and its statements."""
@@ -39,9 +42,16 @@ class Translation(Expressions):
         self._body(tree.body)
         self._put(f"ret {llvm_type(self.result)} {ZERO[llvm_type(self.result)]}")
         slots = [f"  {slot.text} = alloca {llvm_type(slot.type)}" for slot in self.slots.values()]
-        hurry = " noinline optnone" if hasattr(self.function, "seldom") else ""
-        top = f"define internal {llvm_type(self.result)} @{self.function.__name__}({', '.join(heads)}){hurry} {{"
+        top = f"define internal {llvm_type(self.result)} @{self.function.__name__}({', '.join(heads)}){self._hurry} {{"
         return "\n".join([top, *slots, *self.lines, "}"])
+
+    @property
+    def _hurry(self) -> str:
+        """How the code is made: in no time where it runs seldom, in the place of its calls where it is short."""
+        if hasattr(self.function, "seldom"):
+            return " noinline optnone"
+        straight = not any(line.startswith("  br ") for line in self.lines)
+        return " alwaysinline" if straight and len(self.lines) <= _SHORT else ""
 
     def _go(self, label: str) -> None:
         """Jump, and go on in a block that nothing reaches."""

@@ -7,6 +7,7 @@ is that axes that meet in a piece have turned against each other.
 from __future__ import annotations
 
 from flexctrl.dynamics.march.record import Factors
+from flexctrl.kernels.eights import eight, largest
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.flat import Flat
@@ -49,17 +50,20 @@ def turned_too_far(axes: Axes, factors: Factors, f: Flat, most: float) -> bool:
 
 def since(R: Reals, made: Reals, turned: Reals) -> None:
     """Work out R madeᵀ."""
-    for i in range(3):
-        for j in range(3):
-            turned[3 * i + j] = R[3 * i] * made[3 * j] + R[3 * i + 1] * made[3 * j + 1] + R[3 * i + 2] * made[3 * j + 2]
+    turned[0] = R[0] * made[0] + R[1] * made[1] + R[2] * made[2]
+    turned[1] = R[0] * made[3] + R[1] * made[4] + R[2] * made[5]
+    turned[2] = R[0] * made[6] + R[1] * made[7] + R[2] * made[8]
+    turned[3] = R[3] * made[0] + R[4] * made[1] + R[5] * made[2]
+    turned[4] = R[3] * made[3] + R[4] * made[4] + R[5] * made[5]
+    turned[5] = R[3] * made[6] + R[4] * made[7] + R[5] * made[8]
+    turned[6] = R[6] * made[0] + R[7] * made[1] + R[8] * made[2]
+    turned[7] = R[6] * made[3] + R[7] * made[4] + R[8] * made[5]
+    turned[8] = R[6] * made[6] + R[7] * made[7] + R[8] * made[8]
 
 
 def apart(a: Reals, b: Reals) -> float:
     """Return the largest difference of the entries of two rotations."""
-    most = 0.0
-    for i in range(9):
-        most = max(most, abs(a[i] - b[i]))
-    return most
+    return max(largest(abs(eight(a) - eight(b))), abs(a[8] - b[8]))
 
 
 def tilt(a: Reals) -> float:

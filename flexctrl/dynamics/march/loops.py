@@ -173,8 +173,6 @@ def fixed(m: March) -> int:
         status = leap(m) if m.leap.modes > 0 else step(m)
         if status != DONE:
             return status
-        if m.leap.modes == 0:
-            judge(m)
         place(m.flat)
         if m.watching == 1 and passes(m.corners, m.flat):
             if m.leap.modes > 0:

@@ -107,7 +107,6 @@ def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) ->
         tangent(m.flat, on_place, on_rate, on_acceleration, m.entries)
 
 
-@seldom
 def foremost(m: March) -> int:
     """Return the degree of freedom with the largest correction in the last iteration, or one that is not finite."""
     f = m.flat
