@@ -7,7 +7,8 @@ from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
 from flexctrl.errors import SceneError
 from flexctrl.scene import load_scene
-from flexctrl.study.ledger import Entry, Ledger, ledger
+from flexctrl.study.bookkeeping import ledger
+from flexctrl.study.ledger import Entry, Ledger
 
 
 def answer(request: Request) -> Answer:

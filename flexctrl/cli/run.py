@@ -12,7 +12,8 @@ from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.model.model import Model
-from flexctrl.plots.machine import add_machine_axes, draw_deformed, pose_of
+from flexctrl.plots.machine import add_machine_axes, draw_deformed
+from flexctrl.plots.pose import pose_of
 from flexctrl.plots.run import comparison_curves, panels, run_curves, units
 from flexctrl.plots.style import FLEXIBLE
 from flexctrl.scene import Scene, load_scene

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,9 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
 
-from flexctrl.mechanics.clamped_modes import clamped_shapes
 from flexctrl.model.model import Model
-from flexctrl.model.state import State
+from flexctrl.plots.pose import Drawn, Pose, axis_curve, posed, seen
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.bodies import PointMass, RigidBody
@@ -36,115 +34,6 @@ _SYMBOLS: dict[type, tuple[str, str, float, str]] = {
     Hinge: ("hinge", "o", 8.0, "#fde68a"),
     Slide: ("slide", "D", 6.0, "#bfdbfe"),
 }
-
-
-class Pose(Protocol):
-    """Where the nodes are and how they have turned: a `State`."""
-
-    @property
-    def x(self) -> np.ndarray: ...
-
-    @property
-    def R(self) -> np.ndarray: ...
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """The pose of a structure as it is drawn.
-
-    Attributes
-    ----------
-    x, R : numpy.ndarray
-        Of the nodes.
-    bent : mapping of str to numpy.ndarray, shape (elements, 2, modes)
-        Amplitudes of the component modes of beams that have them, along y and z of each element [m].
-    """
-
-    x: np.ndarray
-    R: np.ndarray
-    bent: Mapping[str, np.ndarray] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, structure: Structure) -> Drawn:
-        """Return the pose at rest."""
-        x = np.array([n.position for n in structure.nodes])
-        return seen(structure, cls(x, np.broadcast_to(np.eye(3), (len(x), 3, 3))))
-
-
-def seen(structure: Structure, pose: Pose) -> Drawn:
-    """Return the pose of a structure's nodes; those that say how far a trolley has travelled stand on it.
-
-    Parameters
-    ----------
-    structure : Structure
-    pose : State
-
-    Returns
-    -------
-    Drawn
-    """
-    count = len(structure.nodes)
-    x = pose.x[:count].copy()
-    for track in structure.tracks:
-        x[track.gauge] = x[track.node]
-    return Drawn(x, pose.R[:count], pose.bent if isinstance(pose, Drawn) else {})
-
-
-def pose_of(structure: Structure, coordinates: Sequence[str], state: State) -> Drawn:
-    """Return the pose of a state of a model, beams bent by their component modes.
-
-    Parameters
-    ----------
-    structure : Structure
-    coordinates : sequence of str
-        Of the model.
-    state : State
-        A frame of a run, say.
-
-    Returns
-    -------
-    Drawn
-    """
-    return replace(seen(structure, state), bent=bent_of(structure, coordinates, state.q))
-
-
-def bent_of(structure: Structure, coordinates: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:
-    """Return how component modes bend the beams that have them.
-
-    Parameters
-    ----------
-    structure : Structure
-    coordinates : sequence of str
-        Of the model.
-    values : numpy.ndarray, shape (n,)
-
-    Returns
-    -------
-    dict of str to numpy.ndarray, shape (elements, 2, modes)
-    """
-    value = dict(zip(coordinates, values.tolist(), strict=True))
-    found = {}
-    for beam in (e for e in structure.elements if isinstance(e, Beam)):
-        count = 0
-        while f"{beam.name}_0_y{count + 1}" in value:
-            count += 1
-        if count:
-            found[beam.name] = np.array(
-                [
-                    [[value[f"{beam.name}_{k}_{axis}{i + 1}"] for i in range(count)] for axis in "yz"]
-                    for k in range(beam.elements)
-                ]
-            )
-    return found
-
-
-def _posed(machine: Structure | Model, pose: Pose | None) -> tuple[Structure, Drawn]:
-    """A structure, and what is to be drawn of it; of a model's states that is how component modes bend beams, too."""
-    if isinstance(machine, Structure):
-        return machine, seen(machine, pose) if pose else Drawn.of(machine)
-    if isinstance(pose, State):
-        return machine.structure, pose_of(machine.structure, machine.coordinates, pose)
-    return _posed(machine.structure, pose)
 
 
 def best_plane(structure: Structure, poses: Sequence[Pose] = ()) -> tuple[int, int] | None:
@@ -277,24 +166,17 @@ def draw_machine(
     matplotlib.axes.Axes
         The same axes.
     """
-    structure, shown = _posed(machine, pose)
+    structure, shown = posed(machine, pose)
     plane = None if ax.name == "3d" else plane or best_plane(structure) or (0, 2)
     pen = Pen(ax, plane)
+    fixed = ROPE if symbols and not callable(color) else None
     for part in structure.elements:
         tint = color(part) if callable(color) else color
-        nodes = [structure.number(n) for n in part.nodes]
-        if isinstance(part, Beam):
-            pen.line(axis_curve(part, shown, nodes), color=tint, linewidth=width, solid_capstyle="round", zorder=2)
-            pen.mark(shown.x[nodes], marker="o", color=tint, markersize=2.2 + 0.4 * width, zorder=3)
-        elif isinstance(part, Rope | Spring):
-            curve = shown.x[nodes] if isinstance(part, Rope) else _zigzag(shown.x[nodes], structure.size)
-            pen.line(curve, color=ROPE if symbols and not callable(color) else tint, linewidth=0.55 * width, zorder=2)
-        else:
-            _draw_body(pen, part, shown.x[nodes], _heaviest(structure), tint)
+        _draw_part(pen, part, structure, shown, tint, width, fixed)
     for drive in structure.drives:
         if isinstance(drive, Winch):
             ends = [structure.number(n) for n in (drive.against, drive.node)]
-            pen.line(shown.x[ends], color=ROPE if symbols and not callable(color) else INK, linewidth=0.55 * width)
+            pen.line(shown.x[ends], color=fixed or INK, linewidth=0.55 * width)
     if symbols:
         _draw_symbols(pen, structure, shown)
     if numbers:
@@ -303,35 +185,19 @@ def draw_machine(
     return ax
 
 
-def axis_curve(beam: Beam, pose: Drawn, nodes: Sequence[int], points: int = 12) -> np.ndarray:
-    """Return the deflected axis: cubics through the nodes along their turned axes, and what component modes add.
-
-    Parameters
-    ----------
-    beam : Beam
-    pose : Drawn
-    nodes : sequence of int
-        Numbers of the beam's nodes.
-    points : int
-        Of each element.
-
-    Returns
-    -------
-    numpy.ndarray, shape (elements · points, 3)
-    """
-    s = np.linspace(0.0, 1.0, points)[:, None]
-    h = (2 * s**3 - 3 * s**2 + 1, s**3 - 2 * s**2 + s, -2 * s**3 + 3 * s**2, s**3 - s**2)
-    along = beam.axes[:, 0] * beam.length / beam.elements
-    pieces = [
-        h[0] * pose.x[a] + h[1] * (pose.R[a] @ along) + h[2] * pose.x[b] + h[3] * (pose.R[b] @ along)
-        for a, b in pairwise(nodes)
-    ]
-    if beam.name in pose.bent:
-        shapes = clamped_shapes(pose.bent[beam.name].shape[2], s[:, 0])
-        for k, amplitudes in enumerate(pose.bent[beam.name]):
-            across = 0.5 * (pose.R[nodes[k]] + pose.R[nodes[k + 1]]) @ beam.axes[:, 1:]
-            pieces[k] = pieces[k] + (amplitudes @ shapes).T @ across.T
-    return np.vstack(pieces)
+def _draw_part(
+    pen: Pen, part: Part, structure: Structure, pose: Drawn, color: str, width: float, rope: str | None
+) -> None:
+    """One part in its colour; ropes and springs in that of ropes if there is one."""
+    nodes = [structure.number(n) for n in part.nodes]
+    if isinstance(part, Beam):
+        pen.line(axis_curve(part, pose, nodes), color=color, linewidth=width, solid_capstyle="round", zorder=2)
+        pen.mark(pose.x[nodes], marker="o", color=color, markersize=2.2 + 0.4 * width, zorder=3)
+    elif isinstance(part, Rope | Spring):
+        curve = pose.x[nodes] if isinstance(part, Rope) else _zigzag(pose.x[nodes], structure.size)
+        pen.line(curve, color=rope or color, linewidth=0.55 * width, zorder=2)
+    else:
+        _draw_body(pen, part, pose.x[nodes], _heaviest(structure), color)
 
 
 def _zigzag(ends: np.ndarray, size: float, turns: int = 6) -> np.ndarray:
@@ -452,4 +318,4 @@ def draw_deformed(
     return ax
 
 
-__all__ = ["Drawn", "Pose", "add_machine_axes", "best_plane", "draw_deformed", "draw_machine", "pose_of", "seen"]
+__all__ = ["add_machine_axes", "best_plane", "draw_deformed", "draw_machine"]

@@ -12,7 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from flexctrl.linear.modes import Modes
 from flexctrl.linear.place import Place
 from flexctrl.mechanics.rotation import exponential
-from flexctrl.plots.machine import Drawn, add_machine_axes, bent_of, best_plane, draw_deformed
+from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed
+from flexctrl.plots.pose import Drawn, bent_of
 from flexctrl.plots.style import CYCLE, INK, PALE, new_figure, tidy
 
 _MOST_PARTS = 8

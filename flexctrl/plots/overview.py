@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 from flexctrl.mechanics.rotation import exponential, logarithm
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
-from flexctrl.plots.machine import Drawn, add_machine_axes, bent_of, best_plane, draw_deformed, draw_machine, seen
+from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed, draw_machine
+from flexctrl.plots.pose import Drawn, bent_of, seen
 from flexctrl.plots.style import FLEXIBLE, INK, new_figure
 from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.elements import Part

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from flexctrl.linear.modes import Modes
-from flexctrl.plots.machine import Drawn, Pose, axis_curve, bent_of, seen
 from flexctrl.plots.modes import mode_label, mode_pose
+from flexctrl.plots.pose import Drawn, Pose, axis_curve, bent_of, seen
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.structure import Structure
 

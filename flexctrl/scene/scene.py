@@ -29,7 +29,7 @@ from flexctrl.model.state import State
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, check_seconds
 from flexctrl.structure.naming import node_of
 from flexctrl.structure.structure import Structure
-from flexctrl.study.ledger import ledger
+from flexctrl.study.bookkeeping import ledger
 
 Signal = Callable[[float], float]
 

@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 
 import flexctrl as fc
 from flexctrl.cranes import bridge_crane, ceiling_crane, flexible_arm
-from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed, draw_machine, pose_of
+from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed, draw_machine
 from flexctrl.plots.modes import mode_label, mode_pose, modes_figure
+from flexctrl.plots.pose import pose_of
 from flexctrl.plots.run import comparison_curves, panels, run_curves, units
 from flexctrl.study.compare import Comparison
 
@@ -130,8 +131,8 @@ def test_how_far_a_trolley_has_travelled_is_drawn_nowhere():
 def test_a_beam_of_component_modes_is_drawn_bent():
     """One element, clamped at both ends: its nodes stand still, its first mode is φ₁ along the whole axis."""
     from flexctrl.mechanics.clamped_modes import clamped_shapes
-    from flexctrl.plots.machine import axis_curve
     from flexctrl.plots.modes import mode_pose
+    from flexctrl.plots.pose import axis_curve
     from flexctrl.report.modes import animation
 
     beam = fc.Beam("beam", (0, 0, 0), (2, 0, 0), fc.Section.tube(fc.STEEL, 0.05, 0.004))
