@@ -35,7 +35,7 @@ from flexctrl.dynamics.march.record import (
 from flexctrl.dynamics.march.step import blended, refactored, sloped, step, to_rate, to_v
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
-from flexctrl.model.flat.flat import clear, drive, energy, keep, load, place, pull, push
+from flexctrl.model.flat.flat import accelerate, arrive, clear, drive, energy, keep, load, place, pull, push
 from flexctrl.model.flat.fronts import factor
 from flexctrl.model.gauges import read
 
@@ -173,7 +173,7 @@ def fixed(m: March) -> int:
         status = leap(m) if m.leap.modes > 0 else step(m)
         if status != DONE:
             return status
-        place(m.flat)
+        reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
             if m.leap.modes > 0:
                 back(m)
@@ -226,7 +226,7 @@ def controlled(m: March) -> int:
             again = True
             continue
         again = False
-        place(m.flat)
+        reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
             return CORNER
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
@@ -317,6 +317,8 @@ def accept(m: March) -> None:
     enter(m)
     note(m)
     m.done += 1
+    if m.swift < 0:
+        m.swift = 1 if m.swift == -1 else m.swift + 1
 
 
 def follow(m: March) -> None:
@@ -361,7 +363,8 @@ def enter(m: March) -> None:
     m.gained += total(work)
     due = drawn_now(m)
     if m.losing == 1 or due:
-        drive(f)
+        if m.swift != 1:
+            drive(f)
         if m.leap.modes == 0 or due:
             energy(f)
     if m.leap.modes > 0:
@@ -377,6 +380,14 @@ def drawn_now(m: March) -> bool:
     """Count a step; tell whether the balance is to be drawn after it."""
     m.entered += 1
     return m.drawing == 1 and (m.entered < OFTEN or m.entered % OFTEN == 0)
+
+
+def reach(m: March) -> None:
+    """Put nodes and drives where the step takes them."""
+    if m.swift == 1:
+        arrive(m.flat)
+    else:
+        place(m.flat)
 
 
 @seldom
@@ -396,7 +407,7 @@ def note(m: March) -> None:
     f = m.flat
     row = m.rows[(1 + m.gauges.outputs) * m.done :]
     row[0] = m.t
-    if m.gauges.moving == 1 and m.losing == 0:
+    if m.gauges.moving == 1 and m.losing == 0 and m.swift != 1:
         drive(f)
     read(m.gauges, f.z, row[1:])
     if m.keeping == 1 or m.t >= m.due:
@@ -455,6 +466,8 @@ def jump(m: March) -> int:
         pull(f)
         copy(f.padded, f.force, m.pulled)
         return DONE
+    if m.swift == 1 and answered(m):
+        return changed(m)
     if m.mass_for != 1.0 or spent(m) or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
         status = massed(m)
         if status != DONE:
@@ -467,6 +480,23 @@ def jump(m: March) -> int:
             return status
     if m.flows.count > 0:
         run_on(m)
+    return changed(m)
+
+
+def answered(m: March) -> bool:
+    """Find the accelerations from kernels of the whole machine; tell whether they are numbers."""
+    f = m.flat
+    accelerate(f)
+    sums = 0.0 * eight(m.weight)
+    for i in range(0, f.padded, 8):
+        put(f.rate[i:], eight(f.answer[i:]))
+        sums = sums + abs(eight(f.answer[i:]))
+    return math.isfinite(total(sums))
+
+
+def changed(m: March) -> int:
+    """Take up accelerations that have jumped, and the inputs' forces."""
+    f = m.flat
     for i in range(0, f.padded, 8):
         change = eight(f.rate[i:]) - eight(m.rate[i:])
         put(m.algorithmic[i:], eight(m.algorithmic[i:]) + change)

@@ -53,7 +53,7 @@ from flexctrl.model.state import State
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
 _SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
-_HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed")
+_HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed", "swift")
 _MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
@@ -236,6 +236,8 @@ class Marcher:
         m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
         m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
         m.lean, m.phase, m.attempt, m.t = point.lean, FRESH, 0, point.state.t
+        if m.swift and not F.keeps_shape:
+            m.swift = 0
         self.supply(point.supply.u)
         self.open(point.state.q, np.zeros(self.model.n), False)
         return self
@@ -468,6 +470,7 @@ def _march(F: Flattened, method: Method) -> March:
         share=_SHARE if c.damping else _KEEPING,
         price=_MADE + probes.groups if flat.tangents or probes.groups else _ASKED,
         asking=int(not flat.tangents and not probes.groups),
+        swift=int(flat.quick > 0),
         tolerance=method.least,
     )
 

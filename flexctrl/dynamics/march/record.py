@@ -170,6 +170,9 @@ class March:
         Steps.
     phase, attempt, iteration, last, contraction, strayed : int, float
         Where in a step it is.
+    swift : int
+        1: accelerations come from kernels of the whole machine, and Newton's method takes the mass at hand for the
+        tangent; 0: the machine has none; below: steps until that is tried again, after one for which it was not enough.
     habit, trusted : float, int
         How much smaller each correction has been than the one before, and in how many steps that was only believed.
     price, spent, lately, served : float, int
@@ -246,6 +249,7 @@ class March:
     price: float
     asking: int
     shelf: int
+    swift: int = 0
     tolerance: float = 0.0
     error: float = 0.0
     h: float = 0.0

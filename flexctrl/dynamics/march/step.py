@@ -13,7 +13,7 @@ from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import drive, place, push, tangent
+from flexctrl.model.flat.flat import accelerate, drive, place, push, tangent
 from flexctrl.model.flat.fronts import factor
 
 __all__ = ["blended", "refactored", "sloped", "step", "to_rate", "to_v"]
@@ -23,6 +23,8 @@ _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
 _TRUSTED = 8
+_PATIENCE = 500
+"""Steps until the mass is tried again for the tangent."""
 _HABIT = 0.002
 _ROUND_OFF = 1e-13
 """Corrections below this that do not shrink any more are round-off."""
@@ -37,6 +39,8 @@ def step(m: March) -> int:
         if status == WANTS_TANGENT:
             return status
         m.phase = FRESH
+        if status != DONE and m.swift == 1:
+            m.swift = -_PATIENCE
         if status == DONE or m.attempt == 1:
             m.attempt = 0
             m.worst = m.worst if status == SINGULAR else foremost(m)
@@ -71,7 +75,9 @@ def newton(m: March) -> int:
     """Iterate until the step is solved."""
     f = m.flat
     while m.iteration < _ITERATIONS:
-        if m.phase == EVALUATE:
+        if m.swift == 1:
+            lag(m)
+        elif m.phase == EVALUATE:
             place(f)
             drive(f)
             push(f)
@@ -90,6 +96,8 @@ def newton(m: March) -> int:
             return FAILED
         m.contraction = size / m.last if math.isfinite(m.last) else 0.0
         m.last = size
+        if m.swift == 1 and m.contraction > _POOR:
+            return FAILED
         if m.contraction > 2.0 and m.iteration > 3:
             return FAILED
         if converged(m, size):
@@ -99,6 +107,16 @@ def newton(m: March) -> int:
     return FAILED
 
 
+def lag(m: March) -> None:
+    """Find the Newton step with the mass for the tangent: how far accelerations are from those of the end."""
+    f = m.flat
+    accelerate(f)
+    pull = 1.0 / to_rate(m)
+    for i in range(0, f.padded, 8):
+        put(f.force[i:], pull * (eight(f.rate[i:]) - eight(f.answer[i:])))
+
+
+@seldom
 def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) -> None:
     """Fill in the slope of the forces for motions that add these times an increment."""
     if m.probes.groups > 0:
@@ -184,8 +202,9 @@ def converged(m: March, size: float) -> bool:
 def correct(m: March) -> float:
     """Take a Newton step, found in the place of the forces; return its size, NaN where it is not finite."""
     f = m.flat
-    f.force[f.n] = 0.0
-    solved(m.axes, m.tangent, m.fronts, f.force)
+    if m.swift != 1:
+        f.force[f.n] = 0.0
+        solved(m.axes, m.tangent, m.fronts, f.force)
     speed = to_v(m)
     pull = to_rate(m)
     most = 0.0 * eight(m.weight)

@@ -16,7 +16,20 @@ from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.motion import FAST
 
-__all__ = ["Flat", "clear", "drive", "energy", "keep", "load", "place", "pull", "push", "tangent"]
+__all__ = [
+    "Flat",
+    "accelerate",
+    "arrive",
+    "clear",
+    "drive",
+    "energy",
+    "keep",
+    "load",
+    "place",
+    "pull",
+    "push",
+    "tangent",
+]
 
 _TURN = 2.0 * math.pi
 _POSE = 12
@@ -43,8 +56,8 @@ class Flat:
         their directions.
     q : Reals *
         Sums of the degrees of freedom at the start of the step.
-    driven, found, about : Reals
-        Driven coordinates at the start of the step, at its end (*), and about what the step adds to them (*).
+    driven, found, about : Reals *
+        Driven coordinates at the start of the step, at its end, and about what the step adds to them.
     whole : Wholes
         Nodes whose six degrees of freedom are their own and follow each other, and the first of these.
     moved, turned, linked : Wholes
@@ -75,8 +88,14 @@ class Flat:
         steps add to them.
     gusts : Runs
         Kernels of the forces of gusts.
-    books : Reals
+    books : Reals *
         Kinetic energy, stored energy, dissipated power.
+    answer : Reals *
+        Accelerations; see `accelerate`.
+    entire : Runs
+        Kernels of the whole machine, where it has few freedoms; see `flexctrl.model.flat.entire`.
+    quick : int
+        How many there are.
     """
 
     n: int
@@ -139,6 +158,9 @@ class Flat:
     shifts: Runs
     gusts: Runs
     books: Reals
+    answer: Reals
+    entire: Runs = ()
+    quick: int = 0
 
 
 def load(f: Flat) -> None:
@@ -249,8 +271,21 @@ def push(f: Flat) -> None:
         f.linkage[3](f.z, f.z)
 
 
+def accelerate(f: Flat) -> None:
+    """Find the accelerations at the end of the step, of machines with kernels for all of it."""
+    f.entire[0](f.z, f.z)
+
+
+def arrive(f: Flat) -> None:
+    """Put nodes and drives where the step takes them, with the rates of its end; of such machines."""
+    f.entire[1](f.z, f.z)
+
+
 def pull(f: Flat) -> None:
     """Sum up the forces of the inputs alone."""
+    if f.quick > 0:
+        f.entire[2](f.z, f.z)
+        return
     press(f)
     if f.carried > 0:
         f.linkage[3](f.z, f.z)
@@ -286,6 +321,9 @@ def tangent(f: Flat, on_place: float, on_rate: float, on_acceleration: float, en
 
 def energy(f: Flat) -> None:
     """Work out the energies and the dissipated power of the slots."""
+    if f.quick > 0:
+        f.entire[3](f.z, f.z)
+        return
     clear(3, f.books)
     for k in range(f.pieces):
         f.energies[k](f.z, f.books)

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.kernels.kernel import Kernel, Run
+from flexctrl.kernels.kernel import Backend, Kernel, Run
 from flexctrl.mechanics.rotation import turn_kernel
 from flexctrl.model.flat.axes import Axes, axes_of
+from flexctrl.model.flat.entire import Entire, entire_of
 from flexctrl.model.flat.entries import entry, entry_energy, entry_slope
 from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.fronts import Plan, plan_of
@@ -23,6 +24,7 @@ from flexctrl.model.state import State
 __all__ = ["Flattened", "Layout"]
 
 _ALIGNED = 64
+_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,8 @@ class Flattened:
         Rows and columns of their entries (with repeats).
     constants : tuple of int and numpy.ndarray
         What the workspace holds from some place on that never changes.
+    entire : Entire
+        Kernels of the whole machine, where it has few freedoms.
     """
 
     model: Model
@@ -52,6 +56,7 @@ class Flattened:
     plan: Plan
     pattern: tuple[np.ndarray, np.ndarray]
     constants: tuple[int, np.ndarray]
+    entire: Entire
 
     def ordered(self, x: np.ndarray) -> np.ndarray:
         """Return values of the degrees of freedom in the order of elimination, padded with zeros."""
@@ -76,6 +81,11 @@ class Flattened:
         self.gauges.shown[:], self.gauges.summed[:] = state.shown, self.model.motion.winding @ state.q
         f.step[:], f.v[:], f.rate[:] = 0.0, self.ordered(state.v), 0.0
 
+    @property
+    def keeps_shape(self) -> bool:
+        """Whether what never changes in poses is as the kernels of the whole machine take it to be."""
+        return bool((abs(self.flat.z[self.entire.cells] - self.entire.values) <= _ROUND_OFF).all())
+
     def state(self, v: np.ndarray, t: float) -> State:
         """Return the state at the start of the step, with rates ``v`` in the order of elimination.
 
@@ -96,6 +106,7 @@ class Layout:
 
     def __init__(self, model: Model) -> None:
         self.model, self.motion, self.forces = model, model.motion, model.forces
+        self.backend: Backend = model.backend
         m = self.motion
         self.padded = (m.n // 8 + 1) * 8
         self.linked = np.zeros(0, dtype=int) if m.plain else m.linked_cells
@@ -113,7 +124,9 @@ class Layout:
             **dict.fromkeys(("step", "v", "rate"), self.padded),
             **dict.fromkeys(("force", "load"), self.padded + self.carried),
             "q": self.padded,
-            **dict.fromkeys(("found", "about"), len(self.motion.drives)),
+            **dict.fromkeys(("found", "about", "driven"), len(self.motion.drives)),
+            "answer": self.padded,
+            "books": 3,
             "u": len(self.model.inputs),
             "shift": 0,
         }
@@ -179,21 +192,28 @@ class Layout:
         part = {name: z[start : start + self.sizes[name]] for name, start in self.starts.items()}
         for hidden in {"slots", "drawn"} & set(part):
             del part[hidden]
-        vectors: dict[str, Any] = {"z": z, "driven": np.zeros(len(self.motion.drives)), "books": np.zeros(3), **part}
+        vectors: dict[str, Any] = {"z": z, **part}
         flat = Flat(
             **vectors,
-            **self._numbers,
-            **self._tables,
-            **self._runs,
+            **self.numbers,
+            **self.tables,
+            **self.runs,
+            entire=self.entire.runs,
+            quick=len(self.entire.runs),
         )
         shown, summed = np.zeros((2, self._gauges.turning))
         gauges = replace(self._gauges, sums=np.zeros(self._gauges.rows), shown=shown, summed=summed)
-        return Flattened(self.model, flat, gauges, self._axes, self.plan, self.pattern[:2], self.constants)
+        return Flattened(self.model, flat, gauges, self._axes, self.plan, self.pattern[:2], self.constants, self.entire)
 
     @property
     def constants(self) -> tuple[int, np.ndarray]:
         """What the workspace holds from some place on that never changes."""
         return 0, np.zeros(0)
+
+    @cached_property
+    def entire(self) -> Entire:
+        """Kernels of the whole machine."""
+        return entire_of(self)
 
     @cached_property
     def _gauges(self) -> Gauges:
@@ -219,7 +239,7 @@ class Layout:
         return own[(np.diff(cells, axis=1) == 1).all(axis=1) & (cells[:, -1] < self.motion.n)]
 
     @cached_property
-    def _tables(self) -> dict[str, Any]:
+    def tables(self) -> dict[str, Any]:
         m, (own, moved, turned) = self.motion, (np.setdiff1d(nodes, self._whole) for nodes in self.own)
         cells = self.position[m.place[own]]
         nodes, freedoms = np.nonzero(cells < m.n)
@@ -244,8 +264,8 @@ class Layout:
         }
 
     @cached_property
-    def _numbers(self) -> dict[str, Any]:
-        m, tables = self.motion, self._tables
+    def numbers(self) -> dict[str, Any]:
+        m, tables = self.motion, self.tables
         return {
             "n": m.n,
             "padded": self.padded,
@@ -254,16 +274,16 @@ class Layout:
             "wholes": len(self._whole),
             "moving": len(tables["moved"]),
             "turning": len(tables["turned"]),
-            "turns": len(self._runs["turn"]),
+            "turns": len(self.runs["turn"]),
             "linking": len(tables["linked"]),
             "rates": len(tables["slots"]),
             "drives": len(m.drives),
             "spinning": len(self._spun),
             "inner": m.inner.size,
-            "pieces": len(self._runs["forces"]),
+            "pieces": len(self.runs["forces"]),
             "shifting": self.sizes["shift"],
             "unit_loads": len(tables["unit"]),
-            "gusting": len(self._runs["gusts"]),
+            "gusting": len(self.runs["gusts"]),
             "following": len(self.model.signals.follows),
             "carried": self.carried,
             "entries": self.plan.length,
@@ -271,7 +291,7 @@ class Layout:
         }
 
     @cached_property
-    def _runs(self) -> dict[str, Any]:
+    def runs(self) -> dict[str, Any]:
         m, turned = self.motion, self.own[2]
         own_tangents = m.plain and not self.model.signals.follows
         damped = bool(self.model.viscous.nnz)
@@ -291,18 +311,18 @@ class Layout:
         at = self.position[columns]
         gather = np.column_stack([self.starts[name] + at for name in ("q", "step", "v", "rate")])
         scatter = self.starts["force"] + self.position[rows][:, None]
-        return self.model.backend.bind(entry(), gather, values, scatter)
+        return self.backend.bind(entry(), gather, values, scatter)
 
     def _entry_slopes(self) -> Run:
         rows, columns, values = self.entries
         seeds = np.tile(self.starts["seeds"] + np.arange(3), (len(rows), 1))
-        return self.model.backend.bind(entry_slope(), seeds, values, self.plan.places(rows, columns)[:, None])
+        return self.backend.bind(entry_slope(), seeds, values, self.plan.places(rows, columns)[:, None])
 
     def _entry_energies(self) -> Run:
         rows, columns, values = self.entries
         ends = [self.starts[name] + self.position[cells] for cells in (rows, columns) for name in ("q", "v")]
         books = np.tile(np.arange(3), (len(rows), 1))
-        return self.model.backend.bind(entry_energy(), np.column_stack(ends), values, books)
+        return self.backend.bind(entry_energy(), np.column_stack(ends), values, books)
 
     def _follows(self) -> np.ndarray:
         follows = self.model.signals.follows
@@ -310,13 +330,13 @@ class Layout:
 
     def _bind(self, kernel: Kernel, gather: np.ndarray, scatter: np.ndarray) -> Run:
         """One item."""
-        return self.model.backend.bind(kernel, gather[None], np.zeros((1, 0)), scatter[None])
+        return self.backend.bind(kernel, gather[None], np.zeros((1, 0)), scatter[None])
 
     def _turn(self, nodes: np.ndarray) -> Run:
         old = self.starts["pose"] + 12 * nodes[:, None] + 3 + np.arange(9)
         theta = self.starts["step"] + self.position[self.motion.place[nodes, 3:]]
         new = NODE_SLOT * nodes[:, None] + 3 + np.arange(9)
-        return self.model.backend.bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(nodes), 0)), new)
+        return self.backend.bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(nodes), 0)), new)
 
     def _linkage(self) -> tuple[Run, ...]:
         m, starts = self.motion, self.starts
@@ -353,7 +373,7 @@ class Layout:
     def _forces(self) -> list[Run]:
         base, sources = self.forces.drive_base, self.motion.source_base
         goal = self.starts["force"] + self.targets
-        bind = self.model.backend.bind
+        bind = self.backend.bind
         return [
             bind(f.kernels.force, f.gather(base), f.parameters, goal[f.scatter(sources)]) for f in self.forces.families
         ]
@@ -361,18 +381,18 @@ class Layout:
     def _gusts(self) -> Run:
         gusts, goal = self.model.gusts, self.starts["force"] + self.targets
         gather = gusts.gather(self.starts["u"])
-        return self.model.backend.bind(gusts.kernels.force, gather, gusts.parameters, goal[gusts.scatter])
+        return self.backend.bind(gusts.kernels.force, gather, gusts.parameters, goal[gusts.scatter])
 
     def _gust_slopes(self, places: np.ndarray) -> Run:
         """Into the blocks of the nodes in the wind."""
-        gusts, bind = self.model.gusts, self.model.backend.bind
+        gusts, bind = self.model.gusts, self.backend.bind
         seeds = np.tile(self.starts["seeds"] + np.arange(3), (len(gusts.nodes), 1))
         gather = np.hstack([gusts.gather(self.starts["u"]), seeds])
         scatter = places[self.forces.wind_blocks].reshape(-1, 9)
         return bind(gusts.kernels.tangent, gather, gusts.parameters, scatter)
 
     def _energies(self) -> list[Run]:
-        base, bind = self.forces.drive_base, self.model.backend.bind
+        base, bind = self.forces.drive_base, self.backend.bind
         return [
             bind(f.kernels.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
             for f in self.forces.families
@@ -388,7 +408,7 @@ class Layout:
             seeds = np.tile(self.starts["seeds"] + np.arange(3), (f.count, 1))
             gather = np.hstack([f.gather(self.forces.drive_base), seeds])
             scatter = places[start : start + f.count * size].reshape(f.count, size)
-            runs.append(self.model.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
+            runs.append(self.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
         return [*runs, self._gust_slopes(places)] if self.model.gusts else runs
 
 

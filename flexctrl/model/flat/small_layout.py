@@ -79,18 +79,18 @@ class SmallLayout(Layout):
         return sp.coo_matrix(self.motion.jacobian(self.motion.rest))
 
     @cached_property
-    def _tables(self) -> dict[str, Any]:
+    def tables(self) -> dict[str, Any]:
         unit = np.eye(len(self.model.inputs))
         columns = [self.model.loads(self.model.rest, u) for u in unit]
         loads = sp.coo_matrix(np.array(columns).reshape(len(unit), self.motion.n).T)
-        return super()._tables | {
+        return super().tables | {
             "linked": np.arange(len(self.motion.place)),
             "inputs": np.concatenate([self.position[loads.row], loads.col]).astype(np.int64),
             "unit": loads.data.astype(float),
         }
 
     @cached_property
-    def _runs(self) -> dict[str, Any]:
+    def runs(self) -> dict[str, Any]:
         return {
             "turn": (),
             "linkage": self._linkage(),
@@ -109,7 +109,7 @@ class SmallLayout(Layout):
         shift = self.starts["shift"] + 6 * nodes[:, None] + np.arange(6)
         pose = NODE_SLOT * nodes[:, None] + np.arange(12)
         none = np.zeros((len(nodes), 0))
-        place = self.model.backend.bind(_shifted(), np.hstack([drawn, shift]), none, pose)
+        place = self.backend.bind(_shifted(), np.hstack([drawn, shift]), none, pose)
         rates, changes = (self._along((of,), cells, 0) for of, cells in self._rate_cells)
         return place, rates, changes
 
@@ -130,7 +130,7 @@ class SmallLayout(Layout):
         cells = np.append(cells, np.full(self.motion.raw - len(cells), -1))[T.row]
         kept = cells >= 0
         gather = np.column_stack([self.starts[name] + self.position[T.col[kept]] for name in of])
-        return self.model.backend.bind(_lever(len(of)), gather, T.data[kept][:, None], start + cells[kept][:, None])
+        return self.backend.bind(_lever(len(of)), gather, T.data[kept][:, None], start + cells[kept][:, None])
 
 
 @cache

@@ -90,6 +90,11 @@ class Linkage(OpenLinkage):
             _kernel("wound", *self._winding),
         )
 
+    @cached_property
+    def freely(self) -> Kernel:
+        """`place` as a kernel of one item, with the drift that rotations have."""
+        return _kernel("place_freely", *self._placing)
+
     def _squared(self, node: int, R: ca.SX) -> ca.SX:
         """Return a rotation freed of round-off drift; one that never changes has none."""
         import casadi as ca
