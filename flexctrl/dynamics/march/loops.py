@@ -459,15 +459,15 @@ def jump(m: March) -> int:
     The method's own accelerations keep their lead on the true ones.
     """
     f = m.flat
-    load(f)
     clear(f.padded, f.step)
     copy(f.padded, m.v, f.v)
+    if m.swift == 1 and answered(m):
+        return changed(m)
+    load(f)
     if m.leap.modes > 0:
         pull(f)
         copy(f.padded, f.force, m.pulled)
         return DONE
-    if m.swift == 1 and answered(m):
-        return changed(m)
     if m.mass_for != 1.0 or spent(m) or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
         status = massed(m)
         if status != DONE:

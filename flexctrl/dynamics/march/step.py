@@ -13,7 +13,7 @@ from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import accelerate, drive, place, push, tangent
+from flexctrl.model.flat.flat import accelerate, drive, load, place, push, tangent
 from flexctrl.model.flat.fronts import factor
 
 __all__ = ["blended", "refactored", "sloped", "step", "to_rate", "to_v"]
@@ -41,6 +41,7 @@ def step(m: March) -> int:
         m.phase = FRESH
         if status != DONE and m.swift == 1:
             m.swift = -_PATIENCE
+            load(m.flat)
         if status == DONE or m.attempt == 1:
             m.attempt = 0
             m.worst = m.worst if status == SINGULAR else foremost(m)

@@ -26,8 +26,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Entire", "entire_of"]
 
+_Drawn = tuple[Kernel, np.ndarray, np.ndarray, np.ndarray]
+"""A kernel, what it reads, its parameters, and where it writes."""
+
 _FREEDOMS = 12
-_INSTRUCTIONS = 6000
+_LARGE, _MOST = 8000, 4000
+"""Instructions of pieces and levers; of the kernel of accelerations: beyond, there is nothing to be gained."""
 _TURN = 2.0 * np.pi
 _MARKED = (0.0, 1.0, -1.0)
 _SOUND = 1e-9
@@ -73,9 +77,8 @@ def entire_of(layout: Layout) -> Entire:
         return _NONE
     if motion.plain or motion.inner.size or motion.flows.size:
         return _NONE
-    if sum(f.count * f.kernels.force.instructions for f in model.forces.families) > _INSTRUCTIONS:
-        return _NONE
-    if motion.linkage.kernels[0].instructions > _INSTRUCTIONS:
+    pieces = sum(f.count * f.kernels.force.instructions for f in model.forces.families)
+    if pieces + motion.linkage.kernels[0].instructions > _LARGE:
         return _NONE
     drawing = _Drawing(layout)
     return drawing.made() if drawing.sound() else _NONE
@@ -97,7 +100,7 @@ class _Piece:
         for cells, p, goals in zip(self.gather, self.params, self.scatter, strict=True):
             found = ca.vertsplit(function(ca.vertcat(*z[cells]), ca.vertcat(ca.SX(0, 1), *p)))
             for goal, value in zip(goals, found, strict=True):
-                r[goal] = value if self.kernel.replaces else r[goal] + value
+                r[goal] = value if self.kernel.replaces or _nothing(r[goal]) else r[goal] + value
 
 
 class _Pieces:
@@ -131,11 +134,14 @@ class _Drawing:
         import casadi as ca
 
         self.layout, self.pieces = layout, _Pieces()
-        drawn = copy(layout)
+        drawn: Any = copy(layout)
         drawn.backend = self.pieces
         drawn.__dict__.pop("runs", None)
-        self.runs = drawn.runs
+        self.runs: dict[str, Any] = drawn.runs
         self.cells = [ca.SX.sym(f"z{i}") for i in range(layout.length)]
+        self.blank = np.empty(layout.length, dtype=object)
+        for i, cell in enumerate(self.cells):
+            self.blank[i] = cell
         self.numbers = {k: self._plain(v) for k, v in (layout.numbers | layout.tables).items()}
         rest = np.hstack([layout.model.rest.x, layout.model.rest.R.reshape(-1, 9)]).ravel()
         self.moving: frozenset[int] = frozenset()
@@ -150,8 +156,7 @@ class _Drawing:
     def workspace(self, fixed: dict[int, float], nodes_placed: bool) -> Flat:
         """A workspace of symbols; slots hold the poses at the start, or, once placed, symbols of their own."""
         layout = self.layout
-        z = np.empty(layout.length, dtype=object)
-        z[:] = self.cells
+        z = self.blank.copy()
         start, nodes = layout.starts["pose"], layout.numbers["nodes"]
         for i in range(12 * nodes):
             slot = NODE_SLOT * (i // 12) + i % 12
@@ -160,7 +165,9 @@ class _Drawing:
         for i in range(nodes):
             for k in range(NODE_SLOT * i + 12, NODE_SLOT * (i + 1)):
                 z[k] = z[k] if nodes_placed and k in self.moving else 0.0
-        part = {name: z[s : s + layout.sizes[name]] for name, s in layout.starts.items() if name != "slots"}
+        part: dict[str, Any] = {
+            name: z[s : s + layout.sizes[name]] for name, s in layout.starts.items() if name != "slots"
+        }
         return Flat(z=z, **part, **self.numbers, **self.runs)
 
     def _lasting(self, fixed: dict[int, float]) -> dict[int, float]:
@@ -193,22 +200,23 @@ class _Drawing:
             slot[0] = f.ratios[i] * f.found[i] if f.rigid[i] else own
 
     def made(self) -> Entire:
-        """The kernels, bound."""
-        arriving, start = self._arriving(), self.layout.starts["pose"]
+        """The kernels, bound; none if they are too large."""
+        accelerating = self._accelerating()
+        if accelerating[0].instructions > _MOST:
+            return _NONE
+        arriving = self._arriving()
+        start = self.layout.starts["pose"]
         cells = np.array(sorted(self.fixed), dtype=int)
-        runs = (self._accelerating(), arriving, self._pulling(), self._booking())
+        found = (accelerating, arriving, self._pulling(), self._booking())
+        runs = tuple(self.layout.model.backend.bind(*one) for one in found)
         return Entire(runs, start + cells, np.array([self.fixed[int(i)] for i in cells]))
 
-    def _pressed(self, rate: Sequence[Any]) -> Flat:
-        """All forces at the end of a step with given accelerations."""
+    def _pressed(self) -> Flat:
+        """All forces at the end of a step."""
         f = self.workspace(self.fixed, False)
-        place_freely = self.layout.motion.linkage.freely
-        first = f.linkage[0]
-        assert isinstance(first, _Piece)
-        loose = _Piece(place_freely, first.gather, first.params, first.scatter)
+        first: Any = f.linkage[0]
+        loose: Any = replace(first, kernel=self.layout.motion.linkage.freely)
         f = replace(f, linkage=(loose, *f.linkage[1:]))
-        for i in range(f.n):
-            f.rate[i] = rate[i]
         load(f)
         self.placed(f)
         drive(f)
@@ -220,10 +228,9 @@ class _Drawing:
         import casadi as ca
 
         n, start = self.layout.motion.n, self.layout.starts["rate"]
-        symbols = self.cells[start : start + n]
-        still = ca.vertcat(*self._pressed([0.0] * n).force[:n])
-        moving = ca.vertcat(*self._pressed(symbols).force[:n])
-        return -ca.jacobian(moving, ca.vertcat(*symbols)), still
+        rates = ca.vertcat(*self.cells[start : start + n])
+        moving = ca.vertcat(*self._pressed().force[:n])
+        return -ca.jacobian(moving, rates), ca.substitute(moving, rates, ca.SX.zeros(n))
 
     def sound(self) -> bool:
         """Tell whether every freedom has mass, at rest."""
@@ -247,12 +254,12 @@ class _Drawing:
         named = {s.name(): float(v) for s, v in zip(self.cells, z, strict=True)}
         return named | {s.name(): v for s, v in zip(self.pieces.symbols, self.pieces.values, strict=True)}
 
-    def _accelerating(self) -> Run:
+    def _accelerating(self) -> _Drawn:
         start = self.layout.starts["answer"]
         rates = _eliminated(self.mass, self.still)
-        return self._bound("accelerating", [(start + i, rates[i]) for i in range(rates.numel())])
+        return self._drawn("accelerating", [(start + i, rates[i]) for i in range(rates.numel())])
 
-    def _arriving(self) -> Run:
+    def _arriving(self) -> _Drawn:
         f = self.workspace(self.fixed, False)
         before = f.z.copy()
         self.placed(f)
@@ -260,30 +267,30 @@ class _Drawing:
         node = [NODE_SLOT * i + k for i in range(f.nodes) for k in range(18 if not self._closes else NODE_SLOT)]
         drives = [f.drive_base + DRIVE_SLOT * i + k for i in range(f.drives) for k in (0, 1, 3)]
         found = [self.layout.starts["found"] + i for i in range(f.drives)]
-        changed = [c for c in (*node, *drives, *found) if f.z[c] is not before[c] and not _is(f.z[c], before[c])]
+        changed = [c for c in (*node, *drives, *found) if _changed(f.z[c], before[c])]
         self.moving = frozenset(changed)
-        return self._bound("arriving", [(c, f.z[c]) for c in changed])
+        return self._drawn("arriving", [(c, f.z[c]) for c in changed])
 
     @property
     def _closes(self) -> bool:
         """Whether loops are closed, whose accelerations are looked at."""
         return bool(self.layout.motion.linkage.loops)
 
-    def _pulling(self) -> Run:
+    def _pulling(self) -> _Drawn:
         f = self.workspace(self.fixed, True)
         load(f)
         pull(f)
         start = self.layout.starts["force"]
-        return self._bound("pulling", [(start + i, f.force[i]) for i in range(f.n)])
+        return self._drawn("pulling", [(start + i, f.force[i]) for i in range(f.n)])
 
-    def _booking(self) -> Run:
+    def _booking(self) -> _Drawn:
         f = self.workspace(self.fixed, True)
         energy(f)
         start = self.layout.starts["books"]
-        return self._bound("booking", [(start + i, f.books[i]) for i in range(3)])
+        return self._drawn("booking", [(start + i, f.books[i]) for i in range(3)])
 
-    def _bound(self, name: str, results: Sequence[tuple[int, Any]]) -> Run:
-        """A kernel of what is found, on the symbols it takes."""
+    def _drawn(self, name: str, results: Sequence[tuple[int, Any]]) -> _Drawn:
+        """A kernel of what is found, on the symbols it takes, and its tables."""
         import casadi as ca
 
         outputs = ca.vertcat(ca.SX(0, 1), *[value for _, value in results])
@@ -295,14 +302,27 @@ class _Drawing:
         kernel = Kernel(name, inputs, params, outputs, replaces=True)
         values = np.array([[self.pieces.values[k] for k in known]]).reshape(1, len(known))
         goals = np.array([[goal for goal, _ in results]], dtype=int)
-        return self.layout.model.backend.bind(kernel, np.array([cells], dtype=int), values, goals)
+        return kernel, np.array([cells], dtype=int), values, goals
 
 
-def _is(expression: Any, value: Any) -> bool:
-    """Tell whether an expression is a number, or another expression, whatever its symbols are."""
+def _is(expression: Any, value: float) -> bool:
+    """Tell whether an expression is a number, whatever its symbols are."""
+    if isinstance(expression, float | int):
+        return expression == value
+    return bool(expression.is_constant() and float(expression) == value)
+
+
+def _changed(after: Any, before: Any) -> bool:
+    """Tell whether an entry has been written anew."""
     import casadi as ca
 
-    return bool(ca.is_equal(ca.SX(expression), ca.SX(value), 2))
+    if after is before:
+        return False
+    return not _is(after, before) if isinstance(before, float) else not ca.is_equal(ca.SX(after), before, 2)
+
+
+def _nothing(expression: Any) -> bool:
+    return isinstance(expression, float) and expression == 0.0
 
 
 def _eliminated(mass: ca.SX, force: ca.SX) -> ca.SX:

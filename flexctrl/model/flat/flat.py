@@ -344,9 +344,10 @@ def keep(f: Flat) -> None:
         for j in range(3, _POSE):
             f.pose[_POSE * i + j] = f.z[NODE_SLOT * i + j]
     for k in range(f.linking):
-        i = f.linked[k]
-        for j in range(_POSE):
-            f.pose[_POSE * i + j] = f.z[NODE_SLOT * i + j]
+        before = f.pose[_POSE * f.linked[k] :]
+        after = f.z[NODE_SLOT * f.linked[k] :]
+        put(before, eight(after))
+        put(before[4:], eight(after[4:]))
     for i in range(f.drives):
         f.driven[i] = f.found[i]
     for i in range(0, f.padded, 8):
