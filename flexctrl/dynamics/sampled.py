@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,37 +72,17 @@ def sampled_response(
 
     law = as_controller(controller, plant.input_labels, plant.output_labels)
     _check(law, until, points)
-    reads = [plant.output_labels.index(name) for name in law.inputs]
-    writes = [plant.input_labels.index(name) for name in law.outputs]
     base = _base(plant, inputs or {})
     x = np.zeros(plant.nstates) if initial_state is None else _checked_state(initial_state, plant.nstates)
-    z, u = np.asarray(law.initial(), dtype=float), base
-    solver = {"method": method or _fitting(plant, x, u, law.sample_time), "rtol": rtol, "atol": atol}
-    t: list[np.ndarray] = []
-    y: list[np.ndarray] = []
-    states: list[np.ndarray] = []
-    used: list[np.ndarray] = []
-    for k in range(math.ceil(until / law.sample_time - 1e-9)):
-        now = k * law.sample_time
-        measured = np.asarray(plant.output(now, x, u), dtype=float)[reads]
-        u = base.copy()
-        u[writes] += np.asarray(law.command(now, z, measured), dtype=float)
-        z = np.asarray(law.update(now, z, measured), dtype=float) if z.size else z
-        instants = np.linspace(now, min(now + law.sample_time, until), points + 1)
-        held = np.repeat(u[:, None], points + 1, axis=1)
-        part = control.input_output_response(
-            plant, instants, held, x, squeeze=False, return_states=True, solve_ivp_kwargs=solver
-        )
-        rows = slice(0, None if instants[-1] >= until * (1 - 1e-12) else points)
-        for kept, values in ((y, part.outputs), (states, part.states), (used, held)):
-            kept.append(values.reshape(-1, points + 1)[:, rows])
-        t.append(instants[rows])
-        x = part.states.reshape(-1, points + 1)[:, -1]
+    solver = {"method": method or _fitting(plant, x, base, law.sample_time), "rtol": rtol, "atol": atol}
+    *stretches, last = _stretches(plant, law, x, base, until, points, solver)
+    pieces = [*([values[..., :-1] for values in stretch] for stretch in stretches), last]
+    t, y, states, used = (np.concatenate(rows, axis=-1) for rows in zip(*pieces, strict=True))
     return control.TimeResponseData(
-        np.concatenate(t),
-        np.hstack(y),
-        np.hstack(states),
-        np.hstack(used),
+        t,
+        y,
+        states,
+        used,
         issiso=False,
         output_labels=plant.output_labels,
         input_labels=plant.input_labels,
@@ -110,6 +90,37 @@ def sampled_response(
         sysname=plant.name,
         title=f"Response of {plant.name} under a sampled controller",
     )
+
+
+def _stretches(
+    plant: control.InputOutputSystem,
+    law: Controller,
+    x: np.ndarray,
+    base: np.ndarray,
+    until: float,
+    points: int,
+    solver: Mapping[str, Any],
+) -> Iterator[tuple[np.ndarray, ...]]:
+    """Instants, outputs, states and inputs from each sample to the next, both ends included."""
+    import control
+
+    reads = [plant.output_labels.index(name) for name in law.inputs]
+    writes = [plant.input_labels.index(name) for name in law.outputs]
+    z, u = np.asarray(law.initial(), dtype=float), base
+    for k in range(math.ceil(until / law.sample_time - 1e-9)):
+        now = k * law.sample_time
+        measured = np.asarray(plant.output(now, x, u), dtype=float)[reads]
+        u = base.copy()
+        u[writes] += np.asarray(law.command(now, z, measured), dtype=float)
+        z = np.asarray(law.update(now, z, measured), dtype=float) if z.size else z
+        t = np.linspace(now, min(now + law.sample_time, until), points + 1)
+        held = np.repeat(u[:, None], points + 1, axis=1)
+        run = control.input_output_response(
+            plant, t, held, x, squeeze=False, return_states=True, solve_ivp_kwargs=solver
+        )
+        y, states = (values.reshape(-1, points + 1) for values in (run.outputs, run.states))
+        yield t, y, states, held
+        x = states[:, -1]
 
 
 def _fitting(plant: control.InputOutputSystem, x: np.ndarray, u: np.ndarray, span: float) -> type[OdeSolver]:

@@ -1,0 +1,162 @@
+"""What is said of scenes that mean nothing."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+from scenes import TROLLEY
+
+import flexctrl as fc
+from flexctrl.errors import SceneError
+from flexctrl.scene import load_scene
+
+BAD = [
+    ("[elements]", "[elemens]", "elemens: unknown key; did you mean 'elements'?"),
+    ('kind = "rope"', 'kind = "rop"', "[elements.rope] kind: there is no 'rop'; did you mean 'rope'?"),
+    ('kind = "rope", ', "", "[elements] rope: the key 'kind' is missing"),
+    ("mass = 5.0", "weight = 5.0", "[elements.load] weight: unknown key"),
+    ("mass = 5.0", 'mass = "heavy"', "[elements.load] mass = 'heavy'; expected a number"),
+    ("mass = 5.0", "mass = -5.0", "[elements] load: PointMass 'load': mass = -5.0; expected a number ≥ 0"),
+    (", mass = 5.0", "", "[elements] load: the key 'mass' is missing"),
+    ("EA = 2e5", "EA = true", "[elements.rope] EA = True; expected a number"),
+    ("EA = 2e5", "EA = nan", "[elements.rope] EA = nan; expected a number"),
+    ("EA = 2e5", "EA = inf", "[elements.rope] EA = inf; expected a number"),
+    ("end = [0, 0, -2]", "end = [0, -2]", "[elements.rope] end = [0, -2]; expected three numbers [x, y, z]"),
+    ("end = [0, 0, -2]", 'end = [0, 0, "deep"]', "[elements.rope] end = 'deep'; expected a number"),
+    ("end = [0, 0, -2]", "end = [0, 0, 0]", "Rope 'rope': start (0.0, 0.0, 0.0) and end (0.0, 0.0, 0.0) coincide"),
+    ('start = "trolley"', 'start = "troley"', "there is no element 'troley'; did you mean 'trolley'?"),
+    (
+        'second = "rope.start"',
+        'second = "rope.strat"',
+        "'rope.strat' names no node of 'rope'; it has rope.start, rope.end",
+    ),
+    ('node = "load"', 'node = "load.eye"', "'load.eye' names no node of 'load'; it has load"),
+    ('node = "load"', "node = 7", "[joints.4] node = 7; expected a text in quotes"),
+    ('held = "v w"', 'held = "v q"', "no freedom 'q'"),
+    ('held = "v w"', 'hold = "v w"', "[joints.1] hold: unknown key; did you mean 'held'?"),
+    ('kind = "pin"', 'kind = "nail"', "[joints.2] kind: there is no 'nail'"),
+    ('second = "load"', 'second = "trolley"', "joined nodes coincide"),
+    ("radius = 0.1", "radius = 0.0", "LinearDrive 'travel_drive': radius = 0.0; expected a number > 0"),
+    ('direction = "x"\nradius', 'direction = "up"\nradius', "no direction 'up'"),
+    ('kind = "linear"', 'kind = "line"', "[drives.travel_drive] kind: there is no 'line'; did you mean 'linear'?"),
+    ("torque = { kind", "tor-que = { kind", "MotorTorque 'tor-que': a name is letters, digits and underscores"),
+    ('drive = "travel_drive" }\nspeed', 'drive = "drive" }\nspeed', "DriveAngle 'angle': there is no 'drive'"),
+    ('top = "trolley", ', "", "[outputs] sway: the key 'top' is missing"),
+    ("gravity = true", "gravty = true", "there is no effect 'gravty'; did you mean 'gravity'?"),
+    ("gravity = true", "gravity = 9.81", "[effects] gravity = 9.81; expected true, false or a table"),
+    ("gravity = true", "gravity = { g = 9.81 }", "[effects.gravity] g = 9.81; expected three numbers"),
+    ("beta = 1e-3", "gamma = 1e-3", "[effects.rayleigh_damping] gamma: unknown key; known: alpha, beta"),
+    ('kind = "minimum_jerk"', 'kind = "minimum_jump"', "[moves.along] kind: there is no 'minimum_jump'"),
+    ("duration = 0.6", "duration = 0", "[moves.along] duration = 0; expected a number > 0"),
+    ('move = "along"', 'move = "across"', "[controllers.1.reference] move: there is no 'across'"),
+    ('kind = "pid"', 'kind = "pdi"', "[controllers.1] kind: there is no 'pdi'; did you mean 'pid'?"),
+    ("kp = 0.2", "kpp = 0.2", "[controllers.1] kpp: unknown key; did you mean 'kp'?"),
+    ("sample_time = 0.01", "sample_time = 0", "[hardware] sample_time = 0; expected a number > 0"),
+    ("until = 0.2", "until = -1", "[simulation] until = -1; expected a number > 0"),
+    ("until = 0.2\n", "", "simulation: the key 'until' is missing"),
+    ("step = 2e-3", "steps = 2e-3", "[simulation] steps: unknown key; did you mean 'step'?"),
+    ("step = 2e-3", "step = 2e-3\ntolerance = { relative = 1e-3 }", "give step (fixed steps) or tolerance"),
+    ("rho = 0.8", "rho = 1.8", "generalised alpha: rho = 1.8; expected 0 … 1"),
+    ('start = "equilibrium"', 'start = "rest"', "[simulation] start: there is no 'rest'"),
+    ("rigid_twin = true", "rigid_twin = 1", "[simulation] rigid_twin = 1; expected true or false"),
+    ('name = "trolley"', 'name = "my crane"', "Structure 'my crane': a name is letters, digits and underscores"),
+    ('name = "trolley"', "name = ", "is not TOML"),
+    ('name = "trolley"', 'name = "trolley"\nmachine = "tower_crane"', "machine: there is no 'tower_crane'"),
+    ('name = "trolley"', 'name = "trolley"\nloads = { pull = 1.0 }', "loads: the machine has no 'pull'"),
+    (
+        'name = "trolley"',
+        'name = "trolley"\nloop = { input = "torqe" }',
+        "the machine has no 'torqe'; did you mean 'torque'?",
+    ),
+    ('name = "trolley"', 'name = "trolley"\nplanar = "q"', "planar: planar: no direction 'q'"),
+    ('notes = ["made up"]', 'notes = "made up"', "notes = 'made up'; expected a list"),
+]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"until": "x"}, "simulation: until = 'x'; expected seconds > 0"),
+        ({"until": math.inf}, "simulation: until = inf; expected seconds > 0"),
+        ({"every": "a"}, "simulation: every = 'a'; expected seconds > 0"),
+        ({"method": "alpha"}, "simulation: method = 'alpha'; expected a method with its parameters"),
+        ({"tolerance": 1e-4}, "simulation: tolerance = 0.0001; expected a Tolerance"),
+        ({"start": "equilibrium"}, "simulation: start = 'equilibrium'; expected Start.DRAWN"),
+        ({"rigid_twin": 1}, "simulation: rigid_twin = 1; expected True or False"),
+    ],
+    ids=lambda v: next(iter(v)) if isinstance(v, dict) else "",
+)
+def test_what_a_simulation_cannot_be_is_told_by_name(given, said):
+    with pytest.raises(SceneError, match=re.escape(said)):
+        fc.Simulation(**{"until": 1.0, **given})
+
+
+@pytest.mark.parametrize(("old", "new", "said"), BAD, ids=lambda v: str(v)[:30])
+def test_bad_files_are_told_where_and_what(written, old, new, said):
+    assert old in TROLLEY
+    path = written(TROLLEY.replace(old, new, 1))
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    assert str(path) in str(caught.value)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = 1", "defines no 'scene'"),
+        ("scene = 5", "its 'scene' is a int"),
+        ("import flexctrl\nscene = 1 / 0", "line 2: ZeroDivisionError"),
+        ("scene = (", "line 1:"),
+        (
+            "import flexctrl as fc\n\nload = fc.PointMass('load', (0, 0, 0), -1.0)",
+            "line 3: PointMass 'load': mass = -1.0",
+        ),
+    ],
+)
+def test_bad_python_scenes(written, text, said):
+    with pytest.raises(SceneError, match=said):
+        load_scene(written(text, "bad.py"))
+
+
+def test_files_that_are_not_there_or_no_scenes(tmp_path, written):
+    with pytest.raises(SceneError, match="no such file"):
+        load_scene(tmp_path / "nowhere.toml")
+    with pytest.raises(SceneError, match=r"a scene is a \.toml file"):
+        load_scene(written("{}", "scene.json"))
+    with pytest.raises(SceneError, match="describes no machine"):
+        load_scene(written(""))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ('measured = "angle"', "reads 'angel', which is no output"),
+        ('command = "torque"', "commands 'torqe', which is no input"),
+        ('through = "travel_drive"', "has no part 'drive'"),
+    ],
+)
+def test_controllers_are_checked_against_the_machine(written, change, said):
+    wrong = change.replace("angle", "angel").replace('"torque"', '"torqe"').replace("travel_drive", "drive")
+    scene = load_scene(written(TROLLEY.replace(change, wrong)))
+    with pytest.raises(fc.errors.FlexctrlError, match=said):
+        _ = scene.law
+
+
+def test_a_freedom_to_hold_that_is_not_there(written):
+    for name, said in (
+        ("trolley.q", "no freedom 'q'"),
+        ("trolley_0_x", "no free coordinate"),
+        ("trolley.v", "no free"),
+    ):
+        scene = load_scene(written(TROLLEY + f'\n[equilibrium]\nhold = {{ "{name}" = 0.0 }}\n'))
+        with pytest.raises(SceneError, match=said):
+            _ = scene.rest
+
+
+def test_a_scene_without_a_simulation_cannot_be_run(written):
+    scene = load_scene(written(TROLLEY.split("[simulation]")[0]))
+    with pytest.raises(SceneError, match=r"has no \[simulation\]"):
+        scene.run()
