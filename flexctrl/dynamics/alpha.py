@@ -144,6 +144,19 @@ class Stepper:
         lead = self.model.switches.still(point.state, point.algorithmic - point.rate)
         return replace(fresh, algorithmic=fresh.rate + lead)
 
+    def join(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
+        """Return the point beyond a corner of a law of force, with the lead that the motion there will have.
+
+        The lead is (α_m − α_f) h times the rate of the accelerations, and h and that rate may be others by orders.
+        """
+        c, fresh = self.coefficients, self.start(point.state, supply, step)
+        state, rate = fresh.state, fresh.rate
+        change = self.model.slope(state, state.v, rate, (1.0, 0.0, 0.0), supply.u) @ state.v
+        change += self.model.slope(state, state.v, rate, (0.0, 1.0, 0.0), supply.u) @ rate
+        lead = (c.alpha_m - c.alpha_f) * step * self._mass(state, supply, step)(change)
+        lead[self.model.motion.flows] = 0.0
+        return replace(fresh, algorithmic=rate + lead)
+
     def _mass(self, state: State, supply: Supply, step: float) -> Solve:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
         c, zero = self.coefficients, np.zeros(self.model.n)

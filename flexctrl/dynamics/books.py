@@ -17,7 +17,8 @@ from flexctrl.model.state import State
 
 __all__ = ["Books", "Sums"]
 
-_ABSURD = 0.5
+_ABSURD, _DOUBTFUL = 0.5, 0.05
+_MOSTLY = 0.9
 _VISIBLE = 1e-3
 _ROUND_OFF = 1e-6
 _LOBATTO = ((0.5 * (1.0 - (3.0 / 7.0) ** 0.5), 49.0 / 180.0), (0.5, 64.0 / 180.0))
@@ -173,16 +174,34 @@ class Books:
         return f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """What the books say against a motion that goes on: they miss a large share of what was turned over."""
+    def unresolved(self) -> str:
+        """What the books say against a motion that has reached its end; empty if they can stand behind it.
+
+        They have missed a large share of what was turned over, and the method's own damping is not why: that takes
+        energy and gives none back, so that the largest gap is the last.
+        """
         s = self.sums
-        visible = (s.moved >= _VISIBLE * self.reach).any() and s.gap >= _ROUND_OFF * abs(s.start)
-        if not (self.lawful and self.residual > _ABSURD and visible):
+        damped = s.made < 0.0 and -s.made >= _MOSTLY * s.gap
+        if not self._doubtful(_ABSURD) or damped:
+            return ""
+        return f"the energy books missed {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the books say against a motion that goes on: they miss a visible share of what was turned over."""
+        s = self.sums
+        if not self._doubtful(_DOUBTFUL):
             return ()
         return (
-            f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved; take "
-            "smaller steps",
+            f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is "
+            f"{'not' if self.residual > _ABSURD else 'poorly'} resolved; take smaller steps or a smaller Tolerance",
         )
+
+    def _doubtful(self, share: float) -> bool:
+        """Whether the books miss more than a share, in a motion large enough to be seen."""
+        s = self.sums
+        visible = (s.moved >= _VISIBLE * self.reach).any() and s.gap >= _ROUND_OFF * abs(s.start)
+        return bool(self.lawful and self.residual > share and visible)
 
     @property
     def residual(self) -> float:

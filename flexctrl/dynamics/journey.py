@@ -16,6 +16,7 @@ from flexctrl.dynamics.dense import Curve, Track
 from flexctrl.dynamics.ending import ends_before
 from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
 from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.impact import LASTING, lasts
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.march.stepper import MarchingStepper
@@ -34,7 +35,7 @@ SMALLEST = 1e-12
 _NEAR = 1e-9
 _LANDINGS = 5
 _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
-_LEAD, _LEAD_MOST = 1e-9, 1e-6
+_LEAD, _LEAD_LEAST, _LEAD_MOST = 1e-8, 1e-9, 1e-6
 _NUDGES = 8
 _CHATTER = 20
 _FORESEEN = 20_000
@@ -133,6 +134,9 @@ class Journey:
             self.fault = error.__cause__
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
+        if self.status is Status.FINISHED and (unresolved := self.books.unresolved):
+            self.status = Status.FAILED
+            self.message = f"{unresolved} at t = {self.point.state.t:.6g} s; {self._remedy}"
 
     @property
     def _tick(self) -> float:
@@ -168,7 +172,7 @@ class Journey:
 
     def go(self, stop: float, until: float, most: int | None = None) -> None:
         """Go on towards a stop, by many steps at once (``most`` of them) or by one, not passing ``until``."""
-        if not self.balked and ride(self, until, most):
+        if not (self.balked or self.mark.follow or self.mark.led) and ride(self, until, most):
             return
         if isinstance(self.plan.method.pace, Fixed):
             self._fixed(stop, until)
@@ -313,6 +317,7 @@ class Journey:
         assert isinstance(pace, Controlled)
         left, size = stop - t, mark.size
         h = min(size, pace.largest)
+        h = min(h, mark.cap) if mark.follow else h
         h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
         if t + h > until + self._tick:
             if ends_before(self, stop):
@@ -320,6 +325,8 @@ class Journey:
             h = until - t
         why = ""
         while True:
+            if mark.led and h != mark.led:
+                self._lead(h)
             if h < SMALLEST * max(1.0, t):
                 raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
             try:
@@ -339,7 +346,7 @@ class Journey:
             size = h * min(2.5, factor)
         elif factor < 1.0:
             size = h * factor
-        mark.size = size
+        mark.size, mark.led, mark.follow = size, 0.0, max(0, mark.follow - 1)
         try:
             self._accept(after, stop)
         except _Missed:
@@ -404,7 +411,7 @@ class Journey:
 
     def _beyond(self, at: Point, corner: Crossing) -> Point:
         """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
-        watch, sign, span = self.watch, 1.0 if corner.rising else -1.0, _LEAD * self.mark.size
+        watch, sign, span = self.watch, 1.0 if corner.rising else -1.0, _LEAD_LEAST * self.mark.size
         state, v = at.state, at.state.v
         for _ in range(_NUDGES):
             moved = self.plan.model.advance(at.state, span * v, v, at.state.t)
@@ -412,12 +419,27 @@ class Journey:
                 state = moved
                 break
             span *= 4.0
-        stepper: Stepper[Any] = self.stepper.plain if isinstance(self.stepper, MarchingStepper) else self.stepper
         supply = self.plan.feed.restart(state, at.supply)
+        self._follow(at.state, state, supply.u)
+        self.point = replace(at, state=state, supply=supply)
+        self._lead(min(self.mark.size, self.mark.cap) if self.mark.follow else self.mark.size)
+        self.books.turn(self.point)
+        return self.point
+
+    def _lead(self, h: float) -> None:
+        """Start anew where the run stands, with a step about to be taken."""
+        stepper: Stepper[Any] = self.stepper.plain if isinstance(self.stepper, MarchingStepper) else self.stepper
         anew = stepper.join if isinstance(stepper, Joining) else stepper.renew
-        point = anew(replace(at, state=state), supply, self.mark.size)
-        self.books.turn(point)
-        return point
+        self.point = anew(self.point, self.point.supply, h)
+        self.mark.led = h if isinstance(self.plan.method.pace, Controlled) else 0.0
+
+    def _follow(self, before: State, beyond: State, u: np.ndarray) -> None:
+        """Follow an impact by short steps, where steps are chosen and would not see it."""
+        if not isinstance(self.plan.method.pace, Controlled):
+            return
+        sums = self.books.sums
+        cap = lasts(self.plan.model, before, beyond, u, (self.plan.tolerance, sums.moved, sums.turnover))
+        self.mark.follow, self.mark.cap = (LASTING, cap) if math.isfinite(cap) else (0, 0.0)
 
     def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:
         for c in crossings:
@@ -434,22 +456,47 @@ class Journey:
 
         Forces may jump at a corner: the step ends just before it, so that one law holds all along.
         """
-        t, h, gauge = before.state.t, after.state.t - before.state.t, crossing.gauge
-        corner = gauge >= len(self.watch.events) + len(self.watch.names)
-        lead = _LEAD * h if corner else 0.0
-        at = crossing.t - lead
+        if crossing.gauge >= len(self.watch.events) + len(self.watch.names):
+            return self._short_of(before, after, crossing)
+        t, h, gauge, at = before.state.t, after.state.t - before.state.t, crossing.gauge, crossing.t
         for _ in range(_LANDINGS):
             if at - t <= SMALLEST * h:
                 return before, replace(crossing, t=t)
             try:
-                after = self._towards(before, at - t) if corner else self.stepper.step(before, at - t)
+                after = self.stepper.step(before, at - t)
             except StepError as error:
                 raise _Missed(error.worst, str(error)) from error
             off = self.watch.offset(self.track.curve(before, after), before, after, gauge)
-            if 0.0 <= off <= _LEAD_MOST * h if corner else abs(off) <= _NEAR * h:
+            if abs(off) <= _NEAR * h:
                 break
-            at = min(max(after.state.t + off - lead, t), t + h)
-        return after, replace(crossing, t=after.state.t + off if corner else after.state.t)
+            at = min(max(after.state.t + off, t), t + h)
+        return after, replace(crossing, t=after.state.t)
+
+    def _short_of(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
+        """Take the step again, to just before a corner.
+
+        What lies beyond a stiff one pulls the end of a longer step back onto it, too late and with another speed: only
+        an end on the side of the start tells when the corner is.
+        """
+        t, h, gauge, watch = before.state.t, after.state.t - before.state.t, crossing.gauge, self.watch
+        lead, side, dust = max(_LEAD * h, 8.0 * math.ulp(t + h)), watch.sides[gauge], watch.dusts[gauge]
+        low, high, at, back = t, t + h, crossing.t - lead, lead
+        found, when = before, t
+        while at - t > SMALLEST * h and high - low > lead:
+            try:
+                after = self._towards(before, at - t)
+            except StepError as error:
+                raise _Missed(error.worst, str(error)) from error
+            if side * watch.values(after.state, after.supply.u, before.state)[gauge] <= dust:
+                high, back = at, 8.0 * back
+                at = max(high - back, 0.5 * (low + high))
+                continue
+            off = watch.offset(self.track.curve(before, after), before, after, gauge)
+            found, low, when = after, after.state.t, after.state.t + max(off, 0.0)
+            if 0.0 <= off <= max(_LEAD_MOST * h, lead):
+                break
+            at = when - lead if low < when - lead < high else 0.5 * (low + high)
+        return found, replace(crossing, t=when)
 
     def _towards(self, before: Point, h: float) -> Point:
         """Take a step to a corner, or just short of it: where a force jumps there, no step ends on it."""

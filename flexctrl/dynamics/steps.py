@@ -72,6 +72,10 @@ class Mark:
         So far.
     stuck : int
         Switches in a row that came at once.
+    follow : int
+        Steps still to be taken no longer than ``cap`` [s]: an impact is followed.
+    led : float
+        The step [s] that the method's own accelerations were made for at a corner; 0 once it has been taken.
     """
 
     size: float
@@ -79,6 +83,9 @@ class Mark:
     steps: int = 0
     rejected: int = 0
     stuck: int = 0
+    follow: int = 0
+    cap: float = 0.0
+    led: float = 0.0
 
 
 class StepError(ArithmeticError):

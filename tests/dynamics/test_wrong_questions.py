@@ -117,17 +117,30 @@ def test_a_start_beyond_all_numbers_is_blamed(model, speed):
         fc.simulate(model, until=1.0, start=model.rest.with_(v=np.array([speed])))
 
 
-def test_steps_longer_than_the_motion_are_noted(model):
-    """A pendulum of 2 s in steps of 10 s finishes, and says that it is none; in steps of 1 ms there is no word."""
+def test_steps_longer_than_the_motion_do_not_finish(model):
+    """A pendulum of 2 s in steps of 10 s reaches its end and is none: it fails; in steps of 10 ms there is no word."""
     start = model.rest.with_(v=np.array([2.0]))
     coarse, fine = (
         fc.simulate(model, until=until, start=start, method=fc.GeneralizedAlpha(step))
         for step, until in ((10.0, 100.0), (1e-2, 1.0))
     )
     assert coarse.report.energy_residual > 0.5
-    assert "the motion is not resolved" in coarse.report.notes[-1]
-    assert "the motion is not resolved" in str(coarse.report)
+    assert coarse.status is fc.Status.FAILED
+    assert coarse.t[-1] == pytest.approx(100.0)
+    assert "the motion is not resolved" in coarse.report.message
+    assert "take steps smaller than 10 s" in str(coarse.report)
+    assert fine.status is fc.Status.FINISHED
     assert fine.report.notes == model.notes
+
+
+def test_what_the_methods_own_damping_takes_is_noted(model):
+    """The same in steps of 0.4 s with ρ = 0, until it hangs still: all its energy is gone, none was made."""
+    start = model.rest.with_(v=np.array([2.0]))
+    run = fc.simulate(model, until=400.0, start=start, method=fc.GeneralizedAlpha(0.4, rho=0.0))
+    assert run.report.energy_residual > 0.5
+    assert run.report.energy.gap < 0.0
+    assert run.status is fc.Status.FINISHED
+    assert "the motion is not resolved" in run.report.notes[-1]
 
 
 def test_states_of_effects_are_not_asked_for_mass():

@@ -37,6 +37,17 @@ def test_steps_that_make_energy_from_nothing_end_the_run():
     assert len(run.t) > 10
 
 
+@pytest.mark.parametrize("step", [0.04, 0.1])
+@pytest.mark.parametrize("rho", [0.5, 0.9])
+def test_energy_that_was_made_and_lost_again_on_the_way_is_not_forgotten(rho, step):
+    """Three springs of 1e7 N/m in steps of ten periods and more: a spike of energy, most of which is damped again."""
+    run = fc.simulate(chain(3, 1e7), until=5.0, method=fc.GeneralizedAlpha(step, rho))
+    assert run.report.energy_residual > 0.5
+    assert run.status is Status.FAILED
+    assert "the motion is not resolved" in run.report.message
+    assert len(run.t) > 10
+
+
 def test_steps_that_are_controlled_reach_the_end_of_the_same_run():
     run = fc.simulate(chain(), until=5.0)
     assert run.status is Status.FINISHED
