@@ -33,7 +33,7 @@ __all__ = ["SMALLEST", "Journey", "Plan"]
 
 SMALLEST = 1e-12
 _NEAR = 1e-9
-_LANDINGS = 5
+_LANDINGS, _LANDINGS_MOST = 5, 60
 _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
 _LEAD, _LEAD_LEAST, _LEAD_MOST = 1e-8, 1e-9, 1e-6
 _NUDGES = 8
@@ -482,7 +482,9 @@ class Journey:
         lead, side, dust = max(_LEAD * h, 8.0 * math.ulp(t + h)), watch.sides[gauge], watch.dusts[gauge]
         low, high, at, back = t, t + h, crossing.t - lead, lead
         found, when = before, t
-        while at - t > SMALLEST * h and high - low > lead:
+        for _ in range(_LANDINGS_MOST):
+            if at - t <= SMALLEST * h or high - low <= lead:
+                break
             try:
                 after = self._towards(before, at - t)
             except StepError as error:
@@ -493,6 +495,7 @@ class Journey:
                 continue
             off = watch.offset(self.track.curve(before, after), before, after, gauge)
             found, low, when = after, after.state.t, after.state.t + max(off, 0.0)
+            high = at if low < at - lead else high  # no step ends there
             if 0.0 <= off <= max(_LEAD_MOST * h, lead):
                 break
             at = when - lead if low < when - lead < high else 0.5 * (low + high)
