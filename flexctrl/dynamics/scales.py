@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from flexctrl.model.model import Model
 
-__all__ = ["components", "farthest", "turning", "yardsticks"]
+__all__ = ["components", "farthest", "output_yardsticks", "turning", "yardsticks"]
 
 _POINT = 1e-12
 _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
@@ -37,11 +37,37 @@ def yardsticks(model: Model) -> np.ndarray:
 
 
 def _yardsticks(model: Model) -> np.ndarray:
-    size = model.structure.size if model.structure.size > _POINT else 1.0
+    size = _size(model)
     gears = {f"{d.name}_source": abs(d.effective_ratio) * (1.0, size)[d.column == 0] for d in model.structure.drives}
     known = gears | model.motion.scales
     pairs = zip(model.coordinates, turning(model), strict=True)
     return np.array([known.get(name, 1.0 if turns else size) for name, turns in pairs])
+
+
+def output_yardsticks(model: Model, time: float) -> np.ndarray:
+    """Return how large each output is where every node and motor moves by a yardstick, within a time.
+
+    Parameters
+    ----------
+    model : Model
+    time : float
+        What rates are of [s].
+
+    Returns
+    -------
+    numpy.ndarray, shape (outputs,)
+    """
+    size, motion = _size(model), model.motion
+    raw = np.ones(motion.raw)
+    raw[: motion.source_base].reshape(-1, 6)[:, :3] = size
+    for k, drive in enumerate(model.structure.drives):
+        raw[motion.source_base + k] = abs(drive.effective_ratio) * (1.0, size)[drive.column == 0]
+    on_place, on_rates = model.signals.slopes(model.rest, np.zeros(motion.raw), motion.raw)
+    return abs(on_place) @ raw + abs(on_rates) @ raw / time
+
+
+def _size(model: Model) -> float:
+    return float(model.structure.size) if model.structure.size > _POINT else 1.0
 
 
 def components(model: Model) -> np.ndarray:

@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.run import Run
+from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.errors import ControllerError, FlexctrlError
 from flexctrl.study.broken_loop import broken_loop, linear_law
 from flexctrl.study.frequency import margins
@@ -19,6 +20,7 @@ from flexctrl.study.subject import Subject
 __all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
 
 _SLOW = 6
+_ROUNDING = 1e-12  # of the machine's size; thousands of roundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +32,20 @@ class Curves:
     t : numpy.ndarray, shape (m,)
     outputs : tuple of str
     y : numpy.ndarray, shape (m, outputs)
+    noise : numpy.ndarray, shape (outputs,)
+        What rounding may leave of an output that is zero.
     """
 
     t: np.ndarray
     outputs: tuple[str, ...]
     y: np.ndarray
+    noise: np.ndarray
 
     @classmethod
     def of(cls, run: Run) -> Curves:
         """Take those of a run."""
-        return cls(run.t, run.outputs, run.y)
+        step = max(float(run.t[-1] - run.t[0]), 1e-300) / max(run.report.steps, 1)
+        return cls(run.t, run.outputs, run.y, _ROUNDING * output_yardsticks(run.track.feed.model, step))
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.y[:, self.outputs.index(name)]
@@ -70,7 +76,7 @@ class Change:
     Attributes
     ----------
     outputs : mapping of str to float
-        max |Δy| over the largest |y| of the first, by output.
+        max |Δy| over the largest |y| of the first, by output; 0 where it is but rounding.
     poles : float
         Largest |Δs| over the larger |s| of both among the slow poles, paired so that the sum is least: 1 where one
         comes to rest or runs away, 2 at most; NaN without any.
@@ -156,6 +162,9 @@ def change_between(first: Answer, second: Answer) -> Change:
 def outputs_apart(first: Run | Curves, second: Run | Curves) -> dict[str, float]:
     """Return max |Δy| over the largest |y| of the first run, by output; 1 for one that the second does not have.
 
+    Of an output that is zero, by symmetry say, rounding leaves something. What is below 10⁻¹² of the motion of a
+    machine that moves by its own size, or by a radian, is no change, and no magnitude to measure changes by.
+
     Parameters
     ----------
     first, second : Run or Curves
@@ -164,15 +173,18 @@ def outputs_apart(first: Run | Curves, second: Run | Curves) -> dict[str, float]
     -------
     dict of str to float
     """
-    return {name: _apart(first, second, name) for name in first.outputs}
+    curves = first if isinstance(first, Curves) else Curves.of(first)
+    return {name: _apart(curves, second, name) for name in curves.outputs}
 
 
-def _apart(first: Run | Curves, second: Run | Curves, name: str) -> float:
+def _apart(first: Curves, second: Run | Curves, name: str) -> float:
     if name not in second.outputs:
         return 1.0
-    gap = np.abs(np.interp(first.t, second.t, second[name]) - first[name]).max()
-    size = np.abs(first[name]).max()
-    return float(gap / size) if size > 0.0 else float(gap > 0.0)
+    noise = float(first.noise[first.outputs.index(name)])
+    gap = float(np.abs(np.interp(first.t, second.t, second[name]) - first[name]).max())
+    if gap <= noise:
+        return 0.0
+    return gap / max(float(np.abs(first[name]).max()), noise)
 
 
 def _poles_apart(first: np.ndarray, second: np.ndarray) -> tuple[float, complex]:

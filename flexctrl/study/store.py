@@ -98,9 +98,9 @@ class Store:
     def reference(self, finest: Setting) -> Reference | None:
         """Return the reference that was found when a setting was the first tried for it."""
         found = self.references.get(repr(finest))
-        if found is None:
+        if found is None or "noise" not in found:
             return None
-        curves = Curves(np.array(found["t"]), tuple(found["outputs"]), np.array(found["y"]))
+        curves = Curves(np.array(found["t"]), tuple(found["outputs"]), np.array(found["y"]), np.array(found["noise"]))
         refined = tuple(found["refined"])
         return Reference(curves, refined_by(finest, refined), dict(found["agreement"]), refined)
 
@@ -114,6 +114,7 @@ class Store:
             "outputs": list(reference.run.outputs),
             "t": reference.run.t.tolist(),
             "y": reference.run.y.tolist(),
+            "noise": reference.run.noise.tolist(),
         }
         self.references[repr(finest)] = line
         self._write(line)

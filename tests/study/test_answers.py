@@ -1,0 +1,67 @@
+"""How far two answers are apart: what is real counts, what rounding leaves does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.study.answers import Curves, outputs_apart
+
+
+def sideways(push: float, *, linear: bool = False) -> fc.Run:
+    """A frame in the plane of y and z under a load in it, and a push out of it: displacement, rate, angle, tension."""
+    section = fc.Section.box(fc.STEEL, width=0.2, height=0.3, web=0.005, flange=0.008)
+    beam = fc.Beam("beam", (0, -2, 0), (0, 2, 0), section, elements=2)
+    rope = fc.Rope("rope", beam.nodes[1], (0, 0, -2), EA=1e6)
+    load = fc.PointMass("load", rope.end, 80.0)
+    outputs = [
+        fc.Position("z", beam.nodes[1], "z"),
+        fc.Position("x", beam.nodes[1], "x"),
+        fc.Velocity("rate", beam.nodes[1], "x"),
+        fc.Rotation("tilt", beam.nodes[1], "z"),
+        fc.SwayAngle("sway", beam.nodes[1], load.node, "x"),
+        fc.Tension("pull", rope),
+    ]
+    structure = fc.Structure(
+        [beam, rope, load],
+        [fc.Support(beam.start), fc.Support(beam.end), fc.Pin(beam.nodes[1], rope.start), fc.Pin(rope.end, load.node)],
+        inputs=[fc.Force("f", beam.nodes[1], "z"), fc.Force("p", beam.nodes[1], "x")],
+        outputs=outputs,
+    )
+    way = fc.GeometricStiffness() if linear else fc.LargeRotation()
+    model = fc.assemble(structure, [fc.Gravity(), fc.Flexible(), way, fc.RayleighDamping(0.1, 1e-4)])
+    method = fc.Exact(0.005) if linear else fc.GeneralizedAlpha(1e-3)
+    rest = fc.equilibrium(model)
+    return fc.simulate(model, until=0.1, start=rest, inputs={"f": -300.0, "p": push}, method=method, every=0.005)
+
+
+def test_what_symmetry_makes_zero_is_no_change_whatever_rounding_leaves_of_it():
+    full, linear = sideways(0.0), sideways(0.0, linear=True)
+    apart = outputs_apart(full, linear)
+    for name in ("x", "rate", "tilt", "sway"):
+        assert np.abs(full[name]).max() < 1e-12
+        assert apart[name] == 0.0
+        disturbed = replace(linear, y=linear.y + 1e-16)
+        assert outputs_apart(disturbed, full)[name] == 0.0  # whichever of both is not quite zero
+    assert 0.0 < apart["z"] < 0.1
+
+
+def test_what_is_small_but_real_counts():
+    """A millionth of the other load: a thousandth of a micrometre, and its loss is all of it."""
+    pushed, not_pushed = sideways(3e-3), sideways(0.0)
+    assert np.abs(pushed["x"]).max() < 1e-8
+    apart = outputs_apart(pushed, not_pushed)
+    assert apart["x"] == apart["rate"] == apart["sway"] == pytest.approx(1.0, rel=1e-3)
+    assert outputs_apart(not_pushed, pushed)["x"] > 1.0
+
+
+def test_rounding_is_measured_by_the_machine():
+    """Of places by its size, of angles by a radian, of pulls by what stretches it by its size."""
+    noise = dict(zip(("z", "x", "rate", "tilt", "sway", "pull"), Curves.of(sideways(0.0)).noise, strict=True))
+    size = 4.0
+    assert noise["x"] == noise["z"] == pytest.approx(1e-12 * size)
+    assert noise["rate"] == pytest.approx(1e-12 * size / 1e-3, rel=0.02)
+    assert noise["tilt"] == pytest.approx(1e-12)
+    assert noise["sway"] == pytest.approx(2e-12 * size / 2.0, rel=1e-6)
+    assert noise["pull"] == pytest.approx(2e-12 * size * 1e6 / 2.0 * (1.0 + 1e-4 / 1e-3), rel=1e-3)  # and its damping
