@@ -17,7 +17,7 @@ from flexctrl.dynamics import steps
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.scales import farthest, turning, yardsticks
+from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
@@ -204,7 +204,7 @@ class Stepper:
                 last = np.inf
             assert self._solve is not None
             correction = self._solve(force)
-            size, worst = self._size(correction)
+            size, worst = largest(correction * self.weight)
             self.counts.newton += 1
             step, v, rate = step + correction, v + to_v * correction, rate + to_rate * correction
             contraction = size / last if np.isfinite(last) else 0.0
@@ -257,13 +257,6 @@ class Stepper:
         self.counts.factorisations += 1
         self.memory = at
 
-    def _size(self, correction: np.ndarray) -> tuple[float, int]:
-        if not correction.size:
-            return 0.0, 0
-        sizes = np.abs(correction) * self.weight
-        worst = int(np.argmax(sizes)) if np.isfinite(sizes).all() else int(np.argmax(~np.isfinite(sizes)))
-        return float(sizes[worst]), worst
-
     def error(self, before: AlphaPoint, after: AlphaPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error of a step over what is allowed: |β − 1/6| h² |Δa| (Zienkiewicz & Xie 1991)."""
         h = after.state.t - before.state.t
@@ -287,8 +280,26 @@ def _quickest(plain: Stepper) -> Any:
     return MarchingStepper(plain) if can_march(plain.model) and not plain.feed.continuous else plain
 
 
+class _Damped:
+    """What the spectral radius at infinite frequency makes of generalised alpha."""
+
+    rho: float
+
+    @property
+    def order(self) -> int:
+        return 2
+
+    @property
+    def symmetric(self) -> bool:
+        return self.rho == 1.0
+
+    @property
+    def damping(self) -> str:
+        return told_damping(self.rho)
+
+
 @dataclass(frozen=True)
-class GeneralizedAlpha:
+class GeneralizedAlpha(_Damped):
     """Generalised alpha with a fixed step; second order.
 
     Parameters
@@ -312,18 +323,6 @@ class GeneralizedAlpha:
         _check_rho(self.rho)
 
     @property
-    def order(self) -> int:
-        return 2
-
-    @property
-    def symmetric(self) -> bool:
-        return self.rho == 1.0
-
-    @property
-    def damping(self) -> str:
-        return told_damping(self.rho)
-
-    @property
     def pace(self) -> Fixed:
         return Fixed(self.step)
 
@@ -333,7 +332,7 @@ class GeneralizedAlpha:
 
 
 @dataclass(frozen=True)
-class AdaptiveAlpha:
+class AdaptiveAlpha(_Damped):
     """Generalised alpha with steps chosen from the estimated error, tried again where it is too large.
 
     Parameters
@@ -363,18 +362,6 @@ class AdaptiveAlpha:
         check_seconds(self.first_step, "first_step", "AdaptiveAlpha")
         check_seconds(self.largest_step, "largest_step", "AdaptiveAlpha", endless=True)
         check_number(self.most_steps, "most_steps", "AdaptiveAlpha", above=0.0)
-
-    @property
-    def order(self) -> int:
-        return 2
-
-    @property
-    def symmetric(self) -> bool:
-        return self.rho == 1.0
-
-    @property
-    def damping(self) -> str:
-        return told_damping(self.rho)
 
     @property
     def pace(self) -> Controlled:

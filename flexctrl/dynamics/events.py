@@ -207,14 +207,6 @@ class Watch:
         """The sides that corners are on."""
         return self.sides[len(self.sides) - len(self.corner_names) :]
 
-    def corner_in(self, before: State, states: Sequence[State]) -> int:
-        """Return how many of some states come before the first one beyond a corner."""
-        for i, state in enumerate(states):
-            if not self._calm(state, before):
-                return i
-            before = state
-        return len(states)
-
     def _calm(self, state: State, before: State) -> bool:
         """Tell whether a state is on the same side of all corners."""
         values = self.corners(state, before)

@@ -20,7 +20,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.scales import turning, yardsticks
+from flexctrl.dynamics.scales import largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
@@ -179,7 +179,7 @@ class _Stepper:
                 last = np.inf
             assert self._solve is not None
             correction = -self._solve(gap)
-            size, worst = self._size(correction)
+            size, worst = largest(correction * self.weight)
             self.counts.newton += 1
             step = step + correction
             contraction = size / last if np.isfinite(last) else 0.0
@@ -236,13 +236,6 @@ class _Stepper:
         self._solve = lambda gap: solve(gap * (-2.0 / h))
         self.counts.factorisations += 1
         self.tangent = at
-
-    def _size(self, correction: np.ndarray) -> tuple[float, int]:
-        if not correction.size:
-            return 0.0, 0
-        sizes = np.abs(correction) * self.weight
-        worst = int(np.argmax(sizes)) if np.isfinite(sizes).all() else int(np.argmax(~np.isfinite(sizes)))
-        return float(sizes[worst]), worst
 
     def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Steps are of one length; nothing is estimated."""

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from flexctrl.model.model import Model
 
-__all__ = ["components", "farthest", "output_yardsticks", "turning", "yardsticks"]
+__all__ = ["components", "farthest", "largest", "output_yardsticks", "turning", "yardsticks"]
 
 _POINT = 1e-12
 _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
@@ -123,6 +123,24 @@ def farthest(model: Model, moved: np.ndarray) -> np.ndarray:
     # no more than 1; the compiled loops work it out in the same order, to the bit
     np.maximum.at(most, part, way + 1.0 - np.maximum(way, 1.0))
     return most[part]
+
+
+def largest(correction: np.ndarray) -> tuple[float, int]:
+    """Return the largest of some corrections in yardsticks, shape (n,), and where it is; what is no number goes first.
+
+    Parameters
+    ----------
+    correction : numpy.ndarray, shape (n,)
+
+    Returns
+    -------
+    float, int
+    """
+    if not correction.size:
+        return 0.0, 0
+    sizes = np.abs(correction)
+    worst = int(np.argmax(sizes)) if np.isfinite(sizes).all() else int(np.argmax(~np.isfinite(sizes)))
+    return float(sizes[worst]), worst
 
 
 def once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:

@@ -323,21 +323,6 @@ class Batch:
         """The bound run; made when first asked for."""
         return self.backend.bind(self.kernel, self.gather, self.params, self.scatter)
 
-    def add_into(self, z: np.ndarray, r: np.ndarray) -> None:
-        """Add the outputs of all items to r, in place.
-
-        Parameters
-        ----------
-        z, r : ndarray of float64, contiguous
-            At least one longer than the largest index in their table; r must not overlap z.
-
-        Raises
-        ------
-        KernelError
-            If a vector is too short, not float64 or not contiguous, or a table does not fit the kernel.
-        """
-        self.run(z, r)
-
     def with_params(self, params: np.ndarray) -> Batch:
         """Return the batch with other parameters, (n, n_par); code and index tables are shared."""
         other = Batch(self.kernel, self.gather, params, self.scatter, self.backend)

@@ -11,25 +11,13 @@ import numpy as np
 import pytest
 from recorder import Absolute
 from scipy.integrate import solve_ivp
+from turntable import LOAD, turntable
 
 import flexctrl as fc
 
 PAGE = "hard"
-LOAD, TORQUE = 5.0, 2.0
+TORQUE = 2.0
 SHAFTS = (1e1, 1e3, 1e6, 1e9, 1e12)
-
-
-def turntable(stiffness: float, inertia: float = 0.0, ratio: float = 1.0) -> fc.Model:
-    body = fc.RigidBody("table", (0, 0, 0), 1.0, (LOAD, LOAD, LOAD))
-    motor = fc.RotaryDrive("motor", body.node, axis="z", stiffness=stiffness, inertia=inertia, ratio=ratio)
-    structure = fc.Structure(
-        [body],
-        [fc.Support(body.node, "u v w rx ry")],
-        [motor],
-        inputs=[fc.MotorTorque("torque", "motor")],
-        outputs=[fc.Rotation("table", body.node, "z"), fc.DriveAngle("angle", "motor")],
-    )
-    return fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity()])
 
 
 @pytest.mark.parametrize("stiffness", SHAFTS)

@@ -8,24 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from recorder import Absolute
+from turntable import turntable
 
 import flexctrl as fc
 
 PAGE = "hard"
 CASES = [(1e-4, 1e2), (1e-6, 1e3), (1e-8, 1e4)]
-
-
-def turntable(stiffness: float, inertia: float, ratio: float) -> fc.Model:
-    body = fc.RigidBody("table", (0, 0, 0), 1.0, (5.0, 5.0, 5.0))
-    motor = fc.RotaryDrive("motor", body.node, axis="z", stiffness=stiffness, inertia=inertia, ratio=ratio)
-    structure = fc.Structure(
-        [body],
-        [fc.Support(body.node, "u v w rx ry")],
-        [motor],
-        inputs=[fc.MotorTorque("torque", "motor")],
-        outputs=[fc.Rotation("table", body.node, "z"), fc.DriveAngle("angle", "motor")],
-    )
-    return fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity()])
 
 
 @pytest.mark.parametrize(("inertia", "ratio"), CASES)

@@ -6,32 +6,14 @@ tests/validation; here is the right-angled frame in motion, and a load on a rope
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from recorder import Absolute
+from units import OTHERS, SI, Units
 
 import flexctrl as fc
 
 PAGE = "hard"
-
-
-@dataclass(frozen=True)
-class Units:
-    """How many of the unit make one of SI."""
-
-    length: float
-    mass: float
-    time: float
-
-    @property
-    def force(self) -> float:
-        return self.mass * self.length / self.time**2
-
-
-SI = Units(1.0, 1.0, 1.0)
-OTHERS = {"mm, t, s": Units(1e3, 1e-3, 1.0), "µm, µg, ms": Units(1e6, 1e9, 1e3)}
 TOLERANCE = fc.Tolerance(1e-4, 1e-9)
 TIMES = np.linspace(0.0, 1.0, 21)
 

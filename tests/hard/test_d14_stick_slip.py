@@ -110,6 +110,23 @@ def test_stick_slip_on_a_belt(record):
     )
 
 
+def record_free_play(record, case, many, mean, period, run):
+    record(
+        f"{case} free play: mean period over {many} [s]",
+        ours=mean,
+        reference=period,
+        source="2π/ω + 2 b/v₀",
+        tolerance=1e-4,
+    )
+    record(
+        f"{case} free play: energy lost or made over {many} periods",
+        ours=run.report.energy_residual,
+        reference=0,
+        source="nothing dissipates",
+        tolerance=Absolute(1e-6),
+    )
+
+
 @pytest.mark.slow
 def test_free_play(record):
     """m = 1 at 1 m/s in a gap of 0.02 m between springs of 1e4 N/m: 2π/ω + 2 b/v, ten times"""
@@ -125,20 +142,7 @@ def test_free_play(record):
         events=[centre],
     )
     passing = [event.t for event in run.events if event.name == "centre"]
-    record(
-        "D14 free play: mean period over ten [s]",
-        ours=np.diff(passing).mean(),
-        reference=period,
-        source="2π/ω + 2 b/v₀",
-        tolerance=1e-4,
-    )
-    record(
-        "D14 free play: energy lost or made over ten periods",
-        ours=run.report.energy_residual,
-        reference=0,
-        source="nothing dissipates",
-        tolerance=Absolute(1e-6),
-    )
+    record_free_play(record, "D14", "ten", np.diff(passing).mean(), period, run)
 
 
 @pytest.mark.slow
@@ -148,20 +152,7 @@ def test_a_hundred_periods_of_free_play(record):
     period, start = 2.0 * np.pi / 100.0 + 2.0 * 0.02, model.rest.with_(v=np.ones(model.n))
     run = fc.simulate(model, start=start, until=100.6 * period, method=fc.GeneralizedAlpha(2e-4, rho=1.0), every=0.01)
     corners = [event.t for event in run.events]
-    record(
-        "B18 free play: mean period over a hundred [s]",
-        ours=(corners[400] - corners[0]) / 100.0,
-        reference=period,
-        source="2π/ω + 2 b/v₀",
-        tolerance=1e-4,
-    )
-    record(
-        "B18 free play: energy lost or made over a hundred periods",
-        ours=run.report.energy_residual,
-        reference=0,
-        source="nothing dissipates",
-        tolerance=Absolute(1e-6),
-    )
+    record_free_play(record, "B18", "a hundred", (corners[400] - corners[0]) / 100.0, period, run)
 
 
 LIFT, LOAD, LIMIT, MOTOR, GEAR = 5.0, 10.0, 1.5, 0.02, 100.0

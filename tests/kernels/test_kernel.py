@@ -359,7 +359,7 @@ def test_parameters_can_be_replaced(backend):
     other = batch.with_params(second)
     for bound, params in ((other, second), (batch, first)):
         r = np.zeros(10)
-        bound.add_into(z, r)
+        bound.run(z, r)
         np.testing.assert_allclose(r.reshape(5, 2), z.reshape(5, 2) * params[:, :1] + params[:, 1:], rtol=1e-15)
         assert bound.params is params
     with pytest.raises(KernelError, match="params has shape"):

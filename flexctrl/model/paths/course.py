@@ -144,7 +144,7 @@ class Course:
         state, factor = start.state, start.factor
         delta, excess, before = along * length, None, np.inf
         for iteration in range(1, most + 1):
-            state, excess = self._predicted(state, delta, excess)
+            state, excess = self._predicted(state, delta)
             factor += delta.factor
             if not np.isfinite(state.x).all():
                 return None
@@ -158,12 +158,12 @@ class Course:
             if not size <= max(_CONTRACTION * before, 1e-7):
                 return None
             if size <= _SETTLED * max(1.0, length) or (iteration > 3 and size < 1e-7 and size > 0.3 * before):
-                state, _ = self._predicted(state, delta, excess)
+                state, _ = self._predicted(state, delta)
                 return self.station(state, factor + delta.factor, along, iteration)
             before = size
         return None
 
-    def _predicted(self, state: State, delta: Direction, excess: Excess | None) -> tuple[State, Excess | None]:
+    def _predicted(self, state: State, delta: Direction) -> tuple[State, Excess | None]:
         """A whole step, with the stresses it leads to in first order."""
         model, balance = self.balance.model, self.balance
         after = self.moved(state, delta.place)
