@@ -52,6 +52,23 @@ def check_arguments(given: Mapping[str, object]) -> None:
         if isinstance(value, type) or not isinstance(value, kinds):
             raise StructureError(f"simulate: {name} = {shortened(value)}; expected {expected}")
         _known.add((type(value), name))
+    _check_of(given.get("model"), given.get("start"))
+
+
+def _check_of(model: object, start: object) -> None:
+    """An equilibrium of another machine, its rigid twin's say, is no start of this one; a linear model has its own."""
+    if not isinstance(start, Rest):
+        return
+    if isinstance(model, LinearModel):
+        raise StructureError(
+            "simulate: start = a Rest; a linear model's state counts from where it was made and is zero there: leave "
+            "start out to begin there, or give a State"
+        )
+    if isinstance(model, Model) and start.state.q.size != model.n:
+        raise StructureError(
+            f"simulate: start = a Rest with {start.state.q.size} degrees of freedom, the model has {model.n}: it is of "
+            "another machine, or of the same under other effects; give what equilibrium(model) returns"
+        )
 
 
 def check_times(until: float, every: float | None, start: object) -> None:

@@ -51,6 +51,20 @@ def test_arguments_of_another_kind_are_refused(model, wrong, message):
         fc.simulate(model, **{"until": 0.01, **wrong})
 
 
+def test_a_rest_of_another_machine_is_refused(model):
+    bar = fc.Beam("bar", (0, 0, 0), (1, 0, 0), fc.Section.tube(fc.STEEL, 0.03, 0.002))
+    other = fc.assemble(fc.Structure([bar], [fc.Support(bar.start)]), [fc.Flexible()], fc.CasadiVM())
+    with pytest.raises(StructureError, match=r"Rest with 6 degrees of freedom, the model has 1: .*another machine"):
+        fc.simulate(model, until=0.01, start=fc.equilibrium(other))
+
+
+def test_a_rest_is_no_start_of_a_linear_model(model):
+    """Its state counts from that place: the sag would be counted twice."""
+    rest = fc.equilibrium(model)
+    with pytest.raises(StructureError, match="a linear model's state counts from where it was made"):
+        fc.simulate(fc.linearize(model, rest), until=0.01, start=rest)
+
+
 def test_what_is_no_model_is_refused():
     with pytest.raises(StructureError, match="model = 'crane'; expected a Model"):
         fc.simulate("crane", until=1.0)
