@@ -40,7 +40,8 @@ def _data(study: WorkPrecision) -> dict[str, object]:
         }
         for p in study.points
     ]
-    reference = {"setting": str(study.reference.setting), "agreement": study.reference.agreement}
+    found = study.reference
+    reference = None if found is None else {"setting": str(found.setting), "agreement": found.agreement}
     return plain(
         {
             "scene": study.name,
@@ -50,6 +51,7 @@ def _data(study: WorkPrecision) -> dict[str, object]:
             "held_out": study.held_out,
             "reference": reference,
             "complete": study.complete,
+            "notes": study.notes,
         }
     )
 

@@ -28,7 +28,8 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
     """
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     points_chart(figure.subplots(), study)
-    chosen = f"chosen: {study.chosen.setting}" if study.chosen else "no setting is accurate enough"
+    none = "no setting is accurate enough" if study.complete else "stopped before a setting was chosen"
+    chosen = f"chosen: {study.chosen.setting}" if study.chosen else none
     figure.suptitle(f"{study.name}: {chosen}", fontsize=10, color=INK)
     return figure
 
@@ -45,7 +46,7 @@ def points_chart(ax: Axes, study: WorkPrecision) -> Axes:
     -------
     matplotlib.axes.Axes
     """
-    ran = [p for p in study.points if np.isfinite(p.error)]
+    ran = [p for p in study.points if np.isfinite(p.error) and np.isfinite(p.time_ratio)]
     meshes = sorted({p.setting.mesh for p in ran})
     for colour, fidelity in zip(CYCLE, Fidelity, strict=False):
         for mark, mesh in zip(_MARKS, meshes, strict=False):
@@ -57,10 +58,12 @@ def points_chart(ax: Axes, study: WorkPrecision) -> Axes:
     front = [p for p in study.pareto if np.isfinite(p.error)]
     ax.plot([p.time_ratio for p in front], [max(p.error, 1e-12) for p in front], color=INK, linewidth=1.0)
     ax.axhline(study.tolerance, color=RIGID, linewidth=1.0)
-    ax.axhspan(0.0, study.reference.uncertainty, color="#e5e7eb", zorder=0)
+    if study.reference is not None:
+        ax.axhspan(0.0, study.reference.uncertainty, color="#e5e7eb", zorder=0)
     if study.chosen:
         ax.plot(study.chosen.time_ratio, study.chosen.error, "o", markersize=15, markerfacecolor="none", color=RIGID)
     ax.set(xscale="log", yscale="log")
     tidy(ax).set(xlabel="time over that of the calibration", ylabel="largest error of an output, over its magnitude")
-    ax.legend(fontsize="small", frameon=False)
+    if ran:
+        ax.legend(fontsize="small", frameon=False)
     return ax

@@ -13,7 +13,9 @@ from flexctrl.design.tracking import Commanded, OpenLoop, Together, Tracking
 from flexctrl.design.wrapping import Wrapper, breaks_of
 from flexctrl.study.subject import Subject
 
-__all__ = ["load_cases"]
+__all__ = ["FACTORS", "load_cases"]
+
+FACTORS = (0.6, 1.2)
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Times(Trajectory):
         return breaks_of(self.signal)
 
 
-def load_cases(scene: Subject, factors: tuple[float, ...] = (0.6, 1.2)) -> tuple[Subject, ...]:
+def load_cases(scene: Subject, factors: tuple[float, ...] = FACTORS) -> tuple[Subject, ...]:
     """Return a scene under scaled loads and commanded moves; none if it has neither.
 
     Parameters

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Run, Status, Tolerance
@@ -14,7 +16,7 @@ from flexctrl.study.answers import Curves, outputs_apart
 from flexctrl.study.settings import Fidelity, Setting
 from flexctrl.study.subject import Subject
 
-__all__ = ["Reference", "certified", "error_of", "finest_of", "finished", "refined_by", "trusted"]
+__all__ = ["Reference", "Traced", "certified", "error_of", "finest_of", "finished", "trace"]
 
 _REFINEMENTS = 4
 _MESH = "a coarser mesh"
@@ -47,6 +49,19 @@ class Reference:
         return max(self.agreement.values(), default=0.0)
 
 
+class Traced(NamedTuple):
+    """What is wanted of a run.
+
+    Attributes
+    ----------
+    curves : Curves
+    steps : int
+    """
+
+    curves: Curves
+    steps: int
+
+
 def finest_of(settings: Sequence[Setting]) -> Setting:
     """Return a setting finer than all of some: the reference's.
 
@@ -71,7 +86,12 @@ def finest_of(settings: Sequence[Setting]) -> Setting:
     return Setting(Fidelity.FULL, mesh, finest, Tolerance(0.1 * least.relative, 0.1 * least.absolute))
 
 
-def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> Reference:
+def certified(
+    scene: Subject,
+    settings: Sequence[Setting],
+    tolerance: float,
+    run: Callable[[Setting], Traced] | None = None,
+) -> Reference:
     """Return a reference whose refinements and integrators agree.
 
     Parameters
@@ -81,6 +101,8 @@ def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> 
         What it has to be finer than.
     tolerance : float
         They must agree within a third of it.
+    run : callable, optional
+        What runs the scene at a setting, or knows what that gave.
 
     Returns
     -------
@@ -92,9 +114,10 @@ def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> 
         If a run fails or they do not agree; says by how much.
     """
     refined: tuple[str, ...] = ()
+    traced = cache(run or (lambda setting: trace(scene, setting)))
     for _ in range(_REFINEMENTS):
-        reference = _reference(scene, refined_by(finest_of(settings), refined), refined)
-        if trusted(reference, tolerance):
+        reference = _reference(traced, _refined_by(finest_of(settings), refined), refined)
+        if _trusted(reference, tolerance):
             return reference
         worst = max(reference.agreement, key=lambda name: reference.agreement[name])
         refined = (*refined, worst)
@@ -104,38 +127,43 @@ def certified(scene: Subject, settings: Sequence[Setting], tolerance: float) -> 
     )
 
 
-def trusted(reference: Reference, tolerance: float) -> bool:
-    """Tell whether a reference is good enough to judge errors of the size of a tolerance."""
+def _trusted(reference: Reference, tolerance: float) -> bool:
+    """Whether it is good enough to judge errors of the size of a tolerance."""
     return reference.uncertainty <= tolerance / 3.0
 
 
-def refined_by(setting: Setting, disagreements: Sequence[str]) -> Setting:
-    """Return a setting refined for each of some disagreements, in turn.
-
-    Parameters
-    ----------
-    setting : Setting
-    disagreements : sequence of str
-        As in `Reference.agreement`.
-
-    Returns
-    -------
-    Setting
-    """
+def _refined_by(setting: Setting, disagreements: Sequence[str]) -> Setting:
+    """A setting refined for each of some disagreements, in turn."""
     for worst in disagreements:
         setting = replace(setting, mesh=2 * setting.mesh) if worst == _MESH else _shorter(setting)
     return setting
 
 
-def _reference(scene: Subject, finest: Setting, refined: tuple[str, ...]) -> Reference:
-    run = finished(finest.of(scene))
+def trace(scene: Subject, setting: Setting) -> Traced:
+    """Return what a setting's run gives, which must come to its end.
+
+    Parameters
+    ----------
+    scene : Scene
+    setting : Setting
+
+    Returns
+    -------
+    Traced
+    """
+    run = finished(setting.of(scene))
+    return Traced(Curves.of(run), run.report.steps)
+
+
+def _reference(traced: Callable[[Setting], Traced], finest: Setting, refined: tuple[str, ...]) -> Reference:
+    run = traced(finest)
     others = {
         _MESH: replace(finest, mesh=finest.mesh // 2),
         "longer steps": _longer(finest),
         "another integrator": _other(finest, run),
     }
-    agreement = {name: error_of(run, finished(s.of(scene))) for name, s in others.items()}
-    return Reference(Curves.of(run), finest, agreement, refined)
+    agreement = {name: error_of(run.curves, traced(s).curves) for name, s in others.items()}
+    return Reference(run.curves, finest, agreement, refined)
 
 
 def _shorter(setting: Setting) -> Setting:
@@ -159,11 +187,11 @@ def _held(method: Integrator, factor: float) -> Integrator:
     return replace(method, largest_step=factor * method.largest_step) if isinstance(method, AdaptiveAlpha) else method
 
 
-def _other(setting: Setting, run: Run) -> Setting:
+def _other(setting: Setting, run: Traced) -> Setting:
     """The same accuracy by other means: controlled steps for fixed ones, fixed for controlled."""
     if isinstance(setting.method, GeneralizedAlpha):
         return replace(setting, method=AdaptiveAlpha(rho=0.6), tolerance=Tolerance(1e-6, 1e-9))
-    mean = float(run.t[-1]) / max(run.report.steps, 1)
+    mean = float(run.curves.t[-1]) / max(run.steps, 1)
     return replace(setting, method=GeneralizedAlpha(mean, rho=0.6))
 
 

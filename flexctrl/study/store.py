@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from flexctrl.dynamics.checkpoint import machine_of
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.errors import StructureError, shortened
 from flexctrl.study.answers import Curves
-from flexctrl.study.reference import Reference, refined_by
+from flexctrl.study.fingerprint import digest_of
+from flexctrl.study.reference import Traced
 from flexctrl.study.settings import Setting
 from flexctrl.study.subject import Subject
 
 __all__ = ["Point", "Store", "fingerprint"]
+
+_TELLS_NOTHING = ("name", "notes", "channel")
 
 
 @dataclass(frozen=True)
@@ -44,101 +47,123 @@ class Point:
 
 
 class Store:
-    """Points and references on disk, one a line, the later line of a setting counts; in memory only without a path.
+    """Points and runs of a study on disk, one a line, the later line counts; in memory only without a path.
 
     Parameters
     ----------
     path : str or Path, optional
     scene : str
         Which scene the points are of, as `fingerprint` tells it; those of others are passed over.
+
+    Raises
+    ------
+    StructureError
+        If the file cannot be read and written, or holds something else.
     """
 
     def __init__(self, path: str | Path | None, scene: str) -> None:
         self.path = None if path is None else Path(path)
         self.scene = scene
-        self.lines: dict[str, dict[str, Any]] = {}
-        self.references: dict[str, dict[str, Any]] = {}
-        self.held: dict[tuple[str, str], tuple[float, ...]] = {}
-        if self.path is not None and self.path.is_file():
-            for line in self.path.read_text(encoding="utf-8").splitlines():
-                self._read(line)
+        self.lines: dict[tuple[str, ...], dict[str, Any]] = {}
+        self.torn = False
+        if self.path is not None:
+            content = _content(self.path)
+            self.torn = bool(content) and not content.endswith("\n")
+            for number, line in enumerate(content.splitlines(), 1):
+                self._read(line, number)
 
-    def _read(self, line: str) -> None:
+    def _read(self, line: str, number: int) -> None:
         """A line that was cut off while it was written is passed over."""
         try:
             found = json.loads(line)
         except json.JSONDecodeError:
-            return
-        if found.get("scene") != self.scene:
-            return
-        if "outputs" in found:
-            self.references[found["reference"]] = found
-        elif "held_out" in found:
-            self.held[found["setting"], found["reference"]] = tuple(found["held_out"])
-        else:
-            self.lines[found["setting"]] = found
+            found = {} if line.startswith("{") else None
+        if not isinstance(found, dict):
+            raise StructureError(
+                f"store {self.path}: line {number} ({shortened(line)}) is no line of a study; give a file of its own"
+            )
+        if found.get("scene") == self.scene:
+            self.lines[tuple(found["key"])] = found
 
-    def known(self, setting: Setting) -> Point | None:
-        """Return what is known of a setting: its error, and its time if it was timed."""
-        found = self.lines.get(repr(setting))
-        if found is None:
+    def known(self, setting: Setting, reference: Setting) -> Point | None:
+        """Return what is known of a setting: its error against a reference, and its time if it was timed."""
+        found = self.lines.get(("point", repr(setting)))
+        if found is None or found["reference"] != repr(reference):
             return None
-        numbers = float(found["error"]), float(found["time_ratio"]), int(found["steps"])
-        return Point(setting, *numbers, str(found["failure"]))
+        return Point(setting, float(found["error"]), self.time(setting), int(found["steps"]), str(found["failure"]))
 
-    def keep(self, point: Point) -> Point:
-        """Write a point down; return it."""
-        line = {"scene": self.scene, "setting": repr(point.setting)} | {
-            name: getattr(point, name) for name in ("error", "time_ratio", "steps", "failure")
-        }
-        self.lines[repr(point.setting)] = line
-        self._write(line)
+    def time(self, setting: Setting) -> float:
+        """Return the time of a setting; NaN before it was timed."""
+        return float(self.lines.get(("point", repr(setting)), {"time_ratio": np.nan})["time_ratio"])
+
+    def keep(self, point: Point, reference: Setting) -> Point:
+        """Write a point down, and which reference its error is against; return it."""
+        told = {name: getattr(point, name) for name in ("error", "time_ratio", "steps", "failure")}
+        self._write(("point", repr(point.setting)), {"reference": repr(reference)} | told)
         return point
 
-    def reference(self, finest: Setting) -> Reference | None:
-        """Return the reference that was found when a setting was the first tried for it."""
-        found = self.references.get(repr(finest))
-        if found is None or "noise" not in found:
+    def run(self, setting: Setting) -> Traced | None:
+        """Return what a setting's run gave, if it was kept."""
+        found = self.lines.get(("run", repr(setting)))
+        if found is None:
             return None
         curves = Curves(np.array(found["t"]), tuple(found["outputs"]), np.array(found["y"]), np.array(found["noise"]))
-        refined = tuple(found["refined"])
-        return Reference(curves, refined_by(finest, refined), dict(found["agreement"]), refined)
+        return Traced(curves, int(found["steps"]))
 
-    def keep_reference(self, finest: Setting, reference: Reference) -> Reference:
-        """Write a reference down under the setting that was the first tried for it; return it."""
-        line = {
-            "scene": self.scene,
-            "reference": repr(finest),
-            "refined": list(reference.refined),
-            "agreement": reference.agreement,
-            "outputs": list(reference.run.outputs),
-            "t": reference.run.t.tolist(),
-            "y": reference.run.y.tolist(),
-            "noise": reference.run.noise.tolist(),
-        }
-        self.references[repr(finest)] = line
-        self._write(line)
-        return reference
+    def keep_run(self, setting: Setting, run: Traced) -> Traced:
+        """Write down what a setting's run gave; return it."""
+        curves = run.curves
+        rows = {name: getattr(curves, name).tolist() for name in ("t", "y", "noise")} | {"outputs": curves.outputs}
+        self._write(("run", repr(setting)), {"steps": run.steps} | rows)
+        return run
 
     def known_held(self, setting: Setting, reference: Setting) -> tuple[float, ...] | None:
         """Return the errors of a setting on the held-out cases against a reference, if they are known."""
-        return self.held.get((repr(setting), repr(reference)))
+        found = self.lines.get(("held out", repr(setting), repr(reference)))
+        return None if found is None else tuple(found["errors"])
 
     def keep_held(self, setting: Setting, reference: Setting, errors: tuple[float, ...]) -> tuple[float, ...]:
         """Write the errors of a setting on the held-out cases down; return them."""
-        self.held[repr(setting), repr(reference)] = errors
-        line = {"setting": repr(setting), "reference": repr(reference), "held_out": list(errors)}
-        self._write({"scene": self.scene} | line)
+        self._write(("held out", repr(setting), repr(reference)), {"errors": list(errors)})
         return errors
 
-    def _write(self, line: dict[str, Any]) -> None:
+    def notes(self, reference: Setting) -> tuple[str, ...]:
+        """Return which held-out cases a reference cannot be run on, as far as is known."""
+        return tuple(self.lines.get(("cases", repr(reference)), {"notes": ()})["notes"])
+
+    def keep_notes(self, reference: Setting, notes: tuple[str, ...]) -> tuple[str, ...]:
+        """Write down which held-out cases a reference cannot be run on; return it."""
+        self._write(("cases", repr(reference)), {"notes": list(notes)})
+        return notes
+
+    def _write(self, key: tuple[str, ...], content: dict[str, Any]) -> None:
+        line = {"scene": self.scene, "key": list(key)} | content
+        self.lines[key] = line
         if self.path is not None:
             with self.path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(line) + "\n")
+                file.write("\n" * self.torn + json.dumps(line) + "\n")
+            self.torn = False
+
+
+def _content(path: Path) -> str:
+    """What is in a file that can be written to; made if it is not there."""
+    try:
+        with path.open("a+", encoding="utf-8") as file:
+            file.seek(0)
+            return file.read()
+    except UnicodeDecodeError:
+        raise StructureError(f"store {path}: is no text, so no points of a study; give a file of its own") from None
+    except OSError as error:
+        raise StructureError(
+            f"store {path}: {error.strerror}; give a file in a folder that is there and can be written to"
+        ) from None
 
 
 def fingerprint(scene: Subject) -> str:
-    """Return a text that tells a scene from others: its name, and a digest of machine, effects, loads and run.
+    """Return a text that tells a scene from others: its name, and a digest of all that its runs depend on.
+
+    That is the machine, the effects, the controller and the loads with what they enclose, how long it runs and from
+    where; not the method and the tolerance, which settings replace, nor notes.
 
     Parameters
     ----------
@@ -147,12 +172,15 @@ def fingerprint(scene: Subject) -> str:
     Returns
     -------
     str
-        Controllers and loads that are functions have no part in it.
+
+    Raises
+    ------
+    Untold
+        If something in it cannot be told from others; see `digest_of`.
     """
-    loads = {name: float(load) for name, load in scene.loads.items() if not callable(load)}
-    plan = replace(scene.simulation, method=None)
-    text = repr((machine_of(scene.model), sorted(loads.items()), plan))
-    return f"{scene.name} {hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    plan = replace(scene.simulation, method=None, tolerance=Tolerance())
+    parts = {f.name: getattr(scene, f.name) for f in fields(cast(Any, scene)) if f.name not in _TELLS_NOTHING}
+    return f"{scene.name} {digest_of((type(scene), parts | {'simulation': plan}))[:16]}"
 
 
 def timed(point: Point) -> bool:

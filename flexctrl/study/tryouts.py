@@ -18,7 +18,8 @@ from flexctrl.study.subject import Subject
 
 __all__ = ["calibration", "errors", "time_of", "workers_of"]
 
-_REPEATS = 2
+_LEAST_RUNS, _MOST_RUNS = 3, 8
+_ENOUGH = 0.3  # seconds of runs that are short
 
 
 def workers_of(asked: int | None) -> int:
@@ -38,7 +39,7 @@ def workers_of(asked: int | None) -> int:
     StructureError
         For a number that is not positive, or more than one without joblib.
     """
-    if asked is not None and (not isinstance(asked, int) or asked < 1):
+    if asked is not None and (isinstance(asked, bool) or not isinstance(asked, int) or asked < 1):
         raise StructureError(f"workers = {asked!r}; expected a whole number ≥ 1")
     try:
         import joblib  # noqa: F401
@@ -114,12 +115,16 @@ def time_of(scene: Subject, setting: Setting) -> float:
     float
     """
     plan = replace(scene.simulation, every=scene.simulation.until)
-    bare, times = setting.of(scene.with_(simulation=plan)), []
-    for _ in range(_REPEATS):  # the first assembles and compiles
+    bare = setting.of(scene.with_(simulation=plan))
+    finished(bare)  # assembles and compiles
+    times: list[float] = []
+    spent = 0.0
+    while len(times) < _LEAST_RUNS or (spent < _ENOUGH and len(times) < _MOST_RUNS):
         unit, began = calibration(), time.process_time()
         finished(bare)
         took = time.process_time() - began
         times.append(took / min(unit, calibration()))
+        spent += took
     return min(times)
 
 

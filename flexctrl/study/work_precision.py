@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.run import Run
-from flexctrl.study.held_out import load_cases
-from flexctrl.study.reference import Reference, certified, error_of, finest_of, finished, trusted
+from flexctrl.errors import StructureError, shortened
+from flexctrl.structure.freedoms import check_path
+from flexctrl.study.fingerprint import Untold
+from flexctrl.study.on_held_out import HeldOut
+from flexctrl.study.reference import Reference, Traced, certified, trace
 from flexctrl.study.settings import Setting, sweep
 from flexctrl.study.store import Point, Store, fingerprint, timed
 from flexctrl.study.subject import Subject, prepared
@@ -33,29 +35,34 @@ class WorkPrecision:
     name : str
     tolerance : float
     points : tuple of Point
-        In the order in which they were tried.
-    reference : Reference
+        In the order in which they were tried; those that were not timed before a stop have a time of NaN.
+    reference : Reference or None
+        None if it was stopped before there was one.
     chosen : Point or None
         The cheapest that meets the tolerance on the scene and on every held-out case; None if none does.
     held_out : mapping of str to tuple of float
-        Errors on the held-out load cases of the settings that were checked there, the cheapest first.
+        Errors on the held-out load cases of the settings that were checked there, the cheapest first; infinite where
+        a run ended early.
     complete : bool
         False if it was stopped before all settings were tried.
+    notes : tuple of str
+        What could not be kept or checked, and why.
     """
 
     name: str
     tolerance: float
     points: tuple[Point, ...]
-    reference: Reference
+    reference: Reference | None
     chosen: Point | None
     held_out: dict[str, tuple[float, ...]] = field(default_factory=dict)
     complete: bool = True
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def pareto(self) -> tuple[Point, ...]:
         """Points that no other beats in both error and time, the quickest first."""
         best, front = np.inf, []
-        for point in sorted(self.points, key=lambda p: (p.time_ratio, p.error)):
+        for point in sorted(filter(timed, self.points), key=lambda p: (p.time_ratio, p.error)):
             if point.error < best:
                 best = point.error
                 front.append(point)
@@ -76,17 +83,22 @@ class WorkPrecision:
         front = set(map(id, self.pareto))
         wide = max(len(str(p.setting)) for p in self.points) if self.points else 7
         lines = [f"{'setting':<{wide}}  {'error':>9}  {'time':>8}  front"]
-        for p in sorted(self.points, key=lambda p: p.time_ratio):
-            told = f"{p.error:9.2e}  {p.time_ratio:8.3g}  {'*' if id(p) in front else ''}"
+        for p in sorted(self.points, key=lambda p: (not timed(p), p.time_ratio)):
+            time = f"{p.time_ratio:8.3g}" if timed(p) else "       –"
+            told = f"{p.error:9.2e}  {time}  {'*' if id(p) in front else ''}"
             lines.append(f"{p.setting!s:<{wide}}  {told if not p.failure else p.failure}".rstrip())
-        agreed = ", ".join(f"{name} {value:.1e}" for name, value in self.reference.agreement.items())
-        lines.append(f"reference: {self.reference.setting}; apart from {agreed}")
-        lines.append(
-            f"for {self.tolerance:g}: {self.chosen.setting}, error {self.chosen.error:.2e}"
-            if self.chosen
-            else f"no setting that was tried is within {self.tolerance:g}"
-        )
-        return "\n".join(lines)
+        if self.reference is not None:
+            agreed = ", ".join(f"{name} {value:.1e}" for name, value in self.reference.agreement.items())
+            lines.append(f"reference: {self.reference.setting}; apart from {agreed}")
+        return "\n".join([*lines, self._verdict, *self.notes])
+
+    @property
+    def _verdict(self) -> str:
+        if self.chosen is not None:
+            return f"for {self.tolerance:g}: {self.chosen.setting}, error {self.chosen.error:.2e}"
+        if not self.complete:
+            return "stopped before a setting was chosen"
+        return f"no setting that was tried is within {self.tolerance:g}"
 
 
 def work_precision(
@@ -113,7 +125,9 @@ def work_precision(
     settings : sequence of Setting
         Default: `sweep` of the scene.
     store : str or Path, optional
-        A file that keeps each point as it is found: a study that was stopped goes on from there.
+        A file that keeps each run of the reference, point and time as it is found: a study that was stopped goes on
+        from there. Points are taken up only for a scene that is the same in all that its runs depend on, functions
+        and objects of the user's own included; where that cannot be told, nothing is kept, and the notes say so.
     workers : int, optional
         Processes that find errors; default: one for each processor if joblib is there (``flexctrl[parallel]``), else
         one.
@@ -128,14 +142,36 @@ def work_precision(
     Raises
     ------
     StructureError
-        For a tolerance that is not positive, a scene without a simulation, or several workers without joblib.
+        For a tolerance that is not positive, a scene without a simulation, what is no setting, a store that cannot be
+        written or holds something else, or several workers without joblib.
     FlexctrlError
         If the reference cannot be run, or the reference runs do not agree within a third of the tolerance.
     """
     base = prepared(scene, tolerance, "work_precision")
-    tried = tuple(settings) or sweep(base)
-    kept = Store(store, fingerprint(base))
-    return _Study(base, tolerance, tried, kept, workers_of(workers), progress or (lambda done: None)).made()
+    tried, shared = _checked(settings) or sweep(base), workers_of(workers)
+    kept, notes = _opened(store, base)
+    return _Study(base, tolerance, tried, kept, shared, progress or (lambda done: None), notes).made()
+
+
+def _checked(settings: Sequence[Setting]) -> tuple[Setting, ...]:
+    given = settings if isinstance(settings, Iterable) else [settings]
+    if not isinstance(settings, Sequence) or not all(isinstance(s, Setting) for s in given):
+        wrong = next((s for s in given if not isinstance(s, Setting)), settings)
+        raise StructureError(
+            f"work_precision: settings holds {shortened(wrong)}; expected a sequence of Setting, as sweep(scene) gives"
+        )
+    return tuple(dict.fromkeys(settings))
+
+
+def _opened(path: str | Path | None, scene: Subject) -> tuple[Store, tuple[str, ...]]:
+    """The store, and a note where points of this scene could not be told from those of another."""
+    if path is not None:
+        check_path(path, "store")
+        Store(path, scene.name)  # whether it can be read and written is known now, not after the first run
+    try:
+        return Store(path, fingerprint(scene) if path is not None else scene.name), ()
+    except Untold as error:
+        return Store(None, scene.name), (f"nothing was kept in {path}, nor taken up: {error}",)
 
 
 class _Study:
@@ -149,73 +185,69 @@ class _Study:
         store: Store,
         workers: int,
         progress: Callable[[float], None],
+        notes: tuple[str, ...],
     ) -> None:
         self.scene, self.tolerance, self.settings, self.store = scene, tolerance, settings, store
-        self.workers, self.progress = workers, progress
+        self.workers, self.progress, self.notes = workers, progress, notes
 
     def made(self) -> WorkPrecision:
-        reference = self._reference()
+        reference: Reference | None = None
         chosen: Point | None = None
         held_out: dict[str, tuple[float, ...]] = {}
-        complete = True
+        complete = False
         try:
+            reference = certified(self.scene, self.settings, self.tolerance, self._traced)
             self._errors(reference)
-            self._times()
+            self._times(reference)
             chosen, held_out = self._choice(reference)
+            complete = True
+            self.progress(1.0)
         except KeyboardInterrupt:
-            complete = False
-        self.progress(1.0)
-        return WorkPrecision(self.scene.name, self.tolerance, self._points, reference, chosen, held_out, complete)
+            pass
+        points = () if reference is None else tuple(self._points(reference))
+        found = self.scene.name, self.tolerance, points, reference, chosen, held_out
+        return WorkPrecision(*found, complete, self.notes)
 
-    def _reference(self) -> Reference:
-        """The reference of an earlier study, if it is fine enough; else a new one."""
-        finest = finest_of(self.settings)
-        known = self.store.reference(finest)
-        if known is not None and trusted(known, self.tolerance):
-            return known
-        return self.store.keep_reference(finest, certified(self.scene, self.settings, self.tolerance))
+    def _traced(self, setting: Setting) -> Traced:
+        """A run of the reference, unless it is known."""
+        known = self.store.run(setting)
+        return known if known is not None else self.store.keep_run(setting, trace(self.scene, setting))
 
-    @property
-    def _points(self) -> tuple[Point, ...]:
-        known = (self.store.known(setting) for setting in self.settings)
-        return tuple(point for point in known if point is not None and timed(point))
+    def _points(self, reference: Reference) -> Iterator[Point]:
+        """Those that are known."""
+        known = (self.store.known(setting, reference.setting) for setting in self.settings)
+        yield from (point for point in known if point is not None)
 
     def _tick(self, done: int) -> None:
         """Errors and times of so many settings are found."""
         self.progress((done + 1.0) / (2.0 * len(self.settings) + 3.0))
 
     def _errors(self, reference: Reference) -> None:
-        left = [setting for setting in self.settings if self.store.known(setting) is None]
+        left = [s for s in self.settings if self.store.known(s, reference.setting) is None]
         done = len(self.settings) - len(left)
         self._tick(done)
-        for _, point in errors(self.scene, left, reference.run, self.workers):
-            self.store.keep(point)
+        for setting, point in errors(self.scene, left, reference.run, self.workers):
+            time = point.time_ratio if timed(point) else self.store.time(setting)  # against another reference, perhaps
+            self.store.keep(replace(point, time_ratio=time), reference.setting)
             self._tick(done := done + 1)
 
-    def _times(self) -> None:
+    def _times(self, reference: Reference) -> None:
         """Of those that ran, on this processor alone."""
-        for i, setting in enumerate(self.settings):
-            point = self.store.known(setting)
-            assert point is not None
+        for i, point in enumerate(tuple(self._points(reference))):
             if not timed(point):
-                self.store.keep(replace(point, time_ratio=time_of(self.scene, setting)))
+                self.store.keep(replace(point, time_ratio=time_of(self.scene, point.setting)), reference.setting)
             self._tick(len(self.settings) + i + 1)
 
     def _choice(self, reference: Reference) -> tuple[Point | None, dict[str, tuple[float, ...]]]:
         """The cheapest point that holds here and on cases it was not chosen on."""
-        fit = sorted((p for p in self._points if p.error <= self.tolerance), key=lambda p: p.time_ratio)
-        cases = load_cases(self.scene)
-        references: list[Run] = []
+        points = (p for p in self._points(reference) if p.error <= self.tolerance)
         held_out: dict[str, tuple[float, ...]] = {}
-        for point in fit:
-            held = self.store.known_held(point.setting, reference.setting)
-            if held is None:
-                references = references or [finished(reference.setting.of(case)) for case in cases]
-                found = (
-                    error_of(r, finished(point.setting.of(case))) for r, case in zip(references, cases, strict=True)
-                )
-                held = self.store.keep_held(point.setting, reference.setting, tuple(found))
-            held_out[str(point.setting)] = held
-            if max(held, default=0.0) <= self.tolerance:
-                return point, held_out
-        return None, held_out
+        cases = HeldOut(self.scene, reference.setting, self.store)
+        chosen = None
+        for point in sorted(points, key=lambda p: p.time_ratio):
+            held_out[str(point.setting)] = cases.errors(point.setting)
+            if max(held_out[str(point.setting)], default=0.0) <= self.tolerance:
+                chosen = point
+                break
+        self.notes = (*self.notes, *cases.notes)
+        return chosen, held_out

@@ -14,6 +14,7 @@ from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
 from flexctrl.study import tryouts
 from flexctrl.study.held_out import load_cases
+from flexctrl.study.reference import trace
 from flexctrl.study.settings import Fidelity, around, sweep
 from flexctrl.study.store import Point, Store, fingerprint
 
@@ -97,11 +98,15 @@ def test_a_study_goes_on_where_it_was_stopped(scene, tmp_path, monkeypatch):
 
         return fc.work_precision(scene, 0.02, settings=tried, store=store, workers=1, progress=stop)
 
-    assert until(0.25).points == ()
-    assert len(done["errors"]) in range(1, len(tried))
+    early = until(0.25)
+    assert 0 < len(early.points) == len(done["errors"]) < len(tried)
+    assert all(np.isnan(p.time_ratio) for p in early.points)
+    assert "stopped before" in str(early)
+    assert early.plot().axes
     halfway = until(0.75)
     assert not halfway.complete
-    assert 0 < len(halfway.points) < len(tried)
+    assert 0 < sum(np.isfinite(p.time_ratio) for p in halfway.points) < len(halfway.points) == len(tried)
+    assert all(np.isfinite(p.time_ratio) for p in halfway.pareto)
     with store.open("a") as file:
         file.write('{"scene": "trolley", "sett')  # cut off while it was written
     whole = fc.work_precision(scene, 0.02, settings=tried, store=store, workers=1)
@@ -120,7 +125,7 @@ def test_a_study_that_is_complete_runs_nothing_again(scene, study, tmp_path, mon
         raise AssertionError("run again")
 
     with monkeypatch.context() as patched:
-        for name in ("reference.finished", "work_precision.finished", "work_precision.time_of", "tryouts._tried"):
+        for name in ("reference.finished", "on_held_out.finished", "work_precision.time_of", "tryouts._tried"):
             patched.setattr(f"flexctrl.study.{name}", refused)
         again = fc.work_precision(scene, 0.02, settings=tried, store=store, workers=1)
         with pytest.raises(AssertionError, match="run again"):
@@ -135,12 +140,152 @@ def test_points_of_another_scene_are_not_taken_up(scene, tmp_path):
     store, tried = tmp_path / "cost.jsonl", settings(scene)[:2]
     base = scene.with_(controller=scene.law)
     heavier = base.with_(effects=[fc.Gravity((0, 0, -5.0)), *scene.effects[1:]])
-    longer = base.with_(simulation=replace(scene.simulation, until=0.2))
-    marks = [fingerprint(s) for s in (base, heavier, longer, base.with_())]
-    assert len(set(marks)) == 3
-    Store(store, marks[0]).keep(Point(tried[0], 0.1, 1.0, 3))
-    assert Store(store, marks[0]).known(tried[0]) == Point(tried[0], 0.1, 1.0, 3)
-    assert Store(store, marks[1]).known(tried[0]) is None
+    marks = [fingerprint(s) for s in (base, heavier, base.with_())]
+    assert marks[0] == marks[2]
+    Store(store, marks[0]).keep(Point(tried[0], 0.1, 1.0, 3), tried[1])
+    assert Store(store, marks[0]).known(tried[0], tried[1]) == Point(tried[0], 0.1, 1.0, 3)
+    assert Store(store, marks[0]).known(tried[0], tried[0]) is None  # an error against another reference
+    assert Store(store, marks[1]).known(tried[0], tried[1]) is None
+
+
+class Pull:
+    """A law of the user's own: as a spring beside the rope."""
+
+    inputs, outputs, sample_time = ("z",), ("lift",), 0.01
+
+    def __init__(self, gain, at=-3.0, seen=lambda t: None):
+        self.gain, self.at, self.seen = gain, at, seen
+
+    def initial(self):
+        return ()
+
+    def command(self, t, x, y):
+        self.seen(t)
+        return [-self.gain * (y[0] - self.at)]
+
+
+def hoisted(law=None, load=0.0):
+    hook = fc.PointMass("hook", (0, 0, -3), 40.0)
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -3), EA=2e4)
+    structure = fc.Structure(
+        [rope, hook],
+        [fc.Support(rope.start, "u v w"), fc.Pin(rope.end, hook.node)],
+        inputs=[fc.Force("lift", hook.node, "z")],
+        outputs=[fc.Position("z", hook.node, "z")],
+    )
+    effects = (fc.Gravity(), fc.RopeStretch(), fc.LargeRotation())
+    loads = {"lift": load} if load else {}
+    return fc.Scene(structure, effects, law, loads, fc.Simulation(until=0.1, every=0.01), name="hook")
+
+
+FEW = [fc.Setting(Fidelity.FULL, 1, fc.GeneralizedAlpha(h, 0.8), fc.Tolerance()) for h in (4e-3, 2e-3)]
+
+
+def test_a_study_of_a_retuned_law_is_that_of_a_new_scene(tmp_path):
+    """A gain of the user's own object; points of the first stay for the first."""
+    store = tmp_path / "cost.jsonl"
+    first, second, alone, again = (
+        fc.work_precision(hoisted(Pull(gain)), 0.05, settings=FEW, store=path, workers=1)
+        for gain, path in ((500.0, store), (5000.0, store), (5000.0, None), (500.0, store))
+    )
+    errors = [[p.error for p in study.points] for study in (first, second, alone, again)]
+    assert errors[1] == errors[2] != errors[0] == errors[3]
+    assert [p.time_ratio for p in again.points] == [p.time_ratio for p in first.points]
+
+
+def test_where_scenes_cannot_be_told_apart_nothing_is_kept_and_it_is_said(tmp_path):
+    import threading
+
+    law = Pull(500.0)
+    law.lock = threading.Lock()
+    found = fc.work_precision(hoisted(law), 0.05, settings=FEW, store=tmp_path / "cost.jsonl", workers=1)
+    assert found.complete
+    assert "lock" in found.notes[0]
+    assert found.notes[0] in str(found)
+    assert not (tmp_path / "cost.jsonl").read_text()
+
+
+def test_errors_against_another_reference_are_not_taken_up(tmp_path):
+    """More settings ask for a finer reference: errors are those of a study of its own; times stay."""
+    few, more = (
+        fc.work_precision(hoisted(), 0.05, settings=tried, store=tmp_path / "c", workers=1) for tried in (FEW[:1], FEW)
+    )
+    alone = fc.work_precision(hoisted(), 0.05, settings=FEW, workers=1)
+    assert few.reference.setting != more.reference.setting
+    assert [p.error for p in more.points] == [p.error for p in alone.points]
+    assert more.points[0].error != few.points[0].error
+    assert more.points[0].time_ratio == few.points[0].time_ratio
+
+
+def test_stopped_in_its_reference_a_study_keeps_the_runs_that_are_over(tmp_path, monkeypatch):
+    """Ctrl-C in the third run of the reference: no error leaves, and two runs are not made again."""
+    begun = []
+
+    def counted(scene, setting):
+        begun.append(setting)
+        if len(begun) == 3:
+            raise KeyboardInterrupt
+        return trace(scene, setting)
+
+    monkeypatch.setattr("flexctrl.study.work_precision.trace", counted)
+    told = []
+    stopped, whole = (
+        fc.work_precision(hoisted(), 0.05, settings=FEW, store=tmp_path / "c", workers=1, progress=told.append)
+        for _ in range(2)
+    )
+    assert not stopped.complete
+    assert stopped.reference is None
+    assert stopped.points == stopped.pareto == ()
+    assert "stopped before" in str(stopped)
+    assert stopped.plot().axes
+    assert whole.complete
+    assert told.count(1.0) == 1
+    assert len(begun) == len(set(begun)) + 1  # the third alone is begun twice
+
+
+def test_held_out_cases_that_end_early_take_nothing_away(tmp_path):
+    """A motor reels in a hook that at 1.2 times the torque comes up to the winch: the table and the choice stand."""
+    crab, hook = fc.PointMass("crab", (0, 0, 5), 20.0), fc.PointMass("hook", (0, 0, 2), 4.0)
+    winch = fc.Winch(
+        "winch", hook.node, crab.node, EA=1e4, radius=0.1, ratio=2.0, inertia=0.02, damping=50.0, shortest=1.9
+    )
+    structure = fc.Structure(
+        [crab, hook],
+        [fc.Support(crab.node, "u v w"), fc.Support(hook.node, "u v")],
+        [winch],
+        [fc.MotorTorque("lift", winch)],
+        [fc.Position("z", hook.node, "z")],
+    )
+    plan = fc.Simulation(until=1.0, every=0.02)
+    scene = fc.Scene(structure, (fc.Gravity(), fc.RopeStretch(), fc.LargeRotation()), None, {"lift": -2.8}, plan)
+    assert scene.run().status is fc.Status.FINISHED
+    assert scene.with_(loads={"lift": 1.2 * -2.8}).run().status is not fc.Status.FINISHED
+    few = [replace(s, method=fc.GeneralizedAlpha(h, 0.8)) for s, h in zip(FEW, (5e-3, 2.5e-3), strict=True)]
+    first, again = (fc.work_precision(scene, 0.05, settings=few, store=tmp_path / "c", workers=1) for _ in range(2))
+    assert first.complete
+    assert len(first.points) == 2
+    assert first.chosen is not None
+    assert len(first.held_out[str(first.chosen.setting)]) == 1  # × 0.6 alone
+    assert any("× 1.2" in note and "shortest" in note for note in first.notes)
+    assert str(again) == str(first)
+
+
+@pytest.mark.parametrize("content", ["5\n", "[1]\n", "null\n", "name,value\n1,2\n", b"\xff\xfe\x00garbage\n"])
+def test_a_store_that_is_something_else_is_refused_and_left_alone(content, tmp_path):
+    file = tmp_path / "notes.txt"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    before = file.read_bytes()
+    with pytest.raises(StructureError, match=r"notes\.txt.*give a file of its own"):
+        fc.work_precision(hoisted(), 0.05, settings=FEW, store=file, workers=1)
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("store", ["nowhere/cost.jsonl", ".", 5, ""])
+def test_a_store_that_cannot_be_written_is_refused_before_anything_is_run(store, tmp_path, monkeypatch):
+    monkeypatch.setattr("flexctrl.study.work_precision.certified", None)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(StructureError, match="store"):
+        fc.work_precision(hoisted(), 0.05, settings=FEW, store=store, workers=1)
 
 
 @pytest.mark.slow
@@ -228,3 +373,9 @@ def test_wrong_questions_are_answered(scene):
         fc.work_precision(scene, -1.0)
     with pytest.raises(StructureError, match="no simulation"):
         fc.work_precision(replace(scene, simulation=None))
+    for settings in (["full"], FEW[0], "full", 5):
+        with pytest.raises(StructureError, match="sequence of Setting"):
+            fc.work_precision(scene, settings=settings)
+    for workers in (0, True, 1.5, "2"):
+        with pytest.raises(StructureError, match="workers"):
+            fc.work_precision(scene, workers=workers)
