@@ -74,9 +74,13 @@ def test_it_falls_as_the_linear_model_says(record):
     )
 
 
-@pytest.mark.parametrize("count", [2, 3])
-def test_a_regulator_holds_it(record, count):
-    """A torque at the foot from all angles and rates: the linear loop is stable, and so is the machine that leans."""
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "first"), [(2, 1e-2), (3, 1e-2), (5, 1e-5)])
+def test_a_regulator_holds_it(record, count, first):
+    """A torque at the foot from all angles and rates: the linear loop is stable, and so is the machine that leans.
+
+    Five links have gains of 5000: what may lean without falling is that much less.
+    """
     import control
 
     model = standing(count, drives=True)
@@ -99,16 +103,18 @@ def test_a_regulator_holds_it(record, count):
     gain = -regulator.gain @ np.linalg.inv(plant.C)
     law = control.ss([], [], [], gain, inputs=list(plant.output_labels), outputs=["hip"])
     lean = np.zeros(model.n)
-    lean[0] = 0.01
+    lean[0] = first
     slowest = -1.0 / regulator.poles.real.max()
-    run = fc.simulate(model, law, start=model.displace(lean), until=12.0 * slowest, tolerance=fc.Tolerance(1e-6, 1e-9))
+    run = fc.simulate(
+        model, law, start=model.displace(lean), until=12.0 * slowest, tolerance=fc.Tolerance(1e-6, 1e-7 * first)
+    )
     leans = np.array([run[f"lean{i}"] for i in range(count)])
     record(
-        f"D8 {count} masses standing: lean of the regulated machine after 12 time constants, from 0.01 rad [rad]",
-        ours=np.abs(leans[:, -1]).max(),
+        f"D8 {count} masses standing: lean after 12 time constants of the regulator, from {first:g} rad, over that",
+        ours=np.abs(leans[:, -1]).max() / first,
         reference=0,
         source="it comes back",
-        tolerance=Absolute(1e-5),
+        tolerance=Absolute(1e-3),
     )
     exact = plant_motion(plant, regulator.gain, plant.C, leans[:, 0], run.t)
     record(

@@ -1,13 +1,20 @@
-"""D9: snap-through: load control says that there is no equilibrium; the path goes through; stability is told."""
+"""D9: snap-through: load control says that there is no equilibrium; the path goes through; stability is told.
+
+The limits have their numbers in tests/validation (A9, A10, A12). In time the truss of A12 is let go under a load beyond
+its limit: it snaps and swings on the far side, and the energy says how far: 2 · ½ EA (L(y) − L₀)²/L₀ = P (h − y).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from recorder import Absolute
+from scipy.optimize import brentq
 
 import flexctrl as fc
 from flexctrl.errors import EquilibriumError
 
+PAGE = "hard"
 SPAN, HEIGHT, EA = 10.0, 0.5, 1e4
 LIMIT = 4.79925e-5 * EA
 
@@ -83,3 +90,34 @@ def test_a_column_loaded_beyond_euler_stays_straight_and_is_flagged():
     assert fc.equilibrium(model, inputs={"thrust": 0.99 * euler}).unstable == 0
     assert fc.equilibrium(model, inputs={"thrust": 1.5 * euler}).unstable == 1
     assert fc.equilibrium(model, inputs={"thrust": 2.5 * euler}).unstable == 2
+
+
+SNAPS = {
+    "AdaptiveAlpha": (fc.AdaptiveAlpha(), fc.Tolerance(1e-5, 1e-8)),
+    "GeneralizedAlpha": (fc.GeneralizedAlpha(0.02), None),
+    "ConservingMidpoint": (fc.ConservingMidpoint(0.05), None),
+    "ExplicitRungeKutta": (fc.ExplicitRungeKutta(), fc.Tolerance(1e-7, 1e-10)),
+}
+
+
+@pytest.mark.parametrize("name", SNAPS)
+@pytest.mark.parametrize("share", [1.05, 2.0])
+def test_a_snap_in_time_is_bounded_by_its_energy(record, share, name):
+    method, tolerance = SNAPS[name]
+    load, length = share * LIMIT, np.hypot(SPAN, HEIGHT)
+    run = fc.simulate(truss(), until=40.0, inputs={"load": load}, method=method, tolerance=tolerance, every=0.01)
+    lowest = brentq(lambda y: (np.hypot(SPAN, y) - length) ** 2 * EA / length - load * (HEIGHT - y), -5.0, -0.6)
+    record(
+        f"D9 truss under {share:g} times its limit load, {name}: lowest place [m]",
+        ours=run["y"].min(),
+        reference=lowest,
+        source="work of the load is the energy of the springs",
+        tolerance=1e-3,
+    )
+    record(
+        f"D9 truss under {share:g} times its limit load, {name}: energy lost or made",
+        ours=run.report.energy_residual,
+        reference=0.0,
+        source="nothing dissipates",
+        tolerance=Absolute(5e-3),
+    )
