@@ -15,6 +15,7 @@ import numpy as np
 from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.wrapping import Wrapper, by_name, check_names, discretised
 from flexctrl.errors import ControllerError
+from flexctrl.structure.freedoms import numbers
 
 __all__ = ["AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated"]
 
@@ -37,6 +38,11 @@ class Sampled(Wrapper):
         Seconds; 0.0 leaves it continuous.
     original : Controller
         As it was given: what runs without a computer in between.
+
+    Raises
+    ------
+    ControllerError
+        For a time that is negative or not finite, and a controller that is sampled at another rate.
     """
 
     sample_time: float = 0.0
@@ -63,6 +69,11 @@ class Saturated(Wrapper):
         Any.
     limits : mapping of str to float or (float, float)
         Command → largest magnitude, or (lowest, highest); commands left out are free.
+
+    Raises
+    ------
+    ControllerError
+        For a name that is no command, and what is no limit.
     """
 
     limits: Limits = field(default_factory=dict)
@@ -337,7 +348,7 @@ def _rounded(values: np.ndarray, places: np.ndarray, sizes: np.ndarray) -> np.nd
 
 def _bounds(limits: Limits, names: Sequence[str], what: str) -> tuple[np.ndarray, np.ndarray]:
     check_names(limits, names, what)
-    pairs = {name: _pair(value) for name, value in limits.items()}
+    pairs = {name: _pair(value, f"{what}: the limit of {name!r}") for name, value in limits.items()}
     low = by_name({name: pair[0] for name, pair in pairs.items()}, names, -np.inf, what)
     high = by_name({name: pair[1] for name, pair in pairs.items()}, names, np.inf, what)
     for name, (lowest, highest) in pairs.items():
@@ -348,10 +359,12 @@ def _bounds(limits: Limits, names: Sequence[str], what: str) -> tuple[np.ndarray
     return low, high
 
 
-def _pair(limit: float | Sequence[float]) -> tuple[float, float]:
-    if isinstance(limit, Sequence):
-        return float(limit[0]), float(limit[1])
-    return -float(limit), float(limit)
+def _pair(limit: float | Sequence[float], what: str) -> tuple[float, float]:
+    size = numbers([limit])[0]
+    pair = numbers(limit) if np.isnan(size) else (-size, size)
+    if len(pair) != 2 or np.isnan(pair).any():
+        raise ControllerError(f"{what} is {limit!r}; give a magnitude > 0 or (lowest, highest)")
+    return pair
 
 
 def _signal_values(values: Mapping[str, float], of: Controller, what: str) -> tuple[np.ndarray, np.ndarray]:
@@ -360,7 +373,7 @@ def _signal_values(values: Mapping[str, float], of: Controller, what: str) -> tu
     for name, value in values.items():
         if name in of.inputs and name in of.outputs:
             raise ControllerError(f"{what}: {name!r} is both read and commanded; rename one of the plant's signals")
-        if not 0 <= value < np.inf:
+        if not 0 <= numbers([value])[0] < np.inf:
             raise ControllerError(f"{what}: {name!r} is given {value}, which must be 0 or more")
     read = {name: value for name, value in values.items() if name in of.inputs}
     sent = {name: value for name, value in values.items() if name in of.outputs}

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.errors import ControllerError, did_you_mean, shortened
+from flexctrl.structure.freedoms import numbers
 
 __all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised"]
 
@@ -195,7 +196,7 @@ def by_name(values: Mapping[str, float], names: Sequence[str], default: float, w
         If a name is unknown or a value is NaN.
     """
     check_names(values, names, what)
-    array = np.array([values.get(name, default) for name in names], dtype=float)
+    array = np.array(numbers([values.get(name, default) for name in names]))
     if np.isnan(array).any():
         raise ControllerError(f"{what} of {names[int(np.argmax(np.isnan(array)))]!r} is not a number")
     return array

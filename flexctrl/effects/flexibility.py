@@ -132,7 +132,10 @@ class RopeStretch(Deforming):
 
 @dataclass(frozen=True)
 class Flexible(Effect):
-    """All flexibility at once: `BeamFlexibility`, `ShaftElasticity` and `RopeStretch`."""
+    """All flexibility at once: `BeamFlexibility`, `ShaftElasticity` and `RopeStretch`.
+
+    What it is made of may be given one by one instead, for some parts only; `rigid` takes all of it away.
+    """
 
     def parts(self) -> tuple[Effect, ...]:
         """The three."""

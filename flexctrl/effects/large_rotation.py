@@ -9,7 +9,7 @@ from flexctrl.effects.effect import Effect
 
 @dataclass(frozen=True)
 class LargeRotation(Effect):
-    """Parts may move and turn as far as they like: element frames ride along.
+    """Parts may move and turn as far as they like: element frames ride along (Crisfield, Galvanetto & Jelenić 1997).
 
     Without it the model is the linear one about the shape at rest, without prestress: K stays as
     assembled (a hanging chain then has no pendulum stiffness; linearise a large-rotation model for that).

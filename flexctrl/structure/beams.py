@@ -20,6 +20,10 @@ __all__ = ["Beam"]
 class Beam:
     """A straight elastic beam of one or several elements, with inner nodes shared between them.
 
+    Each element has the textbook stiffness and consistent mass matrix of a Euler–Bernoulli beam (Timoshenko where its
+    section shears) in a frame that rides along with it (Crisfield, Galvanetto & Jelenić 1997): strains are small,
+    motions as large as they like.
+
     Parameters
     ----------
     name : str

@@ -67,12 +67,17 @@ class Support:
 
 @dataclass(frozen=True)
 class Weld:
-    """Rigid bond: all freedoms of both nodes are the same.
+    """Rigid bond: all freedoms of both nodes are the same; it bears forces and moments in all directions.
 
     Parameters
     ----------
     first, second : Node
         Coincident nodes of two parts.
+
+    Raises
+    ------
+    StructureError
+        For what is no node, or nodes of one part; in a `Structure`, for nodes that do not coincide.
     """
 
     first: Node
@@ -97,12 +102,17 @@ class Weld:
 
 @dataclass(frozen=True)
 class Pin:
-    """Ball joint: displacements are the same, rotations are each node's own.
+    """Ball joint: displacements are the same, rotations are each node's own; it bears forces and no moments.
 
     Parameters
     ----------
     first, second : Node
-        Coincident nodes of two parts.
+        Coincident nodes of two parts; points, ropes and springs have no rotations and are joined by pins.
+
+    Raises
+    ------
+    StructureError
+        For what is no node, or nodes of one part; in a `Structure`, for nodes that do not coincide.
     """
 
     first: Node
@@ -137,7 +147,12 @@ class Hinge:
     first, second : Node
         Coincident nodes of two parts; the first is the master.
     axis : str or sequence of 3 floats
-        Direction of the hinge axis at rest, global axes.
+        Direction of the hinge axis at rest, global axes; positive angles turn right-handed about it.
+
+    Raises
+    ------
+    StructureError
+        For what is no node, nodes of one part or without rotations, and what is no direction.
     """
 
     first: Node
@@ -177,9 +192,14 @@ class Slide:
     Parameters
     ----------
     first, second : Node
-        Coincident nodes of two parts; the first is the master.
+        Nodes of two parts that coincide as drawn; the first is the master.
     along : str or sequence of 3 floats
-        Direction at rest, global axes.
+        Direction at rest, global axes; positive displacements of the second node go along it.
+
+    Raises
+    ------
+    StructureError
+        For what is no node, nodes of one part, and what is no direction; in a `Structure`, for nodes without rotations.
     """
 
     first: Node

@@ -83,7 +83,7 @@ class Rope:
 
 @dataclass(frozen=True)
 class Spring:
-    """A massless straight spring with damper that pulls and pushes along its line.
+    """A massless straight spring with damper that pulls and pushes along its line: tension k (ℓ − ℓ₀) + d ℓ̇.
 
     Parameters
     ----------
@@ -91,11 +91,11 @@ class Spring:
     start, end : sequence of 3 floats
         Ends at rest [m]; afterwards the end `Node` s, which have translations only.
     stiffness : float
-        [N/m], ≥ 0.
+        k [N/m], ≥ 0.
     length : float, optional
-        Unstretched length [m]; default: the distance of the ends.
+        Unstretched length ℓ₀ [m], > 0; default: the distance of the ends.
     damping : float
-        [N s/m], ≥ 0.
+        d [N s/m], ≥ 0.
 
     Raises
     ------

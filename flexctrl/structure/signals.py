@@ -46,8 +46,14 @@ class Force:
     ----------
     name : str
     at : Node or sequence of Node
+        Where it acts, in full on each.
     direction : str or sequence of 3 floats
-        Global direction; it does not turn with the node (a dead load).
+        Global direction of positive values; it does not turn with the node (a dead load).
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node, and what is no direction.
     """
 
     name: str
@@ -69,7 +75,14 @@ class Torque:
     ----------
     name : str
     at : Node or sequence of Node
+        Where it acts, in full on each.
     axis : str or sequence of 3 floats
+        Global axis; positive values turn right-handed about it.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
     """
 
     name: str
@@ -94,8 +107,14 @@ class FollowerForce:
     ----------
     name : str
     at : Node or sequence of Node
+        Where it acts, in full on each.
     direction : str or sequence of 3 floats
-        Direction in the machine as drawn; it turns with the node.
+        Direction of positive values in the machine as drawn; it turns with the node.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
     """
 
     name: str
@@ -117,8 +136,14 @@ class FollowerTorque:
     ----------
     name : str
     at : Node or sequence of Node
+        Where it acts, in full on each.
     axis : str or sequence of 3 floats
-        Axis in the machine as drawn; it turns with the node.
+        Axis in the machine as drawn; it turns with the node. Positive values turn right-handed about it.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
     """
 
     name: str
@@ -136,11 +161,19 @@ class FollowerTorque:
 class MotorTorque:
     """Input: the torque M_d of a drive's motor on its source angle θ_d, in N m.
 
+    It acts on the motor's side of the reduction: at rest the joint of a `RotaryDrive` bears R M_d. Positive torque
+    drives θ_d up.
+
     Parameters
     ----------
     name : str
     drive : RotaryDrive, LinearDrive, Winch or str
         The drive or its name.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, or what is no drive.
     """
 
     name: str
@@ -162,6 +195,11 @@ class WindSpeed:
     name : str
     direction : str or sequence of 3 floats
         Where the air goes.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, and what is no direction.
     """
 
     name: str
@@ -198,8 +236,16 @@ class Position:
     ----------
     name : str
     at : Node
+        What is measured.
     direction : str or sequence of 3 floats
+        Global direction of positive values.
     minus : Node, optional
+        What it is measured against; default: the ground.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node, and what is no direction.
     """
 
     name: str
@@ -219,8 +265,16 @@ class Velocity:
     ----------
     name : str
     at : Node
+        What is measured.
     direction : str or sequence of 3 floats
+        Global direction of positive values.
     minus : Node, optional
+        What it is measured against; default: the ground.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node, and what is no direction.
     """
 
     name: str
@@ -245,8 +299,16 @@ class Rotation:
     ----------
     name : str
     at : Node
+        What is measured.
     axis : str or sequence of 3 floats
+        Global axis; positive angles turn right-handed about it.
     minus : Node, optional
+        What it is measured against; default: the ground.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
     """
 
     name: str
@@ -266,8 +328,16 @@ class AngularVelocity:
     ----------
     name : str
     at : Node
+        What is measured.
     axis : str or sequence of 3 floats
+        Global axis; positive angles turn right-handed about it.
     minus : Node, optional
+        What it is measured against; default: the ground.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
     """
 
     name: str
@@ -287,6 +357,12 @@ class DriveAngle:
     ----------
     name : str
     drive : RotaryDrive, LinearDrive, Winch or str
+        The drive or its name.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, or what is no drive.
     """
 
     name: str
@@ -305,6 +381,12 @@ class DriveSpeed:
     ----------
     name : str
     drive : RotaryDrive, LinearDrive, Winch or str
+        The drive or its name.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, or what is no drive.
     """
 
     name: str
@@ -330,6 +412,11 @@ class SwayAngle:
         Horizontal direction of travel.
     down : str or sequence of 3 floats
         Default ``"-z"``.
+
+    Raises
+    ------
+    StructureError
+        For what is no node, nodes that are one, and a direction that is not level.
     """
 
     name: str
@@ -366,7 +453,12 @@ class Tension:
     ----------
     name : str
     line : Rope, Spring, Winch or str
-        What is under tension, or its name.
+        What is under tension, or its name; a spring that is pressed has a negative one.
+
+    Raises
+    ------
+    StructureError
+        For a name that python-control refuses, or what is no rope, winch or spring.
     """
 
     name: str

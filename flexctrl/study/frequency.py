@@ -157,6 +157,12 @@ def margins(loop: Loop) -> Margins:
     Returns
     -------
     Margins
+        Infinite where L crosses nothing.
+
+    Raises
+    ------
+    StructureError
+        For what is no loop.
     """
     omega, L = loop_grid(check_loop(loop, "margins"))
     through_one = _roots(lambda w: np.log(abs(loop.at(w))), omega, np.log(abs(L)))

@@ -302,7 +302,10 @@ def test_what_counts_samples_needs_them(wrap):
     [
         (lambda: Saturated(law(), {"torq": 1.0}), "Saturated: .* no signal 'torq'; did you mean 'torque'"),
         (lambda: Saturated(law(), {"torque": -1.0}), r"limits of 'torque' are \(1.0, -1.0\)"),
-        (lambda: Saturated(law(), {"torque": math.nan}), "of 'torque' is not a number"),
+        (lambda: Saturated(law(), {"torque": math.nan}), "the limit of 'torque' is nan; give a magnitude > 0"),
+        (lambda: Saturated(law(), {"torque": "5 N m"}), "the limit of 'torque' is '5 N m'; give a magnitude > 0"),
+        (lambda: Saturated(law(), {"torque": (1.0,)}), r"the limit of 'torque' is \(1.0,\); give a magnitude > 0"),
+        (lambda: Quantised(law(), {"angle": "fine"}), "'angle' is given fine, which must be 0 or more"),
         (lambda: AntiWindup(Tracking(law(), {}), {}), "needs a linear controller, not Tracking"),
         (lambda: Delayed(law(), -1), "samples = -1 must be a whole number"),
         (lambda: Delayed(law(), 1, {"speed": 1.0}), "Delayed.before: .* no signal 'speed'"),
