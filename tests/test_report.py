@@ -54,6 +54,11 @@ def test_the_page_needs_nothing_else(report):
     text = report.read_text(encoding="utf-8")
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!data:)""", text)
     assert "url(" not in text
+    assert text.count('class="lead"') == text.count("<section ")
+    assert len(re.findall(r"<details>", text)) == 1
+    cost = re.search(r'<section id="cost".*?<pre>(.*?)</pre>', text, re.DOTALL)[1].splitlines()
+    assert "cheapest within 0.1" in cost[-1] or "no setting" in cost[-1]
+    assert all(line.endswith("*") for line in cost[3:] if not re.match("reference|passed|cheapest|no setting", line))
     for title in ("Machine", "Modes", "Bode", "Root locus", "Closed loop", "Effects", "Accuracy", "Versions"):
         assert f">{title}<" in text
 

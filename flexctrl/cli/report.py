@@ -17,6 +17,7 @@ from flexctrl.cli.answer import Answer, plain
 from flexctrl.cli.program import COMMANDS, Request
 from flexctrl.design.hardware import Noisy
 from flexctrl.errors import FlexctrlError
+from flexctrl.report.leads import LEADS
 from flexctrl.report.modes import animation
 from flexctrl.report.page import Section, page
 from flexctrl.scene import Scene, load_scene
@@ -31,6 +32,8 @@ _TITLES = {
     "ledger": "Effects",
     "cost": "Accuracy",
 }
+_ORDER = ("outputs", "inputs", "final")
+_AFTER = ("reference: ", "passed over: ", "cheapest within ", "stopped ", "no setting ")
 _MODES = 12
 _PACKAGES = ("numpy", "scipy", "control", "casadi", "matplotlib", "llvmlite", "slycot")
 
@@ -48,8 +51,10 @@ def answer(request: Request) -> Answer:
     scene = load_scene(request.scene)
     out = request.out or Path()
     with tempfile.TemporaryDirectory() as folder:
-        chapters = [_chapter(name, request, Path(folder)) for name in _TITLES if _applies(name, scene)]
-        sections = [*(c.section for c in chapters), Section("versions", "Versions", _versions(scene))]
+        titles = _TITLES if scene.law is not None else {**_TITLES, "compare": "Simulation"}
+        chapters = [_chapter(n, title, request, Path(folder)) for n, title in titles.items() if _applies(n, scene)]
+        versions = Section("versions", "Versions", _versions(scene), lead=LEADS["versions"])
+        sections = [*(c.section for c in chapters), versions]
         motion = _motion(scene) if any(s.moving for s in sections) else {}
         text = page(scene.name, " ".join(scene.notes), sections, motion)
     path = out / f"{scene.name}.html"
@@ -74,15 +79,32 @@ def _applies(name: str, scene: Scene) -> bool:
     return not timed or scene.simulation is not None
 
 
-def _chapter(name: str, request: Request, folder: Path) -> Chapter:
+def _chapter(name: str, title: str, request: Request, folder: Path) -> Chapter:
     own = folder / name
     own.mkdir()
     try:
         found = importlib.import_module(COMMANDS[name].module).answer(replace(request, out=own))
     except FlexctrlError as error:
-        return Chapter(Section(name, _TITLES[name], str(error), failed=True), {})
-    pictures = () if name == "run" else tuple(sorted(own.glob("*.png")))
-    return Chapter(Section(name, _TITLES[name], found.text, pictures, moving=name == "modes"), found.data)
+        return Chapter(Section(name, title, str(error), failed=True), {})
+    pictures = () if name == "run" else tuple(sorted(own.glob("*.png"), key=_rank))
+    text, more = _front(found.text) if name == "cost" else (found.text, "")
+    section = Section(name, title, text, pictures, moving=name == "modes", lead=LEADS[name], more=more)
+    return Chapter(section, found.data)
+
+
+def _rank(picture: Path) -> tuple[int, str]:
+    """Curves before the shape at the end; all else by name."""
+    known = picture.stem in _ORDER
+    return (_ORDER.index(picture.stem) if known else len(_ORDER)), picture.stem
+
+
+def _front(text: str) -> tuple[str, str]:
+    """The settings that no other beats, and what follows from them; and all that were tried."""
+    lines = text.splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("setting"))
+    last = next((i for i, line in enumerate(lines) if line.startswith(_AFTER)), len(lines))
+    kept = [line for i, line in enumerate(lines) if not first < i < last or line.endswith("*")]
+    return "\n".join(kept), text
 
 
 def _motion(scene: Scene) -> dict[str, Any]:

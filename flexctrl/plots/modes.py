@@ -17,6 +17,8 @@ from flexctrl.plots.pose import Drawn, bent_of
 from flexctrl.plots.style import CYCLE, INK, PALE, new_figure, tidy
 
 _MOST_PARTS = 8
+_SPINS = 1e-4
+"""Below this share of what it turns, what a mode displaces is round-off: parts spin about their own axes."""
 
 
 def mode_pose(place: Place, shape: np.ndarray, fraction: float = 0.12) -> Drawn:
@@ -40,7 +42,8 @@ def mode_pose(place: Place, shape: np.ndarray, fraction: float = 0.12) -> Drawn:
     moved = model.rates(at.with_(v=v))[: model.motion.source_base].reshape(-1, 6)
     bent = bent_of(model.structure, model.coordinates, v)
     swings = [np.abs(moved[:, :3]).max(initial=0.0), *(np.abs(a).max(initial=0.0) for a in bent.values())]
-    largest = max(swings) or np.abs(moved[:, 3:]).max(initial=0.0) * model.structure.size
+    turned = np.abs(moved[:, 3:]).max(initial=0.0) * model.structure.size
+    largest = max(swings) if max(swings) > _SPINS * turned else turned
     scale = fraction * model.structure.size / largest if largest else 0.0
     turn = scale * moved[:, 3:]
     turn /= np.maximum(1.0, np.linalg.norm(turn, axis=1, keepdims=True))  # node by node, or none fits its chord

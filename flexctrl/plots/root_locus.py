@@ -15,6 +15,8 @@ from flexctrl.study.zeros import Zeros
 __all__ = ["locus_figure", "plot_root_locus", "zeros_figure"]
 
 _CANCELLED = 0.02
+_NARROW = 0.01
+"""Half the least width of a picture over its height: without damping, real parts are round-off."""
 
 
 def plot_root_locus(
@@ -135,5 +137,5 @@ def _window(loci: Mapping[str, RootLocus], top: float) -> tuple[tuple[float, flo
     near = moving[(abs(moving.imag) <= height) & (abs(moving.real) <= 3 * height)].real
     anchors = fixed.real[(abs(fixed.imag) <= height) & (abs(fixed.real) <= height)]
     ends = np.concatenate([np.quantile(near, [0.03, 0.97]) if near.size else np.zeros(1), anchors, [0.0]])
-    pad = 0.12 * float(np.ptp(ends)) or 0.1 * height
+    pad = max(0.12 * float(np.ptp(ends)), _NARROW * height)
     return (float(ends.min()) - pad, float(ends.max()) + pad), height

@@ -32,6 +32,10 @@ class Section:
     title : str
     text : str
         Shown as it is, in columns.
+    lead : str
+        What is to be seen here, for who sees it for the first time.
+    more : str
+        A longer text that is shown when it is asked for.
     pictures : tuple of Path
         PNG files, taken into the page.
     moving : bool
@@ -46,6 +50,8 @@ class Section:
     pictures: tuple[Path, ...] = ()
     moving: bool = False
     failed: bool = False
+    lead: str = ""
+    more: str = ""
 
 
 def page(title: str, subtitle: str, sections: Sequence[Section], motion: Mapping[str, Any]) -> str:
@@ -80,7 +86,10 @@ def _section(s: Section) -> str:
     kind = ' class="failed"' if s.failed else ""
     swing = _SWING if s.moving else ""
     pictures = "".join(_picture(p) for p in s.pictures)
-    return f'<section id="{s.name}" role="tabpanel">{swing}{pictures}<pre{kind}>{html.escape(s.text)}</pre></section>'
+    lead = f'<p class="lead">{html.escape(s.lead)}</p>' if s.lead else ""
+    more = f"<details><summary>everything</summary><pre>{html.escape(s.more)}</pre></details>" if s.more else ""
+    text = f"<pre{kind}>{html.escape(s.text)}</pre>{more}"
+    return f'<section id="{s.name}" role="tabpanel">{lead}{swing}{pictures}{text}</section>'
 
 
 def _picture(path: Path) -> str:

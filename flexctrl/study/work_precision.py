@@ -90,15 +90,27 @@ class WorkPrecision:
         if self.reference is not None:
             agreed = ", ".join(f"{name} {value:.1e}" for name, value in self.reference.agreement.items())
             lines.append(f"reference: {self.reference.setting}; apart from {agreed}")
-        return "\n".join([*lines, self._verdict, *self.notes])
+        return "\n".join([*lines, *self._passed_over, self._verdict, *self.notes])
 
     @property
     def _verdict(self) -> str:
-        if self.chosen is not None:
-            return f"for {self.tolerance:g}: {self.chosen.setting}, error {self.chosen.error:.2e}"
-        if not self.complete:
-            return "stopped before a setting was chosen"
-        return f"no setting that was tried is within {self.tolerance:g}"
+        if self.chosen is None:
+            if not self.complete:
+                return "stopped before a setting was chosen"
+            return f"no setting that was tried is within {self.tolerance:g}"
+        held = self.held_out.get(str(self.chosen.setting), ())
+        others = f"; {max(held):.2e} at most under held-out loads" if held else "; there are no loads to hold out"
+        return f"cheapest within {self.tolerance:g}: {self.chosen.setting}, error {self.chosen.error:.2e}{others}"
+
+    @property
+    def _passed_over(self) -> list[str]:
+        """Settings that are within the tolerance here, but not under loads they were not looked at for."""
+        failed = {name: max(held, default=0.0) for name, held in self.held_out.items()}
+        return [
+            f"passed over: {name}, {worst:.2e} under held-out loads"
+            for name, worst in failed.items()
+            if worst > self.tolerance
+        ]
 
 
 def work_precision(

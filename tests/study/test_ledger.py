@@ -8,6 +8,7 @@ import pytest
 from scenes import TROLLEY
 
 import flexctrl as fc
+import flexctrl.study.bookkeeping as ledger_module
 from flexctrl.errors import StructureError
 from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
@@ -219,6 +220,25 @@ def test_the_work_of_exact_steps_is_counted():
 
 
 @pytest.mark.slow
+def test_what_takes_longer_without_stays(monkeypatch):
+    """Whatever the counts say: a controller that reads all the time is asked by Python at every step."""
+    timed, names = ledger_module._timed, []
+
+    def slowly(scene):
+        run = timed(scene)[0]
+        sampled = scene.law is not None and scene.law.sample_time
+        names.append(bool(sampled))
+        return run, (1.0 if sampled else 60.0)
+
+    loose = fc.ledger(trolley(), 0.9)
+    monkeypatch.setattr(ledger_module, "_timed", slowly)
+    found = fc.ledger(trolley(), 0.9)
+    assert not all(names)
+    assert found["sampled"].change.outputs_worst <= 0.9
+    assert found["sampled"].keep
+    assert set(found.minimal_set) <= {*loose.minimal_set, "sampled"}
+
+
 def test_what_saves_nothing_stays():
     """Torsion of a beam that nothing twists: the stiffer one has all its freedoms."""
     beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), fc.Section.tube(fc.STEEL, 0.03, 0.002))

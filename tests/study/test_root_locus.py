@@ -208,3 +208,10 @@ def test_critical_gains_are_where_the_number_of_unstable_poles_changes(loop):
     factors = [p.margin for p in margins(loop).phase_crossings]
     for c in found:
         assert c.omega == 0.0 or min(abs(c.gain / k - 1) for k in factors) < 1e-6
+
+
+def test_the_picture_of_an_undamped_loop_does_not_enlarge_round_off():
+    """m ẍ + k x = u under a spring: poles stay on the imaginary axis, at ±(ω, …), real parts of 1e-16."""
+    ax = fc.plot_root_locus(root_locus(open_loop(ct.ss(ct.tf([1.0], [1, 0, 4])))))
+    low, high = ax.get_xlim()
+    assert high - low >= 0.02 * ax.get_ylim()[1]

@@ -70,6 +70,16 @@ def test_nothing_cheaper_that_was_tried_passes(study):
             assert max(study.held_out[str(point.setting)]) > study.tolerance
 
 
+def test_its_words_end_with_the_choice_and_why_nothing_cheaper_was(study):
+    *_, last = str(study).splitlines()
+    assert last.startswith(f"cheapest within {study.tolerance:g}: {study.chosen.setting}, error")
+    assert "under held-out loads" in last
+    failing = replace(study, held_out={**study.held_out, "another setting": (0.5, 2.0)})
+    assert "passed over: another setting, 2.00e+00 under held-out loads" in str(failing)
+    assert "passed over" not in str(replace(study, held_out={}))
+    assert str(replace(study, chosen=None)).splitlines()[-1].startswith("no setting that was tried is within")
+
+
 def test_no_point_of_the_front_is_beaten(study):
     for a in study.pareto:
         assert not any(b.error <= a.error and b.time_ratio < a.time_ratio for b in study.points)
