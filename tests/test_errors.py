@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import flexctrl as fc
+from flexctrl.design import pd, zvd
 from flexctrl.errors import FlexctrlError, did_you_mean, shortened
 
 NODES = [f"arm_{i}_u" for i in range(30)]
@@ -47,3 +48,33 @@ def test_studies_want_a_scene(study):
 def test_comparing_wants_a_scene_or_a_model():
     with pytest.raises(FlexctrlError, match="compare: 'crane' is neither a Scene nor a Model"):
         fc.compare("crane")
+
+
+SECTION = fc.Section.tube(fc.STEEL, 0.03, 0.002)
+BAR = fc.Beam("bar", (0, 0, 0), (1, 0, 0), SECTION)
+MACHINE = fc.Structure([BAR], [fc.Support(BAR.start)])
+MODEL = fc.assemble(MACHINE, [fc.Flexible()], fc.CasadiVM())
+PD = {"measured": "angle", "rate": "speed", "command": "torque"}
+
+
+@pytest.mark.parametrize(
+    ("mistake", "message"),
+    [
+        (lambda: fc.equilibrium(MODEL, hold=["bar_1_u"]), "hold = .'bar_1_u'.; expected displacements by name"),
+        (lambda: fc.equilibrium(MODEL, hold={"bar_1_u": "far"}), "hold 'bar_1_u' = 'far'; expected a number"),
+        (lambda: fc.equilibrium(MODEL, start="rest"), "start = 'rest'; expected a State"),
+        (lambda: fc.equilibrium(MODEL, tolerance=-1.0), "tolerance = -1.0; expected a number > 0"),
+        (lambda: fc.zeros(MODEL), "zeros: Model.* is no linear model; give what linearize returns"),
+        (lambda: fc.open_loop(MODEL), "open_loop: Model.* is no linear model"),
+        (lambda: fc.refine(MODEL, 2), "refine: Model.* is no Structure"),
+        (lambda: fc.Scene(BAR), "Scene: structure = Beam.*; expected a Structure"),
+        (lambda: fc.Scene(MACHINE, simulation=3), "Scene: simulation = 3; expected a Simulation"),
+        (lambda: pd("8", 1.0, **PD), "gain: '8' is not a finite number"),
+        (lambda: pd(float("nan"), 1.0, **PD), "gain: nan is not a finite number"),
+        (lambda: fc.Sampled(pd(1.0, 1.0, **PD), "0.01"), "the sample time '0.01' must be 0 or more seconds"),
+        (lambda: zvd("1"), "the frequency '1' rad/s must be > 0"),
+    ],
+)
+def test_what_is_of_another_kind_is_told_by_name(mistake, message):
+    with pytest.raises(FlexctrlError, match=message):
+        mistake()

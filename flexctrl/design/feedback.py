@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from flexctrl.design.piecewise import require_finite
 from flexctrl.errors import ControllerError
 
 __all__ = ["FilteredRate", "observer", "observer_feedback", "pd", "pi", "pid", "state_feedback"]
@@ -74,6 +75,7 @@ def pi(kp: float, ki: float, *, measured: str, command: str) -> Any:
     control.StateSpace
         Continuous; its state is ``integral``.
     """
+    require_finite("pi: gain", kp, ki)
     return _law(_integral(ki), [[-kp]], [measured], command)
 
 
@@ -98,6 +100,7 @@ def pid(kp: float, ki: float, kd: float, *, measured: str, rate: str | FilteredR
     control.StateSpace
         Continuous; its states are ``integral`` and ``filtered``, as far as needed.
     """
+    require_finite("pid: gain", kp, ki, kd)
     if isinstance(rate, FilteredRate):
         # With the filtered signal z, T ż = y − z, the filtered rate is (y − z)/T.
         slow = [("filtered", -1 / rate.time, 1 / rate.time, kd / rate.time)] if kd else []

@@ -50,8 +50,8 @@ class Sampled(Wrapper):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.sample_time < np.inf:
-            raise ControllerError(f"Sampled: the sample time {self.sample_time} must be a number of seconds, 0 or more")
+        if not 0 <= numbers([self.sample_time])[0] < np.inf:
+            raise ControllerError(f"Sampled: the sample time {self.sample_time!r} must be 0 or more seconds")
         object.__setattr__(self, "original", self.controller)
         object.__setattr__(self, "controller", discretised(self.controller, self.sample_time))
 

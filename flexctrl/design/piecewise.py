@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.errors import ControllerError
+from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -309,5 +310,5 @@ def distinct(instants: Iterable[float]) -> tuple[float, ...]:
 def require_finite(what: str, *values: float) -> None:
     """Raise a `ControllerError` naming the first value that is not finite."""
     for value in values:
-        if not math.isfinite(value):
-            raise ControllerError(f"{what}: {value} is not a finite number")
+        if not math.isfinite(numbers([value])[0]):
+            raise ControllerError(f"{what}: {value!r} is not a finite number")

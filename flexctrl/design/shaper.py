@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 
 from flexctrl.errors import ControllerError
+from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -193,11 +194,11 @@ def convolve(*shapers: Shaper) -> Shaper:
 
 def check_mode(omega: float, zeta: float) -> None:
     """Raise a `ControllerError` unless ω > 0 and 0 ≤ ζ < 1."""
-    if not (omega > 0 and math.isfinite(omega)):
-        raise ControllerError(f"shaper: the frequency {omega} rad/s must be > 0")
+    if not 0 < numbers([omega])[0] < math.inf:
+        raise ControllerError(f"shaper: the frequency {omega!r} rad/s must be > 0")
     _check_damping(zeta)
 
 
 def _check_damping(zeta: float) -> None:
-    if not 0 <= zeta < 1:
+    if not 0 <= numbers([zeta])[0] < 1:
         raise ControllerError(f"shaper: the damping ratio {zeta} must be at least 0 and below 1")

@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, require_finite
 from flexctrl.errors import ControllerError
+from flexctrl.structure.freedoms import numbers
 
 __all__ = [
     "MinimumJerk",
@@ -302,5 +303,5 @@ def _points(what: str, times: Sequence[float], values: Sequence[float]) -> tuple
 
 def _positive(what: str, **values: float) -> None:
     for name, value in values.items():
-        if not value > 0:
-            raise ControllerError(f"{what}: {name} = {value} must be > 0")
+        if not numbers([value])[0] > 0:
+            raise ControllerError(f"{what}: {name} = {value!r} must be > 0")

@@ -15,6 +15,7 @@ from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
 from flexctrl.model.search import Found, Newton, follow
 from flexctrl.model.state import State
+from flexctrl.structure.freedoms import check_finite, check_number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -131,8 +132,11 @@ def equilibrium(
     """
     if not isinstance(model, Model):
         raise StructureError(f"equilibrium: {shortened(model)} is no Model; give what flexctrl.assemble returns")
-    held = {model.coordinate(name): float(value) for name, value in (hold or {}).items()}
+    check_number(tolerance, "tolerance", "equilibrium", above=0.0)
+    held = _held(model, hold or {})
     if start is not None:
+        if not isinstance(start, State):
+            raise StructureError(f"equilibrium: start = {shortened(start)}; expected a State (rest.state, run.final)")
         check_state(model, start, "equilibrium: start")
     begin = (start or model.rest).loose
     held |= {i: float(begin.q[i]) for i in model.motion.frozen}
@@ -146,6 +150,14 @@ def equilibrium(
             found.residual,
         )
     return rest_of(balance, found)
+
+
+def _held(model: Model, hold: Mapping[str, float]) -> dict[int, float]:
+    if not isinstance(hold, Mapping):
+        raise StructureError(f"equilibrium: hold = {shortened(hold)}; expected displacements by name of coordinate")
+    return {
+        model.coordinate(name): check_finite(value, f"hold {name!r}", "equilibrium") for name, value in hold.items()
+    }
 
 
 def rest_of(balance: Balance, found: Found) -> Rest:

@@ -147,6 +147,10 @@ class Scene:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.structure, Structure):
+            raise SceneError(f"Scene: structure = {shortened(self.structure)}; expected a Structure")
+        if not isinstance(self.simulation, Simulation | None):
+            raise SceneError(f"Scene: simulation = {shortened(self.simulation)}; expected a Simulation(until=…)")
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "name", self.name or self.structure.name)
         inputs = [i.name for i in self.structure.inputs]

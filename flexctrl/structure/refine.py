@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass
 from math import gcd
 from typing import Any, TypeVar
 
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.lines import Rope
@@ -37,6 +37,8 @@ def refine(structure: Structure, factor: int) -> Structure:
     StructureError
         For a factor that is no whole number ≥ 1, or a structure tied by a table of numbers.
     """
+    if not isinstance(structure, Structure):
+        raise StructureError(f"refine: {shortened(structure)} is no Structure")
     if factor != int(factor) or factor < 1:
         raise StructureError(f"refine: factor = {factor!r}; expected a whole number ≥ 1")
     _check_joints(structure, "refine")

@@ -366,6 +366,8 @@ def _as_lti(plant: Any, dt: float) -> Any:
         return plant.discretize(dt)
     if isinstance(plant, ReducedStates):
         plant = plant.to_ss()
+    if not isinstance(plant, control.lti.LTI):
+        raise StructureError(f"open_loop: {shortened(plant)} is no linear model; give what linearize or reduce returns")
     system = control.ss(plant)
     if dt and not system.dt:
         system = control.sample_system(system, dt)

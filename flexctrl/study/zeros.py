@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
-from flexctrl.errors import LinearizationError, StructureError
+from flexctrl.errors import LinearizationError, StructureError, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import unsymmetric
 from flexctrl.study.channel import Quadruple, channel_states
@@ -78,6 +78,8 @@ def zeros(linear: LinearModel, inputs: Sequence[str] | None = None, outputs: Seq
     -------
     Zeros
     """
+    if not isinstance(linear, LinearModel):
+        raise StructureError(f"zeros: {shortened(linear)} is no linear model; give what linearize returns")
     channel = linear.select(inputs, outputs).condense()
     A, B, C, D = channel_states(channel)
     rough = deflated_zeros(A, B, C, D)
