@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,8 +42,9 @@ class Rung:
     time_ratio : float
         Processor time of the run over that of a fixed calculation in the same process; infinite if it failed.
     freedoms, steps : int
+        0 for a rung that cannot be.
     failure : str
-        Why the run ended early; empty if it did not.
+        Why it cannot be (a law of force that switches is not linear, say) or its run ended early; empty if it ran.
     """
 
     name: str
@@ -81,8 +81,13 @@ class Ladder:
 
     @property
     def gains(self) -> tuple[float, ...]:
-        """How many times faster each rung is than the next: one fewer than there are rungs."""
-        return tuple(b.time_ratio / a.time_ratio for a, b in pairwise(self.rungs))
+        """How many times faster each rung is than the next that ran: one fewer than there are rungs.
+
+        Infinite for a rung that could not be run itself, or none after it.
+        """
+        times = [rung.time_ratio for rung in self.rungs]
+        after = [next(filter(np.isfinite, times[i:]), np.inf) for i in range(1, len(times))]
+        return tuple(b / a if np.isfinite(a) else np.inf for a, b in zip(times, after, strict=False))
 
     def plot(self) -> Figure:
         """Draw error against time, rung by rung.
@@ -148,8 +153,10 @@ def ladder(
 ) -> Ladder:
     """Run a scene at every fidelity: rigid, with elastic shafts, linear, component modes, full, refined.
 
-    All are the same scene with other effects. Errors are against a certified reference, finer than the refined rung.
-    Times are the shortest of several runs, taken in turn, over that of a fixed calculation made in between.
+    All are the same scene with other effects. One that cannot be, as the linear one with Coulomb friction, backlash or
+    no equilibrium, is told as such and takes nothing from the others. Errors are against a certified reference, finer
+    than the refined rung. Times are the shortest of several runs, taken in turn, over that of a fixed calculation made
+    in between.
 
     Parameters
     ----------
@@ -211,11 +218,11 @@ class _Tried:
             took = time.process_time() - began
             self.time = min(self.time, took / min(unit, calibration()))
         except FlexctrlError as error:
-            self.failure = str(error).splitlines()[0]
+            self.failure = str(error).splitlines()[0].partition(";")[0]  # the remedy would be for the whole scene
 
     def rung(self, reference: Reference) -> Rung:
         """What was found."""
         if self.failure or self.run is None:
-            return Rung(self.name, self.setting, np.inf, np.inf, self.scene.model.n, 0, self.failure)
+            return Rung(self.name, self.setting, np.inf, np.inf, 0, 0, self.failure)
         error, report = error_of(reference.run, self.run), self.run.report
         return Rung(self.name, self.setting, error, self.time, report.dofs, report.steps)

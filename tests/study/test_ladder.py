@@ -14,6 +14,7 @@ from flexctrl.errors import StructureError
 from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
 from flexctrl.study.ladder import rungs
+from flexctrl.study.subject import prepared
 
 
 @pytest.fixture(scope="module")
@@ -77,3 +78,78 @@ def test_wrong_questions_are_answered(scene, climbed):
         climbed["modes"]
     with pytest.raises(StructureError, match="no simulation"):
         fc.ladder(replace(scene, simulation=None))
+
+
+def slider(*effects):
+    """A cart that a geared motor drives along a rail, a load on a rope under it."""
+    cart, load = fc.PointMass("cart", (0, 0, 2), 8.0), fc.PointMass("load", (0, 0, 0), 5.0)
+    rope = fc.Rope("rope", (0, 0, 2), (0, 0, 0), EA=2e4, damping=20.0)
+    drive = fc.LinearDrive(
+        "travel", cart.node, direction="x", radius=0.05, ratio=4.0, stiffness=30.0, inertia=2e-3, damping=0.02
+    )
+    structure = fc.Structure(
+        [cart, rope, load],
+        [fc.Support(cart.node, "v w"), fc.Pin(rope.start, cart.node), fc.Pin(rope.end, load.node)],
+        [drive],
+        [fc.MotorTorque("torque", drive)],
+        [fc.Position("x", load.node, "x"), fc.DriveAngle("angle", drive)],
+    )
+    given = (fc.Gravity(), fc.Flexible(), fc.LargeRotation(), *effects)
+    return fc.Scene(
+        fc.planar(structure, "y"),
+        given,
+        loads={"torque": 1.5},
+        simulation=fc.Simulation(0.1, fc.GeneralizedAlpha(2e-3)),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "named"),
+    [
+        (fc.CoulombFriction({"travel": 0.3}), "CoulombFriction"),
+        (fc.LuGreFriction({"travel": fc.LuGre(50.0, 0.3)}), "LuGreFriction"),
+        (fc.Backlash({"travel": 0.02}), "Backlash"),
+    ],
+)
+def test_a_rung_that_cannot_be_is_told_and_the_others_stand(effect, named):
+    """No linear machine has dry friction or backlash; each other rung is that of its own run."""
+    scene = slider(effect)
+    found = fc.ladder(scene, tolerance=0.1)
+    failed = [r for r in found.rungs if r.failure]
+    assert [r.name for r in failed] == ["linear"]
+    assert named in failed[0].failure
+    assert failed[0].failure in str(found)
+    assert (failed[0].error, failed[0].time_ratio) == (np.inf, np.inf)
+    names = [r.name for r in found.rungs]
+    assert names == ["rigid", "rigid, shafts", "linear", "full", "refined"]
+    for name in ("rigid", "full"):
+        run = found[name].setting.of(prepared(scene, 0.1, "ladder")).run()
+        reference = found.reference.run
+        errors = [np.abs(run[n] - reference[n]).max() / np.abs(reference[n]).max() for n in reference.outputs]
+        assert found[name].error == pytest.approx(max(errors), rel=1e-6)
+    assert found.plot().axes
+
+
+def test_gains_pass_over_rungs_that_did_not_run(climbed):
+    def ladder_of(*times):
+        return replace(climbed, rungs=tuple(replace(climbed.rungs[0], time_ratio=t) for t in times))
+
+    assert ladder_of(1.0, np.inf, 3.0, 12.0).gains == (3.0, np.inf, 4.0)
+    assert ladder_of(1.0, 2.0, np.inf).gains == (2.0, np.inf)
+
+
+def test_a_machine_without_an_equilibrium_has_the_rungs_that_need_none():
+    """A hook on a free winch falls; nothing can be linearised about it."""
+    crab, hook = fc.PointMass("crab", (0, 0, 5), 20.0), fc.PointMass("hook", (0, 0, 2), 4.0)
+    winch = fc.Winch("winch", hook.node, crab.node, EA=2e4, radius=0.1, ratio=2.0, inertia=0.02, damping=50.0)
+    joints = [fc.Support(crab.node, "u v w"), fc.Support(hook.node, "u v")]
+    structure = fc.Structure(
+        [crab, hook], joints, [winch], [fc.MotorTorque("lift", winch)], [fc.Position("z", hook.node, "z")]
+    )
+    plan = fc.Simulation(0.2, fc.GeneralizedAlpha(2e-3), every=0.01)
+    effects = (fc.Gravity(), fc.RopeStretch(), fc.LargeRotation())
+    found = fc.ladder(fc.Scene(structure, effects, simulation=plan), tolerance=0.05)
+    assert found["linear"].failure
+    assert all(np.isfinite(r.error) for r in found.rungs if r.name != "linear")
+    assert found["full"].error < 0.05
