@@ -8,9 +8,11 @@ import shutil
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scenes import TROLLEY
 
+import flexctrl as fc
 from flexctrl.cli import main
 from flexctrl.report.modes import animation
 from flexctrl.report.page import Section, page
@@ -40,13 +42,41 @@ def test_text_is_escaped_and_data_cannot_end_the_script():
 def test_the_animation_is_the_mode_shape():
     scene = scene_from(tomllib.loads(TROLLEY), Place("trolley.toml"), "trolley")
     modes = scene.linear.modes()
-    found = animation(scene.structure, modes)
+    found = animation(modes)
     assert len(found["modes"]) == len(modes)
     assert len(found["rest"]) == len(scene.structure.nodes)
     assert {n for line in found["lines"] for n in line} == set(range(len(found["rest"])))
     pendulum = next(m for m, kind in zip(found["modes"], modes.kinds, strict=True) if kind == "flexible")
     moved = dict(zip([str(n) for n in scene.structure.nodes], pendulum["moved"], strict=True))
     assert abs(moved["node 0 of load"][0]) > 10 * abs(moved["node 0 of load"][2])
+
+
+def test_the_animation_is_of_the_machine_with_the_nodes_that_effects_give_it():
+    """A heavy rope of five pieces hangs straight down from a beam's tip: all is where it was drawn."""
+    tube = fc.Section.tube(fc.STEEL, 0.08, 0.005)
+    jib = fc.Beam("jib", (0, 0, 4), (2, 0, 4), tube, elements=2)
+    rope = fc.Rope("rope", (2, 0, 4), (2, 0, 1), EA=1e6, rhoA=1.5, elements=5)
+    load = fc.PointMass("load", (2, 0, 1), 50.0)
+    joints = [fc.Support(jib.start, "u v w rx ry rz"), fc.Pin(jib.end, rope.start), fc.Pin(rope.end, load.node)]
+    structure = fc.Structure([jib, rope, load], joints)
+    model = fc.assemble(structure, [fc.Gravity(), fc.Flexible(), fc.RopeMass(), fc.LargeRotation()])
+    assert len(model.structure.nodes) > len(structure.nodes)
+    found = animation(fc.linearize(model, at=fc.equilibrium(model)).modes())
+    rest = np.array(found["rest"])
+    curves = [rest[line] for line in found["lines"]]
+    hanging = [c for c in curves if np.ptp(c[:, 2]) > 0.5]
+    lying = [c for c in curves if np.ptp(c[:, 0]) > 0.5]
+    assert len(hanging) == 5
+    assert len(lying) == 1
+    for kept, length in ((hanging, 3.0), (lying, 2.0)):
+        along = sum(np.linalg.norm(np.diff(c, axis=0), axis=1).sum() for c in kept)
+        assert along == pytest.approx(length, abs=0.01)
+    ends = np.vstack(hanging)
+    assert ends[:, 0] == pytest.approx(2.0, abs=0.01)
+    assert (ends[:, 2].min(), ends[:, 2].max()) == pytest.approx((1.0, 4.0), abs=0.05)  # the jib sinks by 2 cm
+    assert any(len(c) == 1 and c[0] == pytest.approx((2.0, 0.0, 1.0), abs=0.05) for c in curves)  # the load
+    for mode in found["modes"]:
+        assert np.abs(mode["moved"]).max() < 0.2 * structure.size
 
 
 @pytest.mark.slow

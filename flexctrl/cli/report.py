@@ -108,9 +108,8 @@ def _front(text: str) -> tuple[str, str]:
 
 
 def _motion(scene: Scene) -> dict[str, Any]:
-    settled = scene.settled
-    modes = settled.linear.modes()
-    return animation(settled.structure, modes.select(list(range(min(_MODES, len(modes))))))
+    modes = scene.settled.linear.modes()
+    return animation(modes.select(list(range(min(_MODES, len(modes))))))
 
 
 def _versions(scene: Scene) -> str:

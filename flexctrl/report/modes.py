@@ -17,12 +17,13 @@ __all__ = ["animation"]
 _ALONG = 9
 
 
-def animation(structure: Structure, modes: Modes) -> dict[str, Any]:
+def animation(modes: Modes) -> dict[str, Any]:
     """Return a machine's lines at rest and at full swing in each mode.
+
+    It is the machine as it was assembled: effects may give it nodes that it was not drawn with, along a heavy rope.
 
     Parameters
     ----------
-    structure : Structure
     modes : Modes
         With their place.
 
@@ -34,6 +35,7 @@ def animation(structure: Structure, modes: Modes) -> dict[str, Any]:
     """
     place = modes.place
     assert place is not None
+    structure = place.model.structure
     still = bent_of(structure, place.model.coordinates, place.state.q)
     rest = _points(structure, Drawn(place.state.x, place.state.R, still))
     poses = [_points(structure, mode_pose(place, modes.shapes[:, k])) for k in range(len(modes))]

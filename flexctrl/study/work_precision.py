@@ -99,7 +99,8 @@ class WorkPrecision:
                 return "stopped before a setting was chosen"
             return f"no setting that was tried is within {self.tolerance:g}"
         held = self.held_out.get(str(self.chosen.setting), ())
-        others = f"; {max(held):.2e} at most under held-out loads" if held else "; there are no loads to hold out"
+        none = "" if self.notes else "; there are no loads to hold out"
+        others = f"; {max(held):.2e} at most under held-out loads" if held else none
         return f"cheapest within {self.tolerance:g}: {self.chosen.setting}, error {self.chosen.error:.2e}{others}"
 
     @property

@@ -95,12 +95,8 @@ def slider(*effects):
         [fc.Position("x", load.node, "x"), fc.DriveAngle("angle", drive)],
     )
     given = (fc.Gravity(), fc.Flexible(), fc.LargeRotation(), *effects)
-    return fc.Scene(
-        fc.planar(structure, "y"),
-        given,
-        loads={"torque": 1.5},
-        simulation=fc.Simulation(0.1, fc.GeneralizedAlpha(2e-3)),
-    )
+    plan = fc.Simulation(0.03, fc.GeneralizedAlpha(2e-3))
+    return fc.Scene(fc.planar(structure, "y"), given, loads={"torque": 1.5}, simulation=plan)
 
 
 @pytest.mark.slow
