@@ -63,10 +63,12 @@ class Forces:
 
     def slots(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the flat vector the kernels read."""
+        return self._slots(state, self.motion.rates(state, v), self.motion.accelerations(state, v, a))
+
+    def _slots(self, state: State, rates: np.ndarray, accelerations: np.ndarray) -> np.ndarray:
+        """The same of raw rates and accelerations."""
         motion = self.motion
         nodes = len(motion.place)
-        rates = motion.rates(state, v)
-        accelerations = motion.accelerations(state, v, a)
         z = np.empty(self.slot_count)
         slots = z[: self.drive_base].reshape(nodes, NODE_SLOT)
         slots[:, :3] = state.x
@@ -279,8 +281,8 @@ class Forces:
 
     def energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""
-        z = self.slots(state, v, np.zeros_like(v))
-        total = np.zeros(3)
+        rates = self.motion.rates(state, v)
+        z, total = self._slots(state, rates, np.zeros_like(rates)), np.zeros(3)
         for batch in self._energy:
             batch(z, total)
         return float(total[0]), float(total[1]), float(total[2])

@@ -173,7 +173,9 @@ class Motion:
         return self._pose(state.x, state.R)
 
     def _pose(self, x: np.ndarray, R: np.ndarray) -> np.ndarray:
-        return np.hstack([x[self.nodes], R[self.nodes].reshape(-1, 9)])
+        pose = np.empty((len(self.nodes), 12))
+        pose[:, :3], pose[:, 3:] = x[self.nodes], R[self.nodes].reshape(-1, 9)
+        return pose
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
         """Return the state after a step of the degrees of freedom.
@@ -259,14 +261,14 @@ class Motion:
     def rates(self, state: State, v: np.ndarray) -> np.ndarray:
         """Return the raw rates of own rates ``v``."""
         raw = np.append(v, 0.0)[self.cells]
-        if not self.plain:
+        if not self.plain and v.any():
             raw[self.linked_cells] = self.linkage.rates(self._pose(state.x, state.R), v[self.linked])
         return raw
 
     def accelerations(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the raw accelerations of own rates ``v`` and accelerations ``a``."""
         raw = np.append(a, 0.0)[self.cells]
-        if not self.plain:
+        if not self.plain and (v.any() or a.any()):
             pose = self._pose(state.x, state.R)
             raw[self.linked_cells] = self.linkage.accelerations(pose, v[self.linked], a[self.linked])
         return raw

@@ -25,12 +25,12 @@ PAGE = """# The fidelity ladder
 <!-- Made by `python tests/benchmarks/ladder.py --page` -->
 
 One scene under ever more physics: rigid, with elastic shafts, linear (integrated exactly), beams as a few modes in
-moving frames, full, refined (twice the elements, half the steps, none longer than half a sample). Errors are against a certified reference, finer than
-all of them: the largest $|Δy|$ of any output over its largest magnitude, so that an output that only flexibility makes
-(`bend`) is wrong by 100 % on the rigid rungs. Times are processor time over that of a fixed calculation in the same
-process, the shortest of several runs in turn; all that `simulate` does is in. What of it belongs to steps and what to
-the run, however long, follows from a run of half the length. A scene has no rung that changes nothing of it (no shafts:
-no rung of shafts).
+moving frames, full, refined (twice the elements, half the steps, none longer than half a sample). Errors are against a
+certified reference, finer than all of them: the largest $|Δy|$ of any output over its largest magnitude, so that an
+output that only flexibility makes (`bend`) is wrong by 100 % on the rigid rungs. Times are processor time over that of
+a fixed calculation in the same process, the shortest of several runs in turn; all that `simulate` does is in. What of
+it belongs to steps and what to the run, however long, follows from a run of half the length. A scene has no rung that
+changes nothing of it (no shafts: no rung of shafts).
 
 ```{{image}} ../_static/fidelity_ladder_3.png
 :alt: Error against time of every rung, one panel a scene
