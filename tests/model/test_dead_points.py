@@ -23,12 +23,16 @@ def linkage(*points: tuple[float, float]) -> fc.Structure:
 
 @pytest.mark.parametrize("step", [0.04, 1e-3, 2e-4])
 def test_a_parallelogram_passes_the_line_with_any_step(step):
-    """Equal bars, no weight: it turns at a constant rate through the line at 90°."""
+    """Equal bars, no weight: it turns at a constant rate through the line at 90°.
+
+    A step that would end on the line goes 2e-6 further; near it a gap that is off by one digit, the last, makes
+    accelerations of 1e-6.
+    """
     model = fc.assemble(linkage((0, 0), (0, 1), (1, 1), (1, 0)), [fc.LargeRotation()])
     start = model.displace([-0.5 * np.pi + 0.05]).with_(v=np.array([-1.0]))
     run = fc.simulate(model, until=0.1, start=start, method=fc.GeneralizedAlpha(step))
     assert run.status is Status.FINISHED
-    assert run["turn"][-1] == pytest.approx(-0.5 * np.pi - 0.05, abs=3e-6)
+    assert run["turn"][-1] == pytest.approx(-0.5 * np.pi - 0.05, abs=6e-6)
     assert run.report.closure_error < 1e-12
 
 
