@@ -11,6 +11,7 @@ import pytest
 import flexctrl as fc
 from flexctrl.study.answers import outputs_apart
 from flexctrl.study.ladder import rungs
+from flexctrl.study.omissions import omissions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STRETCH = {"bridge_crane": 1.2, "ceiling_crane": 0.01, "flexible_arm": 0.2}
@@ -51,3 +52,20 @@ def test_every_rung_of_every_scene_runs(name):
     apart = {rung: max(outputs_apart(runs["refined"], run).values()) for rung, run in runs.items() if rung != "refined"}
     assert apart["full"] < 0.5 * apart["rigid"]
     assert np.isfinite(list(apart.values())).all()
+
+
+@pytest.mark.slow
+def test_the_bridge_crane_costs_a_fifth_without_what_it_does_not_need(monkeypatch):
+    """Its whole cycle of 60 s: what the full ledger leaves out, left out together; work is counted, not timed."""
+    idle = {"rope_stretch", "large_rotation", "stiffness_damping", "saturated"}
+    scene = fc.load_scene(str(EXAMPLES / "bridge_crane.toml"))
+    assert scene.simulation.until == 60.0
+    items = [o for o in omissions(scene.with_(controller=scene.law)) if o.name in idle]
+    assert len(items) == len(idle)
+    monkeypatch.setattr("flexctrl.study.bookkeeping.omissions", lambda scene: items)
+    found = fc.ledger(scene, 0.01)
+    assert found.minimal_set == ()
+    assert found.minimal_change.outputs_worst <= 0.01
+    assert max(outputs_apart(found.full.run, found.minimal.run).values()) <= 0.01
+    assert found.minimal_size.work <= 0.2 * found.size.work
+    assert found.modes is not None
