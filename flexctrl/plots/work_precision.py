@@ -66,4 +66,7 @@ def points_chart(ax: Axes, study: WorkPrecision) -> Axes:
     tidy(ax).set(xlabel="time over that of the calibration", ylabel="largest error of an output, over its magnitude")
     if ran:
         ax.legend(fontsize="small", frameon=False)
+    else:
+        ax.set(xlim=(0.1, 10.0), ylim=(0.01 * study.tolerance, 1.0))
+        ax.text(0.5, 0.5, "no setting was timed", transform=ax.transAxes, ha="center", color=INK)
     return ax

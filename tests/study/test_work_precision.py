@@ -80,6 +80,15 @@ def test_its_words_end_with_the_choice_and_why_nothing_cheaper_was(study):
     assert str(replace(study, chosen=None)).splitlines()[-1].startswith("no setting that was tried is within")
 
 
+@pytest.mark.parametrize("stopped", ["before the reference", "before any error", "before any time"])
+def test_what_was_stopped_has_a_picture_and_words(stopped, study, tmp_path):
+    points = tuple(replace(p, time_ratio=np.nan) for p in study.points) if stopped == "before any time" else ()
+    reference = None if stopped == "before the reference" else study.reference
+    found = replace(study, points=points, reference=reference, chosen=None, held_out={}, complete=False)
+    found.plot().savefig(tmp_path / "cost.png")
+    assert str(found).splitlines()[-1] == "stopped before a setting was chosen"
+
+
 def test_no_point_of_the_front_is_beaten(study):
     for a in study.pareto:
         assert not any(b.error <= a.error and b.time_ratio < a.time_ratio for b in study.points)
