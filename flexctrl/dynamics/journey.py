@@ -35,7 +35,7 @@ SMALLEST = 1e-12
 _NEAR = 1e-9
 _LANDINGS, _LANDINGS_MOST = 5, 60
 _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
-_LEAD, _LEAD_LEAST, _LEAD_MOST = 1e-8, 1e-9, 1e-6
+_LEAD, _LEAD_LEAST, _LEAD_MOST, _LEAD_FAR = 1e-8, 1e-9, 1e-7, 1e-4
 _NUDGES = 8
 _CHATTER = 20
 _FORESEEN = 20_000
@@ -481,22 +481,27 @@ class Journey:
         t, h, gauge, watch = before.state.t, after.state.t - before.state.t, crossing.gauge, self.watch
         lead, side, dust = max(_LEAD * h, 8.0 * math.ulp(t + h)), watch.sides[gauge], watch.dusts[gauge]
         low, high, at, back = t, t + h, crossing.t - lead, lead
-        found, when = before, t
+        found, when, ahead, misses = before, t, 0.0, 0
         for _ in range(_LANDINGS_MOST):
-            if at - t <= SMALLEST * h or high - low <= lead:
+            if at - t <= SMALLEST * h or high - low <= max(_LEAD_MOST * h, lead):
                 break
             try:
                 after = self._towards(before, at - t)
             except StepError as error:
                 raise _Missed(error.worst, str(error)) from error
-            if side * watch.values(after.state, after.supply.u, before.state)[gauge] <= dust:
-                high, back = at, 8.0 * back
+            left = side * float(watch.values(after.state, after.supply.u, before.state)[gauge])
+            if left <= dust:
+                high, back, misses = at, 8.0 * back, misses + 1
                 at = max(high - back, 0.5 * (low + high))
+                if ahead > 0.0 and misses == 1:
+                    at = low + (high - low) * ahead / (ahead - left) - lead
+                    at = at if low < at < high else 0.5 * (low + high)
                 continue
             off = watch.offset(self.track.curve(before, after), before, after, gauge)
             found, low, when = after, after.state.t, after.state.t + max(off, 0.0)
-            high = at if low < at - lead else high  # no step ends there
-            if 0.0 <= off <= max(_LEAD_MOST * h, lead):
+            ahead, misses, missed = left, 0, low < at - lead  # missed: no step ends there
+            high = at if missed else high
+            if 0.0 <= off <= max((_LEAD_FAR if missed else _LEAD_MOST) * h, lead):
                 break
             at = when - lead if low < when - lead < high else 0.5 * (low + high)
         return found, replace(crossing, t=when)
