@@ -55,8 +55,7 @@ def _data(scene: Scene, modes: Modes) -> dict[str, object]:
 
 
 def _share(modes: Modes, k: int, part: str) -> float:
-    shares = modes.kinetic_shares if modes.kinds[k] == "rigid" else modes.strain_shares
-    return float(np.clip(shares[part][k], 0.0, 1.0)) if part else 0.0
+    return float(np.clip(modes.part_shares(k)[part], 0.0, 1.0)) if part else 0.0
 
 
 def _text(scene: Scene, data: dict) -> str:

@@ -160,8 +160,27 @@ class Modes:
             raise StructureError(f"mode numbers run from 0 to {len(self) - 1}; got {index.tolist()}")
         return self._some(index)
 
+    def part_shares(self, mode: int) -> dict[str, float]:
+        """What each part holds of a mode's strain energy; of its kinetic energy where nothing strains.
+
+        Parameters
+        ----------
+        mode : int
+            Mode number, from 0.
+
+        Returns
+        -------
+        dict of str to float
+            Kinetic energy for rigid-body modes and for machines that swing without bending; empty if the model does
+            not know its parts.
+        """
+        mode = check_whole(mode, "mode", "part_shares", least=0, most=len(self) - 1)
+        strains = self.kinds[mode] != "rigid" and any(share[mode] for share in self.strain_shares.values())
+        shares = self.strain_shares if strains else self.kinetic_shares
+        return {part: float(share[mode]) for part, share in shares.items()}
+
     def dominant_part(self, mode: int) -> str:
-        """The part that holds most of the mode's strain energy (kinetic energy for a rigid-body mode).
+        """The part that holds most of a mode, as `part_shares` tells.
 
         Parameters
         ----------
@@ -174,8 +193,8 @@ class Modes:
             Empty if the model does not know its parts.
         """
         mode = check_whole(mode, "mode", "dominant_part", least=0, most=len(self) - 1)
-        shares = self.kinetic_shares if self.kinds[mode] == "rigid" else self.strain_shares
-        return max(shares, key=lambda name: shares[name][mode]) if shares else ""
+        shares = self.part_shares(mode)
+        return max(shares, key=lambda name: shares[name]) if shares else ""
 
     def dominant_coordinate(self, mode: int) -> str:
         """The coordinate with the largest entry of the shape.

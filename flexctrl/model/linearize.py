@@ -124,7 +124,7 @@ def _derivative(
         inputs=model.inputs,
         outputs=model.outputs,
         name=model.structure.name,
-        parts=model.forces.parts(state, T) if model.large else {},
+        parts=model.forces.parts(model.place(state), T),
         place=Place(model, state, sp.identity(model.n, format="csc")[:, free], u),
     )
     return linear, asymmetry
