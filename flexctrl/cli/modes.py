@@ -65,7 +65,8 @@ def _text(scene: Scene, data: dict) -> str:
     columns = zip(*(data[k] for k in ("frequencies_hz", "damping", "kinds", "parts", "shares")), strict=True)
     rows = [(k, f, z, kind, part, f"{100 * share:.0f} %") for k, (f, z, kind, part, share) in enumerate(columns, 1)]
     modes = grid(("mode", "Hz", "damping", "kind", "part", "its share"), rows)
-    more = f"{data['rigid_body_modes']} rigid-body modes" + (
+    count = data["rigid_body_modes"]
+    more = f"{count} rigid-body mode{'s' * (count != 1)}" + (
         f", {data['unstable_modes']} unstable" if data["unstable_modes"] else ""
     )
     return f"{head}\n\n{outputs}\n\n{modes}\n\n{more}"

@@ -35,7 +35,7 @@ class Section:
     lead : str
         What is to be seen here, for who sees it for the first time.
     more : str
-        A longer text that is shown when it is asked for.
+        All that was tried, shown when it is asked for.
     pictures : tuple of Path
         PNG files, taken into the page.
     moving : bool
@@ -87,7 +87,7 @@ def _section(s: Section) -> str:
     swing = _SWING if s.moving else ""
     pictures = "".join(_picture(p) for p in s.pictures)
     lead = f'<p class="lead">{html.escape(s.lead)}</p>' if s.lead else ""
-    more = f"<details><summary>everything</summary><pre>{html.escape(s.more)}</pre></details>" if s.more else ""
+    more = f"<details><summary>all that was tried</summary><pre>{html.escape(s.more)}</pre></details>" if s.more else ""
     text = f"<pre{kind}>{html.escape(s.text)}</pre>{more}"
     return f'<section id="{s.name}" role="tabpanel">{lead}{swing}{pictures}{text}</section>'
 
