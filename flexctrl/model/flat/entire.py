@@ -62,7 +62,7 @@ _NONE = Entire((), np.zeros(0, dtype=int), np.zeros(0))
 
 
 def entire_of(layout: Layout) -> Entire:
-    """Return the kernels of a model; none if it is large, bends, or has laws of force that switch or flow.
+    """Return the kernels of a model; none if it is large, bends, or has freedoms of first order.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def entire_of(layout: Layout) -> Entire:
     Entire
     """
     model, motion = layout.model, layout.motion
-    if not model.large or model.gusts or not 0 < motion.n <= _FREEDOMS:
+    if not model.large or not 0 < motion.n <= _FREEDOMS:
         return _NONE
     if motion.plain or motion.inner.size or motion.flows.size:
         return _NONE
