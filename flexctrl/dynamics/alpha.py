@@ -33,6 +33,7 @@ _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
 _LAST, _ROUND_OFF = 1e-15, 1e-13
+_LEFTOVER = 1e-11  # stiff parts that steps do not resolve make accelerations of it
 
 
 @dataclass(frozen=True)
@@ -368,7 +369,7 @@ class AdaptiveAlpha(_Damped):
         return Controlled(self.first_step, self.largest_step, 3, self.most_steps)
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
-        newton = min(1e-8, max(1e-3 * tolerance.absolute, _LAST))
+        newton = min(_LEFTOVER, max(1e-3 * tolerance.absolute, _LAST))
         return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
 
 
