@@ -132,7 +132,7 @@ class Scene:
     Raises
     ------
     SceneError
-        For a signal that the machine does not have.
+        For a signal that the machine does not have, or `Automatic` given twice.
     """
 
     structure: Structure
@@ -153,6 +153,8 @@ class Scene:
             raise SceneError(f"Scene: simulation = {shortened(self.simulation)}; expected a Simulation(until=…)")
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "name", self.name or self.structure.name)
+        if sum(isinstance(e, Automatic) for e in self.effects) > 1:
+            raise SceneError(f"{self.name}: Automatic stands twice among the effects; give it once, with one tolerance")
         inputs = [i.name for i in self.structure.inputs]
         outputs = [o.name for o in self.structure.outputs]
         for what, given, known in (

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.errors import FlexctrlError
+from flexctrl.structure.freedoms import check_number
 from flexctrl.study.answers import Answer, answer_of, change_between
 from flexctrl.study.exactly import exactly, fewer_modes
 from flexctrl.study.ledger import Entry, Ledger, Size
@@ -64,6 +65,7 @@ def ledger(
         If the full scene itself cannot be run.
     """
     scene = prepared(scene, tolerance, "ledger")
+    check_number(margin_tolerance, "margin_tolerance (relative; infinite: margins do not count)", "ledger", least=0.0)
     return _Auditor(scene, tolerance, margin_tolerance, progress or (lambda done: None)).drawn_up()
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.exact import Exact
@@ -16,12 +17,14 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Deforming, ShaftElasticity
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
+from flexctrl.structure.freedoms import check_whole
 from flexctrl.structure.refine import coarsen, refine
 from flexctrl.structure.structure import Structure
-from flexctrl.study.subject import Subject
+from flexctrl.study.subject import Subject, planned
 
 __all__ = ["Fidelity", "Setting", "sweep"]
 
@@ -180,7 +183,20 @@ def sweep(
     Returns
     -------
     tuple of Setting
+
+    Raises
+    ------
+    StructureError
+        For a scene without a simulation, or what is no fidelity, factor, order, or pair of method and tolerance.
     """
+    planned(scene, "sweep")
+    fidelities, meshes, orders = (
+        _several(fidelities, "fidelities"),
+        _several(meshes, "meshes"),
+        _several(orders, "orders"),
+    )
+    methods = _several(methods, "methods")
+    _check(fidelities, meshes, methods, orders)
     chosen = tuple(methods) or (*around(scene.simulation.method, scene.simulation.tolerance), *_others(scene))
     found: list[Setting] = []
     parts = (*scene.structure.elements, *scene.structure.drives)
@@ -206,6 +222,37 @@ def sweep(
             for method, tolerance in ways
         ]
     return tuple(found)
+
+
+def _several(given: Sequence[Any], what: str) -> tuple[Any, ...]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise StructureError(f"sweep: {what} = {shortened(given)}; expected a sequence")
+    return tuple(given)
+
+
+def _check(
+    fidelities: Sequence[Fidelity],
+    meshes: Sequence[int],
+    methods: Sequence[tuple[Integrator, Tolerance]],
+    orders: Sequence[int],
+) -> None:
+    for what, given in (("fidelities", fidelities), ("meshes", meshes)):
+        if not given:
+            raise StructureError(f"sweep: {what} are none, so there is nothing to try; give at least one")
+    for fidelity in fidelities:
+        if not isinstance(fidelity, Fidelity):
+            hint = did_you_mean(str(fidelity), [f.value for f in Fidelity])
+            raise StructureError(f"sweep: fidelity {shortened(fidelity)}; expected one as Fidelity.FULL{hint}")
+    for mesh in meshes:
+        check_whole(mesh, "mesh (elements over the scene's own)", "sweep", least=1)
+    for order in orders:
+        check_whole(order, "order (number of modes)", "sweep", least=1)
+    for way in methods:
+        pair = way if isinstance(way, tuple) and len(way) == 2 else (None, None)
+        if isinstance(pair[0], type) or not isinstance(pair[0], Integrator) or not isinstance(pair[1], Tolerance):
+            raise StructureError(
+                f"sweep: method {shortened(way)}; expected a pair as (GeneralizedAlpha(1e-3), Tolerance())"
+            )
 
 
 def _exact(scene: Subject, orders: Sequence[int]) -> list[tuple[Integrator, Tolerance]]:

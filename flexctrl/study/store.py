@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, cast
@@ -135,6 +136,15 @@ class Store:
         """Write down which held-out cases a reference cannot be run on; return it."""
         self._write(("cases", repr(reference)), {"notes": list(notes)})
         return notes
+
+    def told_apart(self, settings: Sequence[Setting], reference: Setting) -> bool:
+        """Tell whether settings of nearly the same time were timed in turn."""
+        found = self.lines.get(("apart", repr(reference)), {"settings": ()})["settings"]
+        return {repr(s) for s in settings} <= set(found)
+
+    def tell_apart(self, settings: Sequence[Setting], reference: Setting) -> None:
+        """Write down that settings of nearly the same time were timed in turn."""
+        self._write(("apart", repr(reference)), {"settings": [repr(s) for s in settings]})
 
     def _write(self, key: tuple[str, ...], content: dict[str, Any]) -> None:
         line = {"scene": self.scene, "key": list(key)} | content

@@ -12,10 +12,10 @@ from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
-from flexctrl.structure.freedoms import check_number
+from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
-__all__ = ["Subject", "prepared"]
+__all__ = ["Subject", "planned", "prepared"]
 
 _ROWS = 1000
 
@@ -84,11 +84,31 @@ def prepared(scene: Subject, tolerance: float, study: str) -> Subject:
     StructureError
         For a tolerance that is not positive, what is no scene, or a scene without a simulation.
     """
-    check_number(tolerance, "tolerance (relative, as 0.01)", study, above=0.0)
-    if isinstance(scene, type) or not hasattr(scene, "simulation"):
-        raise StructureError(f"{study}: {shortened(scene)} is no Scene; give flexctrl.Scene(…) or load_scene('….toml')")
-    plan = scene.simulation
-    if plan is None:
-        raise StructureError(f"{study}: scene {scene.name!r} has no simulation; give at least until = … (seconds)")
+    check_finite(tolerance, "tolerance (relative, as 0.01)", study, above=0.0)
+    plan = planned(scene, study)
     every = plan.every or plan.until / _ROWS
     return scene.with_(controller=scene.law, simulation=replace(plan, every=every, rigid_twin=False))
+
+
+def planned(scene: Subject, study: str) -> Any:
+    """Return how a scene is run; refuse what is no scene, or has no simulation.
+
+    Parameters
+    ----------
+    scene : Scene
+    study : str
+        Who asks, for the message.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    StructureError
+    """
+    if isinstance(scene, type) or not hasattr(scene, "simulation"):
+        raise StructureError(f"{study}: {shortened(scene)} is no Scene; give flexctrl.Scene(…) or load_scene('….toml')")
+    if scene.simulation is None:
+        raise StructureError(f"{study}: scene {scene.name!r} has no simulation; give at least until = … (seconds)")
+    return scene.simulation

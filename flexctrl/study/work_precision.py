@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Point", "WorkPrecision", "work_precision"]
 
+_SCATTER = 1.2
+_ROUNDS = 2
+
 
 @dataclass(frozen=True, eq=False)
 class WorkPrecision:
@@ -128,7 +131,8 @@ def work_precision(
     The reference is the full physics on a mesh twice as fine as the finest tried, with steps four times as short as
     the shortest; it is run again on the coarser mesh, with longer steps and with another integrator, and refined
     until these agree. Errors are found in several processes at once; times afterwards, one setting after the other on
-    a core that does nothing else: the shortest of several runs over that of a fixed calculation made in between.
+    a core that does nothing else: the shortest of several runs over that of a fixed calculation made in between. The
+    cheapest that are as near as times scatter are timed again, in turn.
 
     Parameters
     ----------
@@ -212,6 +216,7 @@ class _Study:
             reference = certified(self.scene, self.settings, self.tolerance, self._traced)
             self._errors(reference)
             self._times(reference)
+            self._close(reference)
             chosen, held_out = self._choice(reference)
             complete = True
             self.progress(1.0)
@@ -250,6 +255,20 @@ class _Study:
             if not timed(point):
                 self.store.keep(replace(point, time_ratio=time_of(self.scene, point.setting)), reference.setting)
             self._tick(len(self.settings) + i + 1)
+
+    def _close(self, reference: Reference) -> None:
+        """Those between which the choice lies are timed again, in turn: their times are as near as times scatter."""
+        fit = [p for p in self._points(reference) if p.error <= self.tolerance]
+        least = min((p.time_ratio for p in fit), default=np.inf)
+        near = [p.setting for p in fit if p.time_ratio <= _SCATTER * least]
+        if len(near) < 2 or self.store.told_apart(near, reference.setting):
+            return
+        for setting in _ROUNDS * near:
+            point = self.store.known(setting, reference.setting)
+            assert point is not None
+            time = min(point.time_ratio, time_of(self.scene, setting))
+            self.store.keep(replace(point, time_ratio=time), reference.setting)
+        self.store.tell_apart(near, reference.setting)
 
     def _choice(self, reference: Reference) -> tuple[Point | None, dict[str, tuple[float, ...]]]:
         """The cheapest point that holds here and on cases it was not chosen on."""
