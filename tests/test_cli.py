@@ -340,4 +340,4 @@ def test_cost_tells_the_cheapest_setting(told, tmp_path):
     assert data["chosen"] in [p["setting"] for p in data["points"]]
     assert (tmp_path / "cost.png").stat().st_size > 10_000
     kept = [json.loads(line) for line in (tmp_path / "cost.jsonl").read_text().splitlines()]
-    assert len({line["setting"] for line in kept if "setting" in line}) == len(data["points"])
+    assert len({line["key"][1] for line in kept if line["key"][0] == "point"}) == len(data["points"])

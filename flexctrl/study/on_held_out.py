@@ -68,7 +68,7 @@ def _run(scene: Subject, factor: float) -> tuple[Run | None, str]:
         return finished(scene), ""
     except FlexctrlError as error:
         why = str(error).splitlines()[0]
-        return None, f"not checked with loads and moves × {factor:g}: of the reference there, {why}"
+        return None, f"not checked with loads and moves × {factor:g}, where the reference cannot be run: {why}"
 
 
 def _error(scene: Subject, reference: Run) -> float:
