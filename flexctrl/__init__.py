@@ -40,7 +40,7 @@ _HOMES = {
     "flexctrl.structure.join_table": ("JoinTable",),
     "flexctrl.structure.structure": ("Structure", "planar"),
     "flexctrl.structure.refine": ("coarsen", "refine"),
-    "flexctrl.effects.automatic": ("Automatic",),
+    "flexctrl.effects.automatic": ("Automatic", "Within"),
     "flexctrl.effects.gravity": ("Gravity",),
     "flexctrl.effects.flexibility": ("BeamFlexibility", "Flexible", "RopeStretch", "ShaftElasticity"),
     "flexctrl.effects.component_modes": ("ComponentModes",),

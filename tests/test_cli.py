@@ -331,6 +331,15 @@ def test_ledger_tells_what_each_effect_changes(told, tmp_path):
     assert (tmp_path / "ledger.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize("command", ["bode", "rlocus", "modes"])
+def test_what_is_told_of_the_linear_machine_is_of_all_effects(call, scene, command):
+    """A choice of effects for runs does not touch margins, loci and modes."""
+    chosen = scene.with_name("chosen.toml")
+    chosen.write_text(TROLLEY.replace("[effects]", "[effects]\nautomatic = { tolerance = 0.5 }"), encoding="utf-8")
+    whole, automatic = (json.loads(call(command, path, "--json")[1]) for path in (scene, chosen))
+    assert automatic == whole
+
+
 @pytest.mark.slow
 def test_cost_tells_the_cheapest_setting(told, tmp_path):
     data = told("cost", "--tolerance", "0.05", "--out", tmp_path)

@@ -22,7 +22,7 @@ from flexctrl.study.root_locus import in_s
 
 def answer(request: Request) -> Answer:
     """Return responses and margins of a scene."""
-    scene = load_scene(request.scene).settled
+    scene = load_scene(request.scene)
     cut = cut_of(scene, request)
     responses = {
         name: linear.select([cut.input], [cut.output]).frequency_response(span=cut.span)

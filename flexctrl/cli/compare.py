@@ -13,7 +13,7 @@ from flexctrl.study.compare import Comparison
 
 def answer(request: Request) -> Answer:
     """Run a scene flexible and rigid and compare the curves."""
-    scene = load_scene(request.scene).settled
+    scene = load_scene(request.scene)
     run, twin = run_both(scene, twin=True)
     if twin is None:  # interrupted: what there is, is kept
         return Answer(f"{scene.name}: interrupted at t = {run.t[-1]:.4g} s", plain(told(run)), problem(run, twin))

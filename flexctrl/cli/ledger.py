@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from flexctrl.cli.answer import Answer, plain, write_json
 from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
+from flexctrl.effects.automatic import Within
 from flexctrl.errors import SceneError
 from flexctrl.scene import load_scene
 from flexctrl.study.bookkeeping import ledger
@@ -16,8 +19,9 @@ def answer(request: Request) -> Answer:
     if not request.tolerance > 0.0:
         raise SceneError(f"--tolerance {request.tolerance}: expected a relative change > 0, e.g. 0.01")
     scene = load_scene(request.scene)
+    asked = Within(outputs=request.tolerance) if request.outputs_only else Within.of(request.tolerance, "ledger")
     with progress(f"{scene.name}: ledger") as tell:
-        found = ledger(scene, request.tolerance, progress=tell)
+        found = ledger(scene, asked, progress=tell)
     data = _data(found)
     write_json(request.out, "ledger.json", data)
     if request.out is not None:
@@ -40,7 +44,8 @@ def _data(found: Ledger) -> dict[str, object]:
     return plain(
         {
             "scene": found.name,
-            "tolerance": found.tolerance,
+            "tolerance": found.within.outputs,
+            "within": asdict(found.within),
             "effects": [_entry(e) for e in found.entries],
             "minimal_set": found.minimal_set,
             "minimal": minimal,
@@ -50,7 +55,13 @@ def _data(found: Ledger) -> dict[str, object]:
 
 
 def _entry(e: Entry) -> dict[str, object]:
-    base: dict[str, object] = {"name": e.name, "output_change": None, "cost_ratio": e.cost_ratio, "keep": e.keep}
+    base: dict[str, object] = {
+        "name": e.name,
+        "output_change": None,
+        "cost_ratio": e.cost_ratio,
+        "keep": e.keep,
+        "stays": e.stays,
+    }
     base |= {"against_without": list(e.first)}
     if e.change is None or e.size is None:
         return {**base, "failure": e.failure}

@@ -18,7 +18,7 @@ def answer(request: Request) -> Answer:
     """Return the equilibrium and the lowest modes of a scene."""
     if request.count < 1:
         raise SceneError(f"--count {request.count}: ask for at least one mode")
-    scene = load_scene(request.scene).settled
+    scene = load_scene(request.scene)
     every = scene.linear.modes()
     modes = every.select(list(range(min(request.count, len(every)))))
     counts = {"rigid_body_modes": every.rigid, "unstable_modes": every.unstable, "massless_freedoms": every.massless}

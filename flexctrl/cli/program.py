@@ -74,7 +74,7 @@ COMMANDS = {
         "flexctrl.cli.ledger",
         "every effect: what leaving it out changes, what it costs, and the smallest set that will do",
         "flexctrl ledger examples/ceiling_crane.toml --tolerance 0.01 --out results",
-        ("tolerance",),
+        ("tolerance", "outputs-only"),
     ),
     "cost": Command(
         "flexctrl.cli.cost",
@@ -99,6 +99,7 @@ COMMANDS = {
 _OPTIONS: dict[str, dict[str, object]] = {
     "count": {"type": int, "default": 12, "metavar": "N", "help": "how many modes to show, lowest first (12)"},
     "tolerance": {"type": float, "default": 0.01, "metavar": "X", "help": "relative change that is borne (0.01)"},
+    "outputs-only": {"action": "store_true", "help": "hold the outputs; poles and margins are told but do not count"},
     "input": {"default": "", "metavar": "NAME", "help": "input where the loop is looked at or cut"},
     "output": {"default": "", "metavar": "NAME", "help": "output of the response"},
     "workers": {
@@ -123,6 +124,7 @@ class Request:
     count : int
     input, output : str
     tolerance : float
+    outputs_only : bool
     workers : int or None
     """
 
@@ -132,6 +134,7 @@ class Request:
     input: str = ""
     output: str = ""
     tolerance: float = 0.01
+    outputs_only: bool = False
     workers: int | None = None
 
 

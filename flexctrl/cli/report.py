@@ -108,7 +108,7 @@ def _front(text: str) -> tuple[str, str]:
 
 
 def _motion(scene: Scene) -> dict[str, Any]:
-    modes = scene.settled.linear.modes()
+    modes = scene.linear.modes()
     return animation(modes.select(list(range(min(_MODES, len(modes))))))
 
 

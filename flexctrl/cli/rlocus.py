@@ -23,7 +23,7 @@ _GAINS = np.geomspace(1e-3, 30.0, 400)  # of a controller, whose own gain is 1
 
 def answer(request: Request) -> Answer:
     """Return the root loci of a scene."""
-    scene = load_scene(request.scene).settled
+    scene = load_scene(request.scene)
     cut = cut_of(scene, request)
     loops = {name: cut.loop(linear) for name, linear in cut.machines.items() if _moves(cut, linear)}
     loci = {name: root_locus(loop, _GAINS if cut.controlled else None) for name, loop in loops.items()}

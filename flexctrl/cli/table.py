@@ -22,7 +22,7 @@ from flexctrl.structure.structure import Structure
 
 def answer(request: Request) -> Answer:
     """Return the join table of a scene's machine."""
-    scene = load_scene(request.scene).settled
+    scene = load_scene(request.scene)
     machine, audit = scene.structure, _audit(scene.model)
     table = machine.join_table
     elements = [_element(machine, part) for part in machine.elements]

@@ -57,7 +57,8 @@ def change_bars(ax: Axes, ledger: Ledger) -> Axes:
     for row, entry in zip(rows, ledger.entries, strict=True):
         if entry.change is None:
             ax.text(2 * _LEAST, float(row), "cannot be left out", va="center", fontsize=8, color=INK)
-    ax.axvline(ledger.tolerance, color=RIGID, linewidth=1.2)
+    if np.isfinite(ledger.within.outputs):
+        ax.axvline(ledger.within.outputs, color=RIGID, linewidth=1.2)
     ax.set_xscale("log")
     ax.set_yticks(rows, [e.name.replace("_", " ") for e in ledger.entries])
     ax.invert_yaxis()

@@ -85,6 +85,7 @@ EFFECTS: dict[str, Kind] = {
 }
 """Effects by the name they have in a scene file."""
 
+_WITHIN = Kind(Automatic.within, dict.fromkeys(("outputs", "poles", "margins"), positive))
 _THROUGH = Kind(RayleighDamping.through, dict.fromkeys(("zeta", "omega1", "omega2"), positive))
 
 
@@ -119,8 +120,14 @@ def _effect(name: str, value: Any, place: Place) -> Effect:
         return checked(EFFECTS[name].make, place)
     if not isinstance(value, Mapping):
         raise place.expected("true, false or a table of its parameters", value)
-    kind = _THROUGH if name == "rayleigh_damping" and "zeta" in value else EFFECTS[name]
-    return kind.read(value, place)
+    return _kind(name, value).read(value, place)
+
+
+def _kind(name: str, value: Mapping[str, Any]) -> Kind:
+    """How the parameters of an effect are told, where there is more than one way."""
+    if name == "automatic" and "tolerance" not in value:
+        return _WITHIN
+    return _THROUGH if name == "rayleigh_damping" and "zeta" in value else EFFECTS[name]
 
 
 __all__ = ["EFFECTS", "effects"]

@@ -12,6 +12,8 @@ from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.errors import ControllerError, FlexctrlError
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.statespace import modal_first_order
 from flexctrl.study.broken_loop import broken_loop, linear_law
 from flexctrl.study.frequency import margins
 from flexctrl.study.gain_family import gain_family
@@ -19,7 +21,7 @@ from flexctrl.study.subject import Subject
 
 __all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
 
-_SLOW = 6
+_SLOW = 6  # poles that are compared, each with any of twice as many
 _ROUNDING = 1e-12  # of the machine's size; thousands of roundings
 
 
@@ -59,7 +61,7 @@ class Answer:
     ----------
     run : Run
     poles : numpy.ndarray of complex
-        The slowest poles off the origin with Im ≥ 0 [1/s], of the closed loop if the scene has a linear law.
+        Poles off the origin with Im ≥ 0 [1/s], the slowest first, of the closed loop if the scene has a linear law.
     margins : mapping of str to (float, float)
         Gain margin (factor) and phase margin [rad] at each commanded input, the loop cut there.
     """
@@ -79,11 +81,12 @@ class Change:
         max |Δy| over the largest |y| of the first, by output; 0 where it is but rounding.
     poles : float
         Largest |Δs| over the larger |s| of both among the slow poles, paired so that the sum is least: 1 where one
-        comes to rest or runs away, 2 at most; NaN without any.
+        comes to rest or runs away, is gone or new, 2 at most; NaN if the first answer has none.
     margins : float
-        Largest relative change of a gain or phase margin; NaN without a linear loop.
+        Largest change of a gain or phase margin over the larger of both: 1 where one is limited and the other is not;
+        NaN if the first answer has none.
     pole : complex
-        The pole of the first answer that changes so [1/s]; NaN without any.
+        The pole that changes so [1/s], of the first answer if it has it; NaN without any.
     """
 
     outputs: Mapping[str, float]
@@ -113,9 +116,9 @@ def answer_of(scene: Subject, run: Run) -> Answer:
     try:
         if law is None:
             return Answer(run, _slow(scene.linear.damped_poles()))
-        family = gain_family(scene.linear, law)
-        poles = np.array([family.continuous(p) for p in family.at(1.0).poles if abs(p) > 0.0])
-        return Answer(run, _slow(poles), {name: _margins(scene, law, name) for name in law.outputs})
+        return Answer(
+            run, _slow(_closed(scene.linear, law)), {name: _margins(scene, law, name) for name in law.outputs}
+        )
     except FlexctrlError:  # no equilibrium, say: the curves still count
         return Answer(run, np.zeros(0, complex))
 
@@ -130,11 +133,29 @@ def _linear_law(scene: Subject) -> LinearController | None:
     return law if law.inputs else None
 
 
+def _closed(linear: LinearModel, law: LinearController) -> np.ndarray:
+    """Poles of the closed loop, and of the modes that it does not touch.
+
+    Samples do not tell a mode faster than half of them from a slow one; poles that are mostly such a mode are left out.
+    """
+    family, plant = gain_family(linear, law), modal_first_order(linear)
+    pace = np.zeros(len(plant.A))
+    omega = np.repeat(np.sqrt(np.abs(linear._modal.modes.omega_squared)), 2)
+    pace[: len(omega)] = omega
+    touched, spectrum = family.states, family.at(1.0)
+    told = np.abs(spectrum.poles) > 0.0
+    if family.dt and len(touched):
+        told &= pace[touched[np.abs(spectrum.shapes[: len(touched)]).argmax(axis=0)]] < np.pi / family.dt
+    closed = [family.continuous(p) for p in spectrum.poles[told]]
+    others = np.setdiff1d(np.arange(len(pace)), touched)
+    return np.concatenate([np.array(closed, complex), np.linalg.eigvals(plant.A[np.ix_(others, others)])])
+
+
 def _slow(poles: np.ndarray) -> np.ndarray:
-    """The slowest poles that are neither at rest nor the lower half of a pair."""
+    """The poles that are neither at rest nor the lower half of a pair, the slowest first."""
     size = np.abs(poles)
     moving = poles[(size > 1e-6 * size.max(initial=0.0)) & (poles.imag >= 0.0)]
-    return moving[np.argsort(np.abs(moving))][:_SLOW]
+    return moving[np.argsort(np.abs(moving))][: 2 * _SLOW]
 
 
 def _margins(scene: Subject, law: LinearController, name: str) -> tuple[float, float]:
@@ -188,21 +209,38 @@ def _apart(first: Curves, second: Run | Curves, name: str) -> float:
 
 
 def _poles_apart(first: np.ndarray, second: np.ndarray) -> tuple[float, complex]:
-    """The largest change of a pole, and which it is."""
-    if not first.size or not second.size:
+    """The largest change of a slow pole of either, and which it is."""
+    if not first.size:
         return np.nan, complex("nan")
-    gaps = np.abs(first[:, None] - second) / np.maximum(np.abs(first)[:, None], np.abs(second))
-    if gaps.shape[0] > gaps.shape[1]:  # poles that are gone
-        gaps = np.hstack([gaps, np.ones((gaps.shape[0], gaps.shape[0] - gaps.shape[1]))])
-    found = gaps[linear_sum_assignment(gaps)]
-    return float(found.max()), complex(first[int(np.argmax(found))])
+    there, back = _nearest(first[:_SLOW], second), _nearest(second[:_SLOW], first)
+    changes = [(gap, pole) for gap, pole, _ in there] + [
+        (gap, pole if other is None else other) for gap, pole, other in back
+    ]
+    return max(changes, key=lambda found: found[0])
+
+
+def _nearest(poles: np.ndarray, others: np.ndarray) -> list[tuple[float, complex, complex | None]]:
+    """How far poles are from those they are paired with, and which these are; alone they are off by 1."""
+    gaps = np.abs(poles[:, None] - others) / np.maximum(np.abs(poles)[:, None], np.abs(others))
+    pairs = dict(zip(*(side.tolist() for side in linear_sum_assignment(gaps)), strict=True))
+    return [
+        (float(gaps[i, pairs[i]]), complex(p), complex(others[pairs[i]])) if i in pairs else (1.0, complex(p), None)
+        for i, p in enumerate(poles)
+    ]
 
 
 def _margins_apart(first: Mapping[str, tuple[float, float]], second: Mapping[str, tuple[float, float]]) -> float:
     changes = [
-        abs(b / a - 1.0)
-        for name in first.keys() & second.keys()
-        for a, b in zip(first[name], second[name], strict=True)
-        if np.isfinite(a) and np.isfinite(b) and a != 0.0
+        _margin_apart(a, b)
+        for name, both in first.items()
+        for a, b in zip(both, second.get(name, (np.nan, np.nan)), strict=True)
     ]
     return max(changes, default=np.nan)
+
+
+def _margin_apart(a: float, b: float) -> float:
+    """Change of a margin over the larger of both; none at all, or no limit, is as far from a number as can be."""
+    if a == b or (np.isnan(a) and np.isnan(b)):
+        return 0.0
+    larger = max(abs(a), abs(b))
+    return abs(b - a) / larger if np.isfinite(larger) and np.isfinite(a + b) else 1.0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.exact import Exact
+from flexctrl.effects.automatic import Within
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.study.answers import Answer, Change
 from flexctrl.study.subject import Subject
@@ -61,11 +62,13 @@ class Entry:
     size : Size or None
         Of the scene without it.
     keep : bool
-        Whether the minimal set has it.
+        Whether the minimal scene has it.
     failure : str
         Why the scene cannot do without it; empty if it can.
     first : tuple of str
         What cannot be without it (friction in a linear machine): left out before, and what the change is against.
+    stays : str
+        Why the minimal scene has it though the answer could do without; empty if it could not.
     """
 
     name: str
@@ -75,6 +78,7 @@ class Entry:
     keep: bool
     failure: str = ""
     first: tuple[str, ...] = ()
+    stays: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +89,8 @@ class Ledger:
     ----------
     name : str
         The scene's.
-    tolerance : float
-        Largest change of an output that is borne, over its largest magnitude.
+    within : Within
+        Largest changes that are borne.
     entries : tuple of Entry
         In the scene's order.
     full : Answer
@@ -106,7 +110,7 @@ class Ledger:
     """
 
     name: str
-    tolerance: float
+    within: Within
     entries: tuple[Entry, ...]
     full: Answer
     size: Size
@@ -142,7 +146,7 @@ class Ledger:
 
     @property
     def minimal_set(self) -> tuple[str, ...]:
-        """Names of the effects that are kept."""
+        """Names of the effects that the minimal scene has."""
         return tuple(e.name for e in self.entries if e.keep)
 
     def __getitem__(self, name: str) -> Entry:
@@ -168,21 +172,30 @@ class Ledger:
         lines = [f"{'without':<{wide}}" + "".join(f"  {head:>{_width(head)}}" for head in heads)]
         lines += [self._line(e, wide) for e in self.entries]
         kept = ", ".join(self.minimal_set) or "nothing"
-        change, asked = _percent(self.minimal_change.outputs_worst), _percent(self.tolerance)
         size = f"{self.minimal_size.states} of {self.size.states} states"
-        lines += [f"kept: {kept}", f"outputs within {change} (asked: {asked}), {self.pace}, {size}{self._way}"]
+        lines += [f"kept: {kept}", f"{self.changes} (asked: {self.within}), {self.pace}, {size}{self._way}"]
+        if all(e.keep for e in self.entries):
+            lines.append("the full set: no smaller one keeps the answer and is as fast")
         return "\n".join(lines)
+
+    @property
+    def changes(self) -> str:
+        """How far the minimal set's answer is from the full one's, in words."""
+        change = self.minimal_change
+        found = {"outputs": change.outputs_worst, "poles": change.poles, "margins": change.margins}
+        return "within: " + ", ".join(f"{name} {_percent(c)}" for name, c in found.items() if np.isfinite(c))
 
     def _line(self, e: Entry, wide: int) -> str:
         if e.change is None or e.size is None:
-            return f"{e.name:<{wide}}  kept: {e.failure}"
+            return f"{e.name:<{wide}}  {'kept' if e.keep else 'gone with others'}: {e.failure}"
         outputs, poles, margins = (_percent(c) for c in (e.change.outputs_worst, e.change.poles, e.change.margins))
         pole = f"{e.change.pole:.2g}" if e.change.poles > 0.0 else "–"
         cells = [f"{c:>10}" for c in (margins, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)]
         places = [f"{outputs:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}"]
         line = "  ".join([f"{e.name:<{wide}}", *places, *cells])
         before = f"  (both without {', '.join(e.first)})" if e.first else ""
-        return line + ("  keep" if e.keep else "") + before
+        keep = f"  keep{f' ({e.stays})' if e.stays else ''}" if e.keep else ""
+        return line + keep + before
 
 
 def _percent(value: float) -> str:

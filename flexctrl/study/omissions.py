@@ -47,7 +47,7 @@ class Omission:
     ----------
     name : str
     without : callable
-        Scene → the same without it.
+        Scene → the same without it; the scene itself if it does not have it.
     spares : bool
         Whether something is gone then, or only much stiffer.
     first : tuple of str
@@ -58,6 +58,19 @@ class Omission:
     without: Callable[[Subject], Subject]
     spares: bool = True
     first: tuple[str, ...] = ()
+
+    def is_in(self, scene: Subject) -> bool:
+        """Tell whether a scene has what is left out here.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        bool
+        """
+        return self.without(scene) is not scene
 
 
 def omissions(scene: Subject) -> tuple[Omission, ...]:
@@ -79,7 +92,7 @@ def omissions(scene: Subject) -> tuple[Omission, ...]:
     found = [o for e in scene.effects for part in e.parts() for o in _of_effect(part, scene.structure)]
     parts = (*scene.structure.elements, *scene.structure.drives)
     for name, kinds in _DASHPOTS.items():
-        if any(isinstance(p, kinds) and getattr(p, "damping", 0.0) for p in parts):
+        if any(_is_damped(p, kinds) for p in parts):
             found.append(Omission(name, partial(_undamped, kinds)))
     return (*(_after_what_needs_it(o, scene) for o in found), *_of_controller(scene.law))
 
@@ -105,9 +118,7 @@ def _of_effect(effect: Effect, structure: Structure) -> list[Omission]:
     if isinstance(effect, RayleighDamping):
         shares = {"mass_damping": "alpha", "stiffness_damping": "beta"}
         return [
-            Omission(name, partial(_without_share, RayleighDamping, share))
-            for name, share in shares.items()
-            if getattr(effect, share)
+            Omission(name, partial(_without_share, share)) for name, share in shares.items() if getattr(effect, share)
         ]
     if isinstance(effect, LargeRotation):
         return [Omission("large_rotation", _small), Omission("geometric_stiffness", _unloaded)]
@@ -134,15 +145,20 @@ def _stiffened_part(kind: type[Deforming], name: str, scene: Subject) -> Subject
     effect = next((e for e in _flat(scene) if type(e) is kind), None)
     if effect is None:
         return scene
-    parts = [p.name for p in (*scene.structure.elements, *scene.structure.drives) if effect.bends(p) and p.name != name]
-    if not parts:
+    parts = [p.name for p in (*scene.structure.elements, *scene.structure.drives) if effect.bends(p)]
+    if name not in parts:
+        return scene
+    if parts == [name]:
         return _without_effect(kind, scene)
-    fewer = replace(effect, of=tuple(parts))
-    return scene.with_(effects=[fewer if type(e) is kind else e for e in _flat(scene)])
+    fewer = replace(effect, of=tuple(part for part in parts if part != name))
+    return _with_effects(scene, [fewer if type(e) is kind else e for e in _flat(scene)])
 
 
 def _stiffened_section(name: str, scene: Subject) -> Subject:
-    """All beams hardly give in one way: they keep their freedoms, so nothing is saved."""
+    """All beams that bend hardly give in one way: they keep their freedoms, so nothing is saved."""
+    effects = _flat(scene)
+    if not any(e.bends(p) for e in effects for p in scene.structure.elements if isinstance(p, Beam)):
+        return scene
     elements = [
         replace(e, section=replace(e.section, **{k: _STIFF * getattr(e.section, k) for k in _RIGIDITIES[name]}))
         if isinstance(e, Beam)
@@ -161,32 +177,43 @@ def _flat(scene: Subject) -> list[Effect]:
     return [part for e in scene.effects for part in e.parts()]
 
 
+def _with_effects(scene: Subject, effects: list[Effect]) -> Subject:
+    """A scene with other effects; itself if they are no others."""
+    return scene if effects == _flat(scene) else scene.with_(effects=effects)
+
+
 def _without_effect(kind: type[Effect], scene: Subject) -> Subject:
-    return scene.with_(effects=[e for e in _flat(scene) if type(e) is not kind])
+    return _with_effects(scene, [e for e in _flat(scene) if type(e) is not kind])
 
 
 def _small(scene: Subject) -> Subject:
     """Small motion about the loaded equilibrium."""
-    return scene.with_(effects=[GeometricStiffness() if isinstance(e, LargeRotation) else e for e in _flat(scene)])
+    return _with_effects(scene, [GeometricStiffness() if isinstance(e, LargeRotation) else e for e in _flat(scene)])
 
 
 def _unloaded(scene: Subject) -> Subject:
     """Small motion as if nothing were loaded."""
     kinds = (LargeRotation, GeometricStiffness)
-    return scene.with_(effects=[e for e in _flat(scene) if not isinstance(e, kinds)])
+    return _with_effects(scene, [e for e in _flat(scene) if not isinstance(e, kinds)])
 
 
-def _without_share(kind: type[Effect], share: str, scene: Subject) -> Subject:
-    """Leave out one share of an effect."""
-    changed = [replace(e, **{share: 0.0}) if type(e) is kind else e for e in _flat(scene)]  # type: ignore[type-var]
-    return scene.with_(effects=changed)
+def _without_share(share: str, scene: Subject) -> Subject:
+    """Leave out one share of Rayleigh damping, which goes with the last."""
+    changed = [replace(e, **{share: 0.0}) if isinstance(e, RayleighDamping) else e for e in _flat(scene)]
+    return _with_effects(scene, [e for e in changed if not isinstance(e, RayleighDamping) or e.alpha or e.beta])
 
 
 def _undamped(kinds: tuple[type, ...], scene: Subject) -> Subject:
     """Without the dampers of some kinds of parts."""
+    if not any(_is_damped(p, kinds) for p in (*scene.structure.elements, *scene.structure.drives)):
+        return scene
     elements = [_still(e) if isinstance(e, kinds) else e for e in scene.structure.elements]
     drives = [_still(d) if isinstance(d, kinds) else d for d in scene.structure.drives]
     return scene.with_(structure=scene.structure.with_(elements=elements, drives=drives))
+
+
+def _is_damped(part: Part | Drive, kinds: tuple[type, ...]) -> bool:
+    return isinstance(part, kinds) and bool(getattr(part, "damping", 0.0))
 
 
 def _still(part: P) -> P:
@@ -229,7 +256,8 @@ def _can_do_without(law: Any, kinds: Sequence[type[Wrapper]]) -> bool:
 
 
 def _without_hardware(kind: type[Wrapper], scene: Subject) -> Subject:
-    return scene.with_(controller=_peeled(scene.law, kind))
+    law = _peeled(scene.law, kind)
+    return scene if law is scene.law else scene.with_(controller=law)
 
 
 def _wrappers(law: Controller | None) -> list[Wrapper]:

@@ -1,0 +1,219 @@
+"""Scenes tried without some of their effects: run, judged against the full one, and timed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from time import thread_time
+
+import numpy as np
+
+from flexctrl.dynamics.exact import Exact
+from flexctrl.dynamics.run import Run, Status
+from flexctrl.effects.automatic import Within
+from flexctrl.errors import FlexctrlError
+from flexctrl.model.model import Model
+from flexctrl.study.answers import Answer, answer_of, change_between, outputs_apart
+from flexctrl.study.exactly import exactly, fewer_modes
+from flexctrl.study.ledger import Size
+from flexctrl.study.omissions import Omission
+from flexctrl.study.subject import Subject
+
+__all__ = ["LONG", "Bench", "Refused", "Trial"]
+
+_DEARER, _SLOWER = 1.05, 1.15
+_ROUNDS, _CLEARLY = 3, 2.0
+_SHORT = 0.05
+_REPEATS = 4
+LONG = 5.0
+
+
+@dataclass
+class Trial:
+    """A scene that was run.
+
+    Attributes
+    ----------
+    scene : Scene
+    run : Run
+    times : list of float
+        Processor times [s]; the first may have compiled.
+    model : Model
+    whole : Trial or None
+        The same machine with all its modes; it has the same poles and margins.
+    """
+
+    scene: Subject
+    run: Run
+    times: list[float]
+    model: Model = field(repr=False)
+    whole: Trial | None = None
+
+    @cached_property
+    def answer(self) -> Answer:
+        """Curves, poles and margins."""
+        if self.whole is not None:
+            return Answer(self.run, self.whole.answer.poles, self.whole.answer.margins)
+        return answer_of(self.scene, self.run)
+
+    @cached_property
+    def size(self) -> Size:
+        """What the model is made of and what the run took."""
+        model, still = self.model, np.zeros(self.model.n)
+        slope = model.slope(model.rest, still, still, (1.0, 1.0, 1.0), np.zeros(len(model.inputs)))
+        instructions = sum(f.count * f.kernels.force.instructions for f in model.forces.families) if model.large else 0
+        states = 2 * model.n + (0 if self.scene.law is None else len(self.scene.law.initial()))
+        report = self.run.report
+        return Size(states, int(slope.count_nonzero()), instructions, report.steps, report.newton_iterations)
+
+    @property
+    def modes(self) -> int | None:
+        """With how many vibrations it is integrated exactly; None if it is not."""
+        method = self.scene.simulation.method
+        return (method.modes or self.model.n) if isinstance(method, Exact) else None
+
+    @property
+    def time(self) -> float:
+        """The shortest [s]."""
+        return min(self.times)
+
+    def again(self) -> None:
+        """Run once more, unless that takes long: the first run may have compiled; short runs several times."""
+        if self.times[0] >= LONG:
+            return
+        for _ in range(_REPEATS if self.time < _SHORT else 1):
+            self.once()
+
+    def once(self) -> float:
+        """Run once more and return the time [s]."""
+        self.times.append(timed(self.scene, self.model)[1])
+        return self.times[-1]
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A scene that cannot be run, and why."""
+
+    reason: str
+
+
+class Bench:
+    """Where scenes are tried without some of their effects, each set once.
+
+    Parameters
+    ----------
+    scene : Scene
+        With all its effects.
+    within : Within
+        How far the answer may change.
+    tick : callable
+        Called after every set.
+    """
+
+    def __init__(self, scene: Subject, within: Within, tick: Callable[[], None]) -> None:
+        self.within, self.tick = within, tick
+        self.full = self._tried(scene)
+        self.plain: dict[frozenset[str], Trial | Refused] = {frozenset(): self.full}
+        self.quick: dict[tuple[frozenset[str], bool], Trial | None] = {}
+
+    def without(self, gone: Sequence[Omission]) -> Trial | Refused:
+        """Return a run of the scene, by its own method, without some effects, or why there is none."""
+        names = frozenset(o.name for o in gone)
+        if names not in self.plain:
+            try:
+                self.plain[names] = self._tried(self._scene(gone))
+            except FlexctrlError as error:
+                self.plain[names] = Refused(str(error).splitlines()[0])
+            self.tick()
+        return self.plain[names]
+
+    def holding(self, gone: Sequence[Omission], exact: bool) -> Trial | None:
+        """Return a run without some effects that keeps the answer; None if there is none.
+
+        Where ``exact`` and the equations are linear then, they are integrated exactly, with the fewest modes that keep
+        the answer.
+        """
+        key = frozenset(o.name for o in gone), exact
+        if key not in self.quick:
+            try:
+                self.quick[key] = self._exact(gone) if exact else self._plain(gone)
+            except FlexctrlError:
+                self.quick[key] = None
+            self.tick()
+        return self.quick[key]
+
+    def linear(self, gone: Sequence[Omission]) -> bool:
+        """Tell whether the scene can be integrated exactly without some effects, if it can be run at all."""
+        trial = self.without(gone)
+        return isinstance(trial, Trial) and exactly(trial.scene) is not trial.scene
+
+    def excess(self, trial: Trial) -> float:
+        """Return the largest change over what is borne; infinite at once if outputs alone are beyond it."""
+        outputs = max(outputs_apart(self.full.run, trial.run).values(), default=0.0)
+        if outputs > self.within.outputs:
+            return np.inf
+        change = change_between(self.full.answer, trial.answer)
+        changes = {"outputs": outputs, "poles": change.poles, "margins": change.margins}
+        asked = (changes[f.name] / getattr(self.within, f.name) for f in fields(self.within))
+        return max((float(e) for e in asked if not np.isnan(e)), default=0.0)
+
+    def dearer(self, trial: Trial, best: Trial) -> bool:
+        """Tell whether a run takes longer than another, by what is counted and by the clock.
+
+        Exact integration costs by its modes. Else the clock tells what is not counted, such as a controller that is
+        asked by Python; both are run in turn until it is clear.
+        """
+        if trial.modes is not None and best.modes is not None:
+            return trial.modes > best.modes
+        if trial.modes is None and best.modes is None and trial.size.work > _DEARER * best.size.work:
+            return True
+        for _ in range(_ROUNDS):
+            best.again()
+            trial.again()
+            if trial.time <= _SLOWER * best.time:
+                return False
+            if trial.time > _CLEARLY * best.time:
+                return True
+        return True
+
+    def _scene(self, gone: Sequence[Omission]) -> Subject:
+        scene = self.full.scene
+        for omission in gone:
+            scene = omission.without(scene)
+        return scene
+
+    def _plain(self, gone: Sequence[Omission]) -> Trial | None:
+        found = self.without(gone)
+        return found if isinstance(found, Trial) and self.excess(found) <= 1.0 else None
+
+    def _exact(self, gone: Sequence[Omission]) -> Trial | None:
+        scene = self._scene(gone)
+        exact = exactly(scene)
+        if exact is scene:
+            return self._plain(gone)
+        whole = self._tried(exact)
+        if self.excess(whole) > 1.0:
+            return None
+        for fewer in fewer_modes(exact):
+            run, taken = timed(fewer, whole.model)
+            trial = Trial(fewer, run, [taken], whole.model, whole)
+            if run.status is Status.FINISHED and self.excess(trial) <= 1.0:
+                return trial
+        return whole
+
+    def _tried(self, scene: Subject) -> Trial:
+        model = scene.model
+        run, taken = timed(scene, model)
+        if run.status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        if run.status is not Status.FINISHED:
+            raise FlexctrlError(f"the run ended early: {run.report.message}")
+        return Trial(scene, run, [taken], model)
+
+
+def timed(scene: Subject, model: Model) -> tuple[Run, float]:
+    """Return a run and its processor time [s], which other processes hardly disturb."""
+    began = thread_time()
+    run = scene.run(model)
+    return run, max(thread_time() - began, 1e-9)
