@@ -135,7 +135,7 @@ class _Auditor:
     @property
     def _noise(self) -> float:
         later = self.full.times[1:] or self.full.times
-        return max(_NOISE, max(later) / min(later) - 1.0)
+        return max(_NOISE, float(np.median(later)) / min(later) - 1.0)
 
     def _tick(self) -> None:
         self.done += 1
