@@ -196,8 +196,8 @@ class Bench:
         if self.excess(whole) > 1.0:
             return None
         for fewer in fewer_modes(exact):
-            run, taken = timed(fewer, whole.model)
-            trial = Trial(fewer, run, [taken], whole.model, whole)
+            run, taken = timed(fewer, fewer.model)  # of its own, whose equilibrium is found once
+            trial = Trial(fewer, run, [taken], fewer.model, whole)
             if run.status is Status.FINISHED and self.excess(trial) <= 1.0:
                 return trial
         return whole
