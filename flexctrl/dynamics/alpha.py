@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics import steps
+from flexctrl.dynamics.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.run import Tolerance
@@ -127,6 +128,9 @@ class Stepper:
         SingularMatrixError
             If a freedom has neither mass nor stiffness.
         """
+        return self._eased(self._fresh(state, supply, step), step)
+
+    def _fresh(self, state: State, supply: Supply, step: float) -> AlphaPoint:
         zero, flows = np.zeros(self.model.n), self.model.motion.flows
         state, supply = settled(self.model, state, self.feed, supply)
         state = flowing(self.model, state, supply.u)
@@ -141,22 +145,33 @@ class Stepper:
 
         Without the lead every jump would cost an error of first order in the step.
         """
-        fresh = self.start(point.state, supply, step)
+        fresh = self._fresh(point.state, supply, step)
         lead = self.model.switches.still(point.state, point.algorithmic - point.rate)
-        return replace(fresh, algorithmic=fresh.rate + lead)
+        return self._eased(replace(fresh, algorithmic=fresh.rate + lead), step)
 
     def join(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
         """Return the point beyond a corner of a law of force, with the lead that the motion there will have.
 
         The lead is (α_m − α_f) h times the rate of the accelerations, and h and that rate may be others by orders.
         """
-        c, fresh = self.coefficients, self.start(point.state, supply, step)
+        c, fresh = self.coefficients, self._fresh(point.state, supply, step)
         state, rate = fresh.state, fresh.rate
         change = self.model.slope(state, state.v, rate, (1.0, 0.0, 0.0), supply.u) @ state.v
         change += self.model.slope(state, state.v, rate, (0.0, 1.0, 0.0), supply.u) @ rate
         lead = (c.alpha_m - c.alpha_f) * step * self._mass(state, supply, step)(change)
         lead[self.model.motion.flows] = 0.0
-        return replace(fresh, algorithmic=rate + lead)
+        return self._eased(replace(fresh, algorithmic=rate + lead), step)
+
+    def _eased(self, point: AlphaPoint, step: float) -> AlphaPoint:
+        """Return a point whose freedoms of first order set out so that a step that sees nothing of them ends well."""
+        c, flows = self.coefficients, self.model.motion.settling
+        v, rate, own = point.state.v.copy(), point.rate.copy(), point.algorithmic.copy()
+        eased = [i for i in flows if unresolved(v[i], rate[i], step)]
+        for i in eased:
+            begun = float(v[i]), float(rate[i]), step, c.beta, c.gamma
+            v[i] = eased_rate(*begun)
+            rate[i] = own[i] = eased_change(*begun)
+        return replace(point, state=point.state.with_(v=v), rate=rate, algorithmic=own) if eased else point
 
     def _mass(self, state: State, supply: Supply, step: float) -> Solve:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""

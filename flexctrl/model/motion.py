@@ -113,6 +113,11 @@ class Motion:
         first = np.array([i.order == 1 for i in self.effects], dtype=bool)
         return self.inner[first & (self.inner < self.n)]
 
+    @cached_property
+    def settling(self) -> np.ndarray:
+        """Those of them that settle by themselves, whatever moves."""
+        return np.setdiff1d(self.flows, self.frozen)
+
     @property
     def frozen(self) -> tuple[int, ...]:
         """Inner degrees of freedom that stay as they are in equilibria and linear models."""

@@ -29,6 +29,8 @@ class Flows:
     count : int
     places, cells : Wholes
         Where they stand in the order of elimination; their own entries in the fronts.
+    settles : Wholes
+        Which of them settle by themselves, whatever moves.
     ease : Reals
         Rate per unit of force; 0 where no rate holds against it.
     rates, changes : Reals
@@ -40,6 +42,7 @@ class Flows:
     count: int
     places: Wholes
     cells: Wholes
+    settles: Wholes
     ease: Reals
     rates: Reals
     changes: Reals
@@ -52,12 +55,14 @@ def flows_of(F: Flattened) -> Flows:
     still, ease = np.zeros(model.n), np.zeros(inner.size)
     if not inner.size:
         none = np.zeros(0, dtype=int)
-        return Flows(0, none, none, ease, ease, ease, 0.0)
+        return Flows(0, none, none, none, ease, ease, ease, 0.0)
     drag = -model.slope(model.rest, still, still, (0.0, 1.0, 0.0), np.zeros(len(model.inputs))).diagonal()[inner]
     np.divide(1.0, drag, out=ease, where=drag > 0.0)
     mass = float(model.mass().diagonal().max()) or 1.0
     rates, changes = np.zeros((2, inner.size))
-    return Flows(inner.size, F.plan.position[inner], F.plan.places(inner, inner), ease, rates, changes, mass)
+    settles = np.isin(inner, model.motion.settling).astype(np.int64)
+    position, cells = F.plan.position[inner], F.plan.places(inner, inner)
+    return Flows(inner.size, position, cells, settles, ease, rates, changes, mass)
 
 
 def flow_on(w: Flows, f: Flat, h: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import in_doubt, settled
@@ -514,6 +515,11 @@ def run_on(m: March) -> None:
         i = m.flows.places[k]
         m.v[i] = m.flows.rates[k]
         f.rate[i] = m.flows.changes[k]
+        if m.flows.settles[k] == 1 and unresolved(m.v[i], f.rate[i], m.h):
+            m.v[i] = eased_rate(m.flows.rates[k], m.flows.changes[k], m.h, m.beta, m.gamma)
+            f.rate[i] = eased_change(m.flows.rates[k], m.flows.changes[k], m.h, m.beta, m.gamma)
+            f.v[i] = m.v[i]
+            m.algorithmic[i] = m.rate[i]
     if m.losing == 1:
         drive(f)
         energy(f)
