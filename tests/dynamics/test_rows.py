@@ -59,19 +59,20 @@ def test_rows_after_a_rope_went_slack_lie_between_the_steps():
     assert np.abs(run["z"] - fine["z"]).max() <= 1e-4
 
 
-@pytest.mark.slow
 def test_an_interrupted_stream_is_the_file_of_a_run_never_stopped(tmp_path):
     model, method = pendulum(), fc.GeneralizedAlpha(1e-4)
     start = model.rest.with_(v=np.array([2.0]))
 
     def ran(name: str, start, progress=None) -> fc.Run:
         record = fc.CsvStream(tmp_path / name, every=0.1)
-        return fc.simulate(model, until=120.0, start=start, method=method, record=record, progress=progress)
+        return fc.simulate(model, until=30.0, start=start, method=method, record=record, progress=progress)
 
     ran("once", start)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
     half = ran("parts", start, lambda share: os.kill(os.getpid(), signal.SIGINT))
+    signal.signal(signal.SIGINT, before)
     assert half.status is fc.Status.INTERRUPTED
     whole = ran("parts", half.checkpoint)
     assert whole.status is fc.Status.FINISHED
     assert (tmp_path / "parts").read_bytes() == (tmp_path / "once").read_bytes()
-    assert len((tmp_path / "once").read_text().splitlines()) == 1202
+    assert len((tmp_path / "once").read_text().splitlines()) == 302

@@ -350,12 +350,14 @@ def unspun(theta: Reals, spin: Reals, out: Reals) -> None:
     if square >= _STRAIGHT:
         half = 0.5 * math.sqrt(square)
         eta = (1.0 - half / math.tan(half)) / square
-    along = dotted(theta, spin)
     for i in range(3):
         j = i + 1 if i < 2 else 0
         k = 3 - i - j
+        # crossed twice: after a whole turn η has no end, and is to meet nothing where the axis stays
         turned = theta[j] * spin[k] - theta[k] * spin[j]
-        out[i] = spin[i] - 0.5 * turned + eta * (along * theta[i] - square * spin[i])
+        ahead = theta[k] * spin[i] - theta[i] * spin[k]
+        behind = theta[i] * spin[j] - theta[j] * spin[i]
+        out[i] = spin[i] - 0.5 * turned + eta * (theta[j] * behind - theta[k] * ahead)
 
 
 def crossed(a: Reals, b: Reals, out: Reals) -> None:
