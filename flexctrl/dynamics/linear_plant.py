@@ -48,6 +48,11 @@ class _Flat:
         return self.inner
 
     @property
+    def settling(self) -> np.ndarray:
+        """There are no inner freedoms."""
+        return self.inner
+
+    @property
     def scales(self) -> dict[str, float]:
         """There are no inner freedoms."""
         return {}
