@@ -37,7 +37,7 @@ def test_a_run_without_end_says_so():
 
 @pytest.mark.slow
 def test_how_many_steps_are_too_many_is_a_value_of_the_method():
-    few = fc.AdaptiveAlpha(largest_step=1e-5, most_steps=1e5)
+    few = fc.AdaptiveAlpha(largest_step=1e-6, most_steps=1e6)
     assert spun(1.0, 2.0, few).status is fc.Status.FAILED
     assert spun(1.0, 0.9, few).status is fc.Status.FINISHED
 
