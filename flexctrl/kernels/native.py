@@ -18,9 +18,9 @@ import numpy as np
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import FLOAT, Run
 from flexctrl.kernels.native_ir import Translation
-from flexctrl.kernels.native_types import DECLARATIONS, RUNS, SCALARS, record_fields
+from flexctrl.kernels.native_types import DECLARATIONS, RUNS, SCALARS, Absent, record_fields
 
-__all__ = ["Packed", "Reals", "Runs", "Wholes", "assembly", "compiled", "seldom"]
+__all__ = ["Packed", "Reals", "Runs", "Wholes", "assembly", "compiled", "lasting_zeros", "seldom"]
 
 Reals: TypeAlias = np.ndarray
 """A vector of floats."""
@@ -109,11 +109,37 @@ class Packed:
         i, kind = self._places[name]
         return memoryview(self._reals if kind == "float" else self._words)[i : i + 1]
 
-    def bound(self, function: Callable[[Any], int]) -> Callable[[], int]:
-        """Return a function of such records, compiled, on this one, which it keeps alive."""
-        bound = _Bound(compiled(function), ctypes.c_void_p(_start(self._words)))
+    def bound(self, function: Callable[[Any], int], without: tuple[str, ...] = ()) -> Callable[[], int]:
+        """Return a function of such records, compiled, on this one, which it keeps alive.
+
+        Parameters
+        ----------
+        function : callable
+        without : tuple of str
+            Numbers of the record that are 0 whenever it is called, besides the lasting ones of all records in it.
+        """
+        absent = frozenset((type(self._record), name) for name in without) | lasting_zeros(self._record)
+        bound = _Bound(compiled(function, absent), ctypes.c_void_p(_start(self._words)))
         bound.owner = self
         return bound
+
+
+def lasting_zeros(record: Any) -> Absent:
+    """Return the fields that are 0 for good, in a record and those in it: of the ones that its type calls lasting.
+
+    A type does so with ``LASTING``, names of ints that say how much there is of something.
+    """
+    zero: set[tuple[type, str]] = set()
+    other: set[tuple[type, str]] = set()
+    waiting = [record]
+    while waiting:
+        record = waiting.pop()
+        record = record._record if isinstance(record, Packed) else record
+        for name in getattr(record, "LASTING", ()):
+            (other if getattr(record, name) else zero).add((type(record), name))
+        known = record_fields(type(record))  # type: ignore[arg-type]
+        waiting += [getattr(record, name) for name, kind in known.items() if isinstance(kind, type)]
+    return frozenset(zero - other)
 
 
 def _start(a: np.ndarray) -> int:
@@ -140,8 +166,14 @@ def seldom(function: _Function) -> _Function:
     return function
 
 
-def assembly(function: Callable[..., int]) -> str:
+def assembly(function: Callable[..., int], absent: Absent = frozenset()) -> str:
     """Return the LLVM assembly of a function of one record and of all that it calls.
+
+    Parameters
+    ----------
+    function : callable
+    absent : frozenset of (type, str)
+        Fields that are 0 whenever it is called.
 
     Raises
     ------
@@ -151,7 +183,7 @@ def assembly(function: Callable[..., int]) -> str:
     known, parts, libraries = {function.__name__: function}, [], set()
     waiting = [function]
     while waiting:
-        translation = Translation(waiting.pop())
+        translation = Translation(waiting.pop(), absent)
         parts.append(translation.assembly())
         libraries |= translation.libraries
         waiting += [f for f in translation.callees if f.__name__ not in known]
@@ -168,11 +200,11 @@ def _check_name(known: Callable[..., Any], callee: Callable[..., Any]) -> None:
 
 
 @cache
-def compiled(function: Callable[[Any], int]) -> Callable[[ctypes.c_void_p], int]:
+def compiled(function: Callable[[Any], int], absent: Absent = frozenset()) -> Callable[[ctypes.c_void_p], int]:
     """Return the machine code of a function that takes a record and returns an int; called on a record's address."""
     from flexctrl.kernels.llvm import link
 
-    library = link(assembly(function), 2, ("entry",), passes=True)
+    library = link(assembly(function, absent), 2, ("entry",), passes=True)
     code = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library["entry"])
     _libraries.append(library)
     return code

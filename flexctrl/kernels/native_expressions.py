@@ -6,6 +6,7 @@ import ast
 import inspect
 import math
 from collections.abc import Callable
+from operator import eq, ge, gt, le, lt, ne
 from typing import Any
 
 from flexctrl.errors import KernelError
@@ -18,6 +19,7 @@ from flexctrl.kernels.native_types import (
     RUNS,
     SCALARS,
     VECTORS,
+    Absent,
     Value,
     llvm_type,
     record_fields,
@@ -27,6 +29,7 @@ from flexctrl.kernels.native_types import (
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _ORDER = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
 _EIGHTS = {getattr(eights, n): n for n in ("eight", "put", "larger", "largest", "total", "rounded", "lost")}
+_COMPARE = {ast.Lt: lt, ast.LtE: le, ast.Gt: gt, ast.GtE: ge, ast.Eq: eq, ast.NotEq: ne}
 _BUILT_IN = ("float", "int", "abs", "min", "max")
 
 
@@ -41,8 +44,8 @@ class Expressions:
         Declarations of functions of the C library it needs.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.function = function
+    def __init__(self, function: Callable[..., Any], absent: Absent = frozenset()) -> None:
+        self.function, self.absent = function, absent
         self.names = function.__globals__
         self.callees: list[Callable[..., Any]] = []
         self.libraries: set[str] = set()
@@ -110,6 +113,30 @@ class Expressions:
         value = self._cast(value, slot.type)
         self._put(f"store {llvm_type(slot.type)} {value.text}, ptr {slot.text}")
 
+    def _kind(self, e: ast.expr) -> Any:
+        """Type of a variable or of a field of a record; nothing of other expressions."""
+        if isinstance(e, ast.Name):
+            return self.slots[e.id].type if e.id in self.slots else None
+        if not isinstance(e, ast.Attribute):
+            return None
+        owner = self._kind(e.value)
+        return record_fields(owner).get(e.attr) if isinstance(owner, type) else None
+
+    def _is_absent(self, e: ast.expr) -> bool:
+        return isinstance(e, ast.Attribute) and (self._kind(e.value), e.attr) in self.absent
+
+    def _decided(self, e: ast.expr) -> bool | None:
+        """Tell what a condition comes to where that hangs on what is absent alone."""
+        if isinstance(e, ast.BoolOp):
+            known = [self._decided(value) for value in e.values]
+            ends = isinstance(e.op, ast.Or)  # one operand like this settles it
+            return ends if ends in known else None if None in known else not ends
+        if isinstance(e, ast.Compare) and type(e.ops[0]) in _COMPARE and self._is_absent(e.left):
+            other = e.comparators[0]
+            value = self.names.get(other.id) if isinstance(other, ast.Name) else getattr(other, "value", None)
+            return bool(_COMPARE[type(e.ops[0])](0, value)) if isinstance(value, int) else None
+        return None
+
     def _truth(self, e: ast.expr) -> str:
         return self._cast(self._eval(e), "bool").text
 
@@ -143,6 +170,8 @@ class Expressions:
     def _e_attribute(self, e: ast.Attribute) -> Value:
         if isinstance(e.value, ast.Name) and self.names.get(e.value.id) is math:
             return self._constant(getattr(math, e.attr))
+        if self._is_absent(e):
+            return Value("int", "0")
         kind, place, attributes = self._place(e)
         return self._value(kind, f"load {llvm_type(kind)}, ptr {place}{attributes}")
 
@@ -196,10 +225,14 @@ class Expressions:
     def _e_boolop(self, e: ast.BoolOp) -> Value:
         """Later operands are evaluated only where they matter."""
         name, end = f"truth.{self._new()}", self._new("end")
-        for i, operand in enumerate(e.values):
+        whole = self._decided(e)
+        if whole is not None:
+            return self._constant(whole)
+        open_ones = [operand for operand in e.values if self._decided(operand) is None]
+        for i, operand in enumerate(open_ones):
             value = Value("bool", self._truth(operand))
             self._set(name, value)
-            if i + 1 < len(e.values):
+            if i + 1 < len(open_ones):
                 more = self._new("more")
                 ways = (more, end) if isinstance(e.op, ast.And) else (end, more)
                 self.lines += [f"  br i1 {value.text}, label %{ways[0]}, label %{ways[1]}", f"{more}:"]
@@ -207,6 +240,9 @@ class Expressions:
         return self._value("bool", f"load i1, ptr %{name}.slot")
 
     def _e_ifexp(self, e: ast.IfExp) -> Value:
+        known = self._decided(e.test)
+        if known is not None:
+            return self._eval(e.body if known else e.orelse)
         name, then, other, end = f"choice.{self._new()}", self._new("then"), self._new("else"), self._new("end")
         self.lines += [f"  br i1 {self._truth(e.test)}, label %{then}, label %{other}", f"{then}:"]
         self._set(name, self._eval(e.body))

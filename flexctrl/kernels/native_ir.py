@@ -17,7 +17,7 @@ from functools import cache
 from typing import Any
 
 from flexctrl.kernels.native_expressions import Expressions
-from flexctrl.kernels.native_types import VECTORS, ZERO, Value, llvm_type, signature
+from flexctrl.kernels.native_types import VECTORS, ZERO, Absent, Value, llvm_type, signature
 
 _SHORT = 150
 """Lines of assembly without branches that are put where they are called."""
@@ -26,8 +26,8 @@ _SHORT = 150
 class Translation(Expressions):
     """A function and its statements."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
+    def __init__(self, function: Callable[..., Any], absent: Absent = frozenset()) -> None:
+        super().__init__(function, absent)
         self.loops: list[tuple[str, str]] = []
         self.parameters, self.result = signature(function)
 
@@ -95,6 +95,10 @@ class Translation(Expressions):
         self.lines.append(f"{self._new('dead')}:")
 
     def _if(self, s: ast.If) -> None:
+        known = self._decided(s.test)
+        if known is not None:
+            self._body(s.body if known else s.orelse)
+            return
         truth, then, other, end = self._truth(s.test), self._new("then"), self._new("else"), self._new("end")
         self.lines += [f"  br i1 {truth}, label %{then}, label %{other}", f"{then}:"]
         self._body(s.body)

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from flexctrl.errors import KernelError
 
@@ -18,6 +18,10 @@ RUNS = "Runs"
 _TYPES: dict[Any, str] = {**SCALARS, "Eight": EIGHT, None: "void"}
 INTRINSICS = ("sqrt", "fabs", "floor", "ceil", "copysign")
 LIBRARY = ("sin", "cos", "tan", "atan", "atan2", "exp", "log", "pow", "asin", "acos", "hypot")
+
+
+Absent: TypeAlias = frozenset[tuple[type, str]]
+"""Fields of records, ints, that are 0 for good: no code is made for what they count."""
 
 
 class Value(NamedTuple):

@@ -14,7 +14,7 @@ import pytest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.eights import Eight, eight, larger, largest, lost, put, rounded, total
 from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel
-from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly
+from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly, lasting_zeros
 from flexctrl.model.flat.flat import clear as cleared
 
 pytest.importorskip("llvmlite")
@@ -149,6 +149,62 @@ def test_compiled_functions_do_what_python_does(function):
         )
     assert packed.h == pytest.approx(plain.h, rel=1e-14)
     assert packed.flag == plain.flag
+
+
+@dataclass
+class Parts:
+    LASTING = ("springs", "dampers")
+
+    springs: int
+    dampers: int
+    x: Reals
+
+
+@dataclass
+class Two:
+    one: Parts
+    other: Parts
+    rounds: int = 3
+
+
+def springy(x: Reals) -> float:
+    return 2.0 * x[0]
+
+
+def damped(x: Reals) -> float:
+    return 3.0 * x[1]
+
+
+def force(p: Parts, rounds: int) -> int:
+    found = 10.0 if p.springs == 0 or rounds < 0 else 20.0
+    if p.springs > 0:
+        found += springy(p.x)
+    if p.dampers > 0 and rounds > 1:
+        found += damped(p.x)
+    else:
+        found += 100.0
+    return int(found) + p.dampers
+
+
+def forces_of_both(m: Two) -> int:
+    return 1000 * force(m.one, m.rounds) + force(m.other, m.rounds)
+
+
+@pytest.mark.parametrize("counts", [(0, 0, 0, 0), (2, 0, 3, 0), (0, 1, 0, 2), (0, 1, 2, 0), (1, 1, 1, 1)])
+def test_no_code_is_made_for_what_is_absent(counts):
+    record = Two(Parts(*counts[:2], np.array([1.0, 2.0])), Parts(*counts[2:], np.array([3.0, 4.0])))
+    absent = lasting_zeros(record)
+    assert absent == {(Parts, n) for n, k in zip(("springs", "dampers"), (0, 1), strict=True) if not any(counts[k::2])}
+    code = assembly(forces_of_both, absent)
+    assert ("@springy(" in code) == any(counts[0::2])
+    assert ("@damped(" in code) == any(counts[1::2])
+    assert Packed(record).bound(forces_of_both)() == forces_of_both(record)
+
+
+def test_a_number_said_to_be_zero_is_left_out():
+    record = Two(*(Parts(0, 1, np.array([1.0, 2.0])) for _ in range(2)), rounds=0)
+    assert Packed(record).bound(forces_of_both, without=("rounds",))() == forces_of_both(record)
+    assert len(assembly(forces_of_both, frozenset({(Two, "rounds")}))) < len(assembly(forces_of_both))
 
 
 def test_compiled_functions_run_compiled_kernels():

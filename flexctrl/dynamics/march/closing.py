@@ -46,6 +46,8 @@ class Closing:
         How far any has been.
     """
 
+    LASTING = ("loops",)
+
     loops: int
     free: int
     rates: int

@@ -39,6 +39,8 @@ class Flows:
         What stands for their mass, which they do not have.
     """
 
+    LASTING = ("count",)
+
     count: int
     places: Wholes
     cells: Wholes

@@ -37,6 +37,8 @@ class LeapPoint(ModalPoint):
 class Leaper(Marcher):
     """A linear model on a march of exact steps."""
 
+    leaping = 1
+
     def __init__(self, model: Model, method: Method) -> None:
         super().__init__(model, method)
         self._tables: dict[tuple[float, int | None], Tables] = {}

@@ -61,7 +61,7 @@ _MASSLESS = 1e-14
 def run(m: March) -> int:
     """Do the task that is set."""
     status = task(m)
-    if m.leap.aloft == 1:
+    if m.leaping == 1 and m.leap.aloft == 1:
         land(m)
     return status
 
@@ -71,9 +71,9 @@ def task(m: March) -> int:
     """Do it, maybe on modal states alone."""
     if m.task == FIXED:
         return fixed(m)
-    if m.task == CONTROLLED:
+    if m.paced == 1 and m.task == CONTROLLED:
         return controlled(m)
-    if m.task == SAMPLED:
+    if m.paced == 1 and m.task == SAMPLED:
         return sampled(m)
     if m.task == JUMP:
         return jump(m)
@@ -163,7 +163,7 @@ def fixed(m: March) -> int:
 
     Inputs that are told to jump do so first.
     """
-    if m.leap.gliding == 1 and m.keeping == 0:
+    if m.leaping == 1 and m.leap.gliding == 1 and m.keeping == 0:
         return glided(m)
     if m.jumping == 1:
         status = jump(m)
@@ -171,12 +171,12 @@ def fixed(m: March) -> int:
             return status
         m.jumping = 0
     while m.done < m.wanted and m.kept < m.shelf:
-        status = leap(m) if m.leap.modes > 0 else step(m)
+        status = leap(m) if m.leaping == 1 else step(m)
         if status != DONE:
             return status
         reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
-            if m.leap.modes > 0:
+            if m.leaping == 1:
                 back(m)
             return CORNER
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
@@ -366,9 +366,9 @@ def enter(m: March) -> None:
     if m.losing == 1 or due:
         if m.swift != 1:
             drive(f)
-        if m.leap.modes == 0 or due:
+        if m.leaping == 0 or due:
             energy(f)
-    if m.leap.modes > 0:
+    if m.leaping == 1:
         m.lost += m.leap.lost
     elif m.losing == 1:
         m.lost += 0.5 * m.h * (m.power + f.books[2])
@@ -465,7 +465,7 @@ def jump(m: March) -> int:
     if m.swift == 1 and answered(m):
         return changed(m)
     load(f)
-    if m.leap.modes > 0:
+    if m.leaping == 1:
         pull(f)
         copy(f.padded, f.force, m.pulled)
         return DONE

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -54,6 +54,7 @@ __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
 _SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
 _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed", "swift")
+_PACED = (CONTROLLED, SAMPLED)
 _MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
@@ -140,12 +141,14 @@ class Marcher:
     method : Method
     """
 
+    leaping: ClassVar[int] = 0
+
     def __init__(self, model: Model, method: Method) -> None:
         self.model, self.method = model, method
         self.flattened = flatten(model)
-        self.march = Packed(_march(self.flattened, method))
+        self.march = Packed(_march(self.flattened, method, self.leaping))
         m = self.march
-        self._run = m.bound(run)
+        self._run = m.bound(run, without=("paced",))
         self._task, self._h, self._wanted, self._jumping = (m.cell(n) for n in ("task", "h", "wanted", "jumping"))
         self._inputs: Any = self.flattened.flat.u.data
         self.steps, self.clock = m.cell("done"), m.cell("t")
@@ -382,9 +385,14 @@ class Marcher:
         self.supply(u)
         return self._through(JUMP)
 
+    @cached_property
+    def _run_paced(self) -> Callable[[], int]:
+        """The loops with the tasks that most runs do without."""
+        return self.march.bound(run)
+
     def _do(self, task: int) -> int:
         self._task[0] = task
-        return self._run()
+        return self._run_paced() if task in _PACED else self._run()
 
     def _through(self, task: int) -> int:
         """Do a task, with the matrices it asks for."""
@@ -427,7 +435,7 @@ class Marcher:
         return Later(count, float(table[-1, -1]), partial(states_of, self.flattened, table))
 
 
-def _march(F: Flattened, method: Method) -> March:
+def _march(F: Flattened, method: Method, leaping: int) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
     state, part, probes = width_of(F), components(F.model), probes_of(F, method.weight)
@@ -469,6 +477,7 @@ def _march(F: Flattened, method: Method) -> March:
         loosest=max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
         share=_SHARE if c.damping else _KEEPING,
         price=_MADE + probes.groups if flat.tangents or probes.groups else _ASKED,
+        leaping=leaping,
         asking=int(not flat.tangents and not probes.groups),
         swift=int(flat.quick > 0),
         tolerance=method.least,

@@ -42,6 +42,8 @@ class Probes:
         Forces and motion between probes.
     """
 
+    LASTING = ("groups",)
+
     groups: int
     starts: Wholes
     columns: Wholes

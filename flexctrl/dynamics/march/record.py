@@ -170,6 +170,10 @@ class March:
         Steps.
     phase, attempt, iteration, last, contraction, strayed : int, float
         Where in a step it is.
+    leaping : int
+        Whether steps are exact ones on modal states.
+    paced : int
+        Whether steps of controlled error, or from sample to sample of a law, are among the tasks.
     swift : int
         1: accelerations come from kernels of the whole machine, and Newton's method takes the mass at hand for the
         tangent; 0: the machine has none; below: steps until that is tried again, after one for which it was not enough.
@@ -212,6 +216,8 @@ class March:
         Poses, degrees of freedom, rates, driven coordinates, angles of outputs, and the time.
     """
 
+    LASTING = ("leaping", "swift")
+
     flat: Flat
     gauges: Gauges
     corners: Corners
@@ -249,6 +255,8 @@ class March:
     price: float
     asking: int
     shelf: int
+    leaping: int
+    paced: int = 1
     swift: int = 0
     tolerance: float = 0.0
     error: float = 0.0

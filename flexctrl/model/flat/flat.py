@@ -98,6 +98,8 @@ class Flat:
         How many there are.
     """
 
+    LASTING = ("linking", "carried", "quick")
+
     n: int
     padded: int
     size: int
