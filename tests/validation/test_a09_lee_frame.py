@@ -80,7 +80,7 @@ def test_the_path_goes_on_past_both(record, path):
         ours=path.factor[-1],
         reference=3.78e4,
         source="shooting",
-        tolerance=5e-3,
+        tolerance=2e-3,
     )
 
 

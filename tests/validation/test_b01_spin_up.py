@@ -2,8 +2,10 @@
 
 The hub's angle is imposed by a drive whose motor is held to the law by a position servo of 1e9 N m/rad, without
 inertia of its own: the hub is where it should be to 1e-6 rad. Without geometric stiffening the arm would bend without
-bounds; with it the tip lags by 0.57 m and comes back. Eight elements, generalised alpha of 12.5 ms, ρ = 0.8. (With
+bounds; with it the tip lags by 0.57 m and comes back. Eight elements, generalised alpha of 5 ms, ρ = 0.8. (With
 ρ = 0.9 and 20 ms the unresolved stretching of the arm gains energy after some turns: steps that turn far want damping.)
+What is left of the bending in the end hangs on the step before all: 3.77 mm with 12.5 ms, 3.62 mm with 5 ms; with 16
+and 32 elements 3.66 mm and 3.67 mm.
 """
 
 from __future__ import annotations
@@ -56,7 +58,7 @@ def spin_up() -> fc.Run:
     )
     model = fc.assemble(fc.planar(structure), [fc.LargeRotation(), fc.Flexible()])
     servo = fc.Tracking(pd(1e9, 0.0, measured="motor", rate="speed", command="torque"), {"motor": angle})
-    return fc.simulate(model, servo, until=18.0, method=fc.GeneralizedAlpha(0.0125, 0.8), every=0.05)
+    return fc.simulate(model, servo, until=18.0, method=fc.GeneralizedAlpha(0.005, 0.8), every=0.025)
 
 
 def seen_from_the_hub(run: fc.Run) -> tuple[np.ndarray, np.ndarray]:
@@ -106,4 +108,10 @@ def test_steady_stretch(record):
         source="closed form of a rod that spins",
         tolerance=5e-3,
     )
-    assert np.abs(across[late]).max() < 3.9e-3
+    record(
+        "B1 largest bending after 15 s [mm]",
+        ours=1e3 * np.abs(across[run.t >= 15.0]).max(),
+        reference=0.0,
+        source="4 cubic geometrically exact elements, Radau 1e-7: not above 3.7",
+        tolerance=Absolute(3.7),
+    )

@@ -4,8 +4,9 @@ In the plane, EA = GA = 1e4 N, with so much rotary inertia that its sections tur
 (EI = 500 N m²): 30 elements, generalised alpha of 20 ms, ρ = 0.7; soft (EI = 100): 80 elements, as the error falls with
 the square of their length. The reference beams of 12 and 20 elements agree to 2e-3 (stiff) and 1e-2 (soft).
 `ConservingMidpoint` (8 elements, 5 ms under the push, then 1.8 ms) keeps both momenta to round-off; its energy
-oscillates with the square of the step and does not drift. How much of it the throw has left depends on the mesh: the
-couple acts on a point, and is taken away amidst the waves it has made (stiff: 89 to 93.5 J with 12 to 60 elements).
+oscillates with the square of the step and does not drift. How much of it the throw has left takes a fine mesh: the
+couple acts on a point, and is taken away amidst the waves it has made (stiff: 92.8, 93.6, 89.1, 89.9, 90.1 J with 10,
+20, 40, 80, 160 elements).
 """
 
 from __future__ import annotations
@@ -109,30 +110,31 @@ def test_momenta_and_energy_in_flight(record):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("EI", "energy", "share", "turning"), [(500, 90.25, 0.04, -189.27), (100, 379.8, 0.01, -229.52)]
+    ("EI", "energy", "within", "turning"), [(500, 90.25, 0.6, -189.27), (100, 379.8, 0.6, -229.52)]
 )
-def test_where_the_throw_leaves_it(record, EI, energy, share, turning):
+def test_where_the_throw_leaves_it(record, EI, energy, within, turning):
     """The centre of mass goes as a mass point under 8 N; its trapezoids along the axis are right to 1/n²."""
-    model = flying(EI, 20)
+    elements = 80
+    model = flying(EI, elements)
     thrown = fc.simulate(model, PUSH, until=2.5, method=fc.ConservingMidpoint(5e-3)).final
     record(
         f"B2 flying beam, EI = {EI}, middle of the axis at 2.5 s [m]",
-        ours=np.trapezoid(thrown.x[:-1, :2], axis=0) / 20.0,
+        ours=np.trapezoid(thrown.x[:-1, :2], axis=0) / elements,
         reference=[5.5, 4.0],
         source="8 N on 10 kg for 2.5 s",
-        tolerance=Absolute(1e-2),
+        tolerance=Absolute(1e-3),
     )
     record(
         f"B2 flying beam, EI = {EI}, energy after the throw [J]",
         ours=sum(model.energy(thrown)[:2]),
         reference=energy,
         source=SOURCE,
-        tolerance=share,
+        tolerance=Absolute(within),
     )
     record(
         f"B2 flying beam, EI = {EI}, angular momentum about the origin after the throw [N m s]",
         ours=momenta(model, thrown)[2],
         reference=turning,
         source=SOURCE,
-        tolerance=1e-3,
+        tolerance=1e-4,
     )

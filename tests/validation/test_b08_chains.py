@@ -2,7 +2,8 @@
 
 The folded chain hangs by one end; the other, held beside it, is let go. Half way down it has overtaken free fall, as
 the fold pulls at it: in the limit of fine links v² = g x (2L − x)/(L − x) (Calkin and March 1989). Forty pieces of a
-stiff rope with the masses between, generalised alpha of 0.1 ms.
+stiff rope with the masses between, generalised alpha of 0.1 ms. The pull on the tip:
+tests/hard/test_d17_folded_chain.py.
 """
 
 from __future__ import annotations
@@ -58,8 +59,6 @@ def test_a_folded_chain_falls_faster_than_free(record):
     )
     assert when(1.0) * np.sqrt(G) == pytest.approx(1.1981402, abs=1e-6)
     assert ours[1] < np.sqrt(2.0 * 0.9 / G)
-    falls = fallen < 0.9
-    assert np.abs(np.diff(run["tip"][falls], 2)).max() / 1e-8 > 20.0 * G
 
 
 @cache

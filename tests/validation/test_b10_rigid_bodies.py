@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 from recorder import Absolute
+from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
 
@@ -21,6 +22,9 @@ TOP = {
     0.2: (0.6055505614, 0.5989576818, -0.5239830274),
     2.0: (-0.1504168227, -0.7241655916, -0.6730222696),
 }
+TURNED = (0.1229471, -0.4910799, 0.3504300, -0.7879869)
+"""The top's quaternion at 2 s, scalar first."""
+
 FLIPS = (8.0532570, 23.0192521, 37.9852472, 52.9512424)
 
 
@@ -69,6 +73,13 @@ def test_heavy_top(record):
         reference=[value for place in TOP.values() for value in place],
         source="Brüls, Cardona and Arnold 2012; quaternions by DOP853",
         tolerance=Absolute(1e-8),
+    )
+    record(
+        "B10 heavy top, quaternion at 2 s",
+        ours=Rotation.from_matrix(run.final.R[0]).as_quat(canonical=True, scalar_first=True),
+        reference=TURNED,
+        source="Brüls, Cardona and Arnold 2012; quaternions by DOP853",
+        tolerance=Absolute(1e-7),
     )
 
 
