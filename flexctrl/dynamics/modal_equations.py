@@ -43,7 +43,8 @@ class ModalEquations:
 
 
 def opened(model: Model, modes: int | None = None) -> ModalEquations:
-    """Return the modal form of a model that does not move far; the last input carries its constant loads.
+    """Return the modal form of a model that does not move far; the last input carries its constant loads, and where
+    it rests.
 
     Parameters
     ----------
@@ -80,6 +81,9 @@ def opened(model: Model, modes: int | None = None) -> ModalEquations:
     if modes is not None and always + modes < len(system.modes):
         first, kept = _truncated(system, always + modes)
         read = read[kept]
+    drawn = np.zeros_like(first.D)
+    drawn[:n, -1] = rest.q
+    first = replace(first, D=first.D + drawn)
     return ModalEquations(first, np.zeros((m, len(first.A))), np.eye(m, m + 1), len(first.A), read)
 
 

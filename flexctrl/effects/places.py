@@ -12,7 +12,7 @@ from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
-__all__ = ["by_place", "check_drives", "check_large", "check_static", "identifier", "not_negative"]
+__all__ = ["by_place", "check_drives", "check_large", "check_static", "finite", "identifier", "not_negative"]
 
 T = TypeVar("T")
 
@@ -44,6 +44,11 @@ def by_place(
 def not_negative(value: object, what: str, owner: str) -> float:
     """Return a number ≥ 0."""
     return check_finite(value, what, owner, least=0.0)  # type: ignore[arg-type]
+
+
+def finite(value: object, what: str, owner: str) -> float:
+    """Return a number."""
+    return check_finite(value, what, owner)  # type: ignore[arg-type]
 
 
 def check_static(static: float, kinetic: float, owner: str) -> None:

@@ -19,6 +19,7 @@ from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.kernels.kernel import Backend, best_backend
 from flexctrl.model.equations import Small
 from flexctrl.model.equilibrium import equilibrium
+from flexctrl.model.holding import held_at
 from flexctrl.model.laws.frictions import inner_freedoms
 from flexctrl.model.laws.gusts import check_gusts, idle_gusts
 from flexctrl.model.linkages.mobility import motion_of
@@ -136,18 +137,23 @@ def _check_names(structure: Structure, effect: Effect) -> None:
 
 
 def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backend | None) -> Model:
-    """Return the model of small motion about the equilibrium under the machine's own weight."""
-    others = [e for e in parts if not isinstance(e, GeometricStiffness)]
-    large = assemble(structure, [*others, LargeRotation()], backend)
-    from flexctrl.model.linearize import linearize  # brings all that modes need
+    """Return the model of small motion about an equilibrium.
 
-    linear = linearize(large, at=(found := equilibrium(large)))
-    still = np.zeros(large.n)
-    rest = replace(found.state, q=still, v=still)
-    about = Small(still, linear.K, linear.C.tocsr(), linear.M)
-    return replace(
-        large, effects=parts, motion=replace(large.motion, rest=rest), viscous=0.0 * large.viscous, about=about
-    )
+    What is held there is free in motion: the force that held it is a load.
+    """
+    [small] = [e for e in parts if isinstance(e, GeometricStiffness)]
+    large = assemble(structure, [*(e for e in parts if e is not small), LargeRotation()], backend)
+    from flexctrl.model.linearize import all_free, linearize  # brings all that modes need
+
+    found = equilibrium(large, hold=held_at(large, dict(small.hold)), inputs=dict(small.inputs))
+    linear = all_free(linearize(large, at=found), found)
+    about = Small(np.zeros(large.n), linear.K, linear.C.tocsr(), linear.M, found.inputs)
+    motion = replace(large.motion, rest=found.state)
+    unloaded = replace(large, effects=parts, motion=motion, viscous=0.0 * large.viscous, about=about)
+    load = -unloaded.loads(found.state, found.inputs)
+    held = [large.coordinate(name) for name in found.held]
+    load[held] += (large.balance(found.state, *np.zeros((2, large.n))) + large.loads(found.state, found.inputs))[held]
+    return replace(unloaded, about=replace(about, load=load))
 
 
 def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:

@@ -170,7 +170,7 @@ def _own_and_held(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 def _expected(motion: Motion, state: State) -> np.ndarray:
     """Where the sums of the degrees of freedom put the nodes; where others do that, the place itself."""
     own, held = (mask[:, :3] for mask in _free(motion))
-    moved = motion.rest.x + np.append(state.q, 0.0)[motion.place[:, :3]]
+    moved = motion.rest.x + np.append(state.q - motion.rest.q, 0.0)[motion.place[:, :3]]
     return np.where(own | held, moved, state.x)
 
 

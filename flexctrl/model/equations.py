@@ -123,17 +123,21 @@ class LargeMotion:
 
 @dataclass(frozen=True, eq=False)
 class Small:
-    """Constant matrices of a model that moves little: load − K q − C v − M a."""
+    """Constant matrices of a model that moves little: load − K (q − q₀) − C v − M a, q₀ being those at rest.
+
+    ``inputs`` are those of the place it is laid about; the load is minus theirs, and what held it there.
+    """
 
     load: np.ndarray
     K: sp.csc_matrix
     C: sp.csr_matrix
     M: sp.csc_matrix
+    inputs: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class SmallMotion:
-    """Linear equations about the drawn shape, or about another place: load + loads − K q − C v − M a = 0.
+    """Linear equations about the drawn shape or another place q₀: load + loads − K (q − q₀) − C v − M a = 0.
 
     Attributes
     ----------
@@ -151,7 +155,7 @@ class SmallMotion:
         still = np.zeros(model.n)
         load = model.forces.balance(model.rest, still, still)
         damping = -model.forces.slope(model.rest, still, still, (0.0, 1.0, 0.0)).tocsr()
-        return Small(load, model.stiffness(), damping + model.viscous, model.mass())
+        return Small(load, model.stiffness(), damping + model.viscous, model.mass(), np.zeros(len(model.inputs)))
 
     def place(self, state: State) -> State:
         """Return where levers and directions of forces are taken: at rest."""
@@ -164,7 +168,7 @@ class SmallMotion:
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the sum of all other forces."""
         m = self.matrices
-        return m.load - m.K @ state.q - m.C @ v - m.M @ a
+        return m.load - m.K @ (state.q - self.model.rest.q) - m.C @ v - m.M @ a
 
     def slope(
         self, state: State, v: np.ndarray, a: np.ndarray, seeds: Seeds, u: np.ndarray, excess: Excess | None
@@ -180,7 +184,7 @@ class SmallMotion:
     @cached_property
     def _reach(self) -> sp.csr_matrix:
         """Raw forces of unit inputs."""
-        return self.model.reach(self.model.rest, np.zeros(len(self.model.inputs)))
+        return self.model.reach(self.model.rest, self.matrices.inputs)
 
     @cached_property
     def _plain(self) -> tuple[np.ndarray | sp.spmatrix, ...]:
@@ -199,13 +203,14 @@ class SmallMotion:
         """Return the state after a step; what is shown moves to first order."""
         motion, rest = self.model.motion, self.model.rest
         q = state.q + step
-        raw = (self._levers @ q).reshape(-1, 6)
+        small = q - rest.q
+        raw = (self._levers @ small).reshape(-1, 6)
         x, R = rest.x + raw[:, :3], exponential(raw[:, 3:]) @ rest.R
         driven = motion.unwound(x, R, motion.wound(state, step, rest))
-        return State(x, R, q, v, driven, t, state.dry, motion.shown(rest.shown, q, R))
+        return State(x, R, q, v, driven, t, state.dry, motion.shown(rest.shown, small, R))
 
     def energy(self, state: State) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""
-        (K, C, M), q, v = self._plain, state.q, state.v
+        (K, C, M), q, v = self._plain, state.q - self.model.rest.q, state.v
         stored = 0.5 * float(q @ (K @ q)) - float(self.matrices.load @ q)
         return 0.5 * float(v @ (M @ v)), stored, float(v @ (C @ v))

@@ -86,6 +86,27 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state, pull))
 
 
+def all_free(linear: LinearModel, rest: Rest) -> LinearModel:
+    """Return what was linearised about an equilibrium with nothing held any more.
+
+    Parameters
+    ----------
+    linear : LinearModel
+        By `linearize`.
+    rest : Rest
+        The equilibrium.
+
+    Returns
+    -------
+    LinearModel
+        In the order of the model's coordinates, all of them; not certified where something was held.
+    """
+    model, state = rest.model, rest.state.loose
+    if len(linear.coordinates) == model.n:
+        return linear
+    return _derivative(model, state, rest.inputs, np.arange(model.n), bool(without_energy(model, rest.inputs)))[0]
+
+
 def _refuse_spins(model: Model, held: Sequence[str]) -> None:
     """Refuse beams that spin about themselves without inertia; bent by a load they seem to have a trace of it."""
     beams = (p for p in model.structure.elements if isinstance(p, Beam) and model.bends(p))

@@ -149,7 +149,7 @@ class Model:
         scipy.sparse.csr_matrix
         """
         place = self.place(state)
-        about = u if self.large else np.zeros_like(u)
+        about = u if self.large else self.about.inputs if self.about else np.zeros_like(u)
         steady = self.signals.loads_at(place)
         if not self.gusts:
             return steady

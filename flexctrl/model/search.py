@@ -120,6 +120,8 @@ class Newton:
                 free = solve(inertia * free)
                 free = free / max(np.abs(free).max(initial=0.0), 1e-300)
             held = inertia * free
+            if not free.any():  # nothing pushes
+                return step, force
             if free @ (matrix @ free) > 2.0 * shift * (held @ free):
                 return step, force
             unsure = self.balance.round_off(here.state) if unsure is None else unsure

@@ -72,7 +72,7 @@ EFFECTS: dict[str, Kind] = {
     "rope_stretch": Kind(RopeStretch, {"of": several(text)}),
     "rope_mass": Kind(RopeMass, {"of": several(text)}),
     "large_rotation": Kind(LargeRotation),
-    "geometric_stiffness": Kind(GeometricStiffness),
+    "geometric_stiffness": Kind(GeometricStiffness, {"hold": mapping(number), "inputs": mapping(number)}),
     "rotating_frame": Kind(RotatingFrame, {"rate": vector, "center": vector}),
     "rayleigh_damping": Kind(RayleighDamping, {"alpha": number, "beta": number}),
     "modal_damping": Kind(ModalDamping, {"ratios": one_or_several(number)}),

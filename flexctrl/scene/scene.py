@@ -17,17 +17,18 @@ from flexctrl.dynamics.steps import Integrator
 from flexctrl.effects.automatic import Automatic
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import Flexible
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import SceneError, StructureError, did_you_mean, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
+from flexctrl.model.holding import held_at
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, check_seconds
-from flexctrl.structure.naming import node_of
+from flexctrl.structure.freedoms import check_seconds
 from flexctrl.structure.structure import Structure
 from flexctrl.study.bookkeeping import ledger
 
@@ -220,7 +221,7 @@ class Scene:
     @cached_property
     def model(self) -> Model:
         """The machine under its effects."""
-        return assemble(self.structure, self.effects)
+        return assemble(self.structure, [self._loaded(e) for e in self.effects])
 
     @cached_property
     def twin(self) -> Model:
@@ -249,13 +250,15 @@ class Scene:
         """The rigid twin linearised about its equilibrium."""
         return linearize(self.twin, at=self.twin_rest)
 
+    def _loaded(self, effect: Effect) -> Effect:
+        """An effect that is laid about an equilibrium, about that of the scene unless it names one."""
+        return GeometricStiffness(self.hold, self.rest_inputs) if effect == GeometricStiffness() else effect
+
     def _equilibrium(self, model: Model) -> Rest:
-        for name in self.hold:
-            if not _own(self.model, name) and not _free(self.structure, name):
-                hint = did_you_mean(name, self.model.coordinates)
-                raise SceneError(f"{self.name}: hold: the machine has no free coordinate {name!r}{hint}")
-        places = {_own(model, name): at for name, at in self.hold.items()}
-        places.pop("", None)  # where parts are rigid it may be no coordinate
+        try:
+            places = held_at(model, self.hold)
+        except StructureError as error:
+            raise SceneError(f"{self.name}: {error}") from None
         return equilibrium(model, hold=places, inputs=dict(self.rest_inputs))
 
     # -- runs
@@ -322,28 +325,6 @@ class Scene:
         if self.simulation is None:
             raise SceneError(f"{self.name}: has no [simulation]; give at least until = … (seconds)")
         return self.simulation
-
-
-def _own(model: Model, name: str) -> str:
-    """The coordinate behind a freedom, ``girder.start.u`` or its own name; empty if the model has none of its own."""
-    if "." not in name:
-        return name if name in model.coordinates else ""
-    number = int(model.motion.place[_cell(model.structure, name)])
-    return model.coordinates[number] if number < model.n else ""
-
-
-def _free(structure: Structure, name: str) -> bool:
-    """Whether the joints leave a freedom free, even if what is rigid takes it away."""
-    return "." in name and bool(structure.join_table.rows[_cell(structure, name)[0]][_cell(structure, name)[1]])
-
-
-def _cell(structure: Structure, name: str) -> tuple[int, int]:
-    """Node and column of ``girder.start.u``."""
-    where, _, freedom = name.rpartition(".")
-    column = {word: i for names in (FREEDOMS, IDENTIFIERS) for i, word in enumerate(names)}
-    if freedom not in column:
-        raise SceneError(f"hold {name!r}: there is no freedom {freedom!r}{did_you_mean(freedom, FREEDOMS)}")
-    return structure.number(node_of(structure.elements, where)), column[freedom]
 
 
 __all__ = ["Channel", "Plan", "Scene", "Simulation", "Start"]

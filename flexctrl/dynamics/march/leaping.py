@@ -73,7 +73,7 @@ class Leaps:
         self.wide = -(-self.size // 8) * 8
         self.places = np.append(self.pairs.where, self.modes + np.arange(few))
         both = np.hstack([first.C @ self.pairs.basis, first.D])
-        gliding, seen, spun = _seen(F, both, ways)
+        gliding, seen, spun = _seen(F, _from_rest(F, both), ways)
         sights = -(-len(seen) // 8) * 8
         self.record = Leap(
             modes=self.modes,
@@ -183,6 +183,13 @@ def _mixed(matrix: np.ndarray) -> np.ndarray:
     return found
 
 
+def _from_rest(F: Flattened, both: np.ndarray) -> np.ndarray:
+    """Coordinates and rates, these counted from where the machine rests."""
+    found = both.copy()
+    found[: F.model.n, -1] -= F.model.rest.q
+    return found
+
+
 def _ways(F: Flattened) -> np.ndarray:
     """What the inputs' work is done along, on the degrees of freedom, shape (inputs, n)."""
     model = F.model
@@ -195,7 +202,9 @@ def _seen(F: Flattened, both: np.ndarray, ways: np.ndarray) -> tuple[bool, np.nd
     sums, arms, spun = _sums(F, both), _arms(F, both), _spun(F)
     if sums is None or arms is None:
         return False, np.zeros((0, both.shape[1])), np.zeros(0, dtype=int)
-    return True, np.vstack([sums, ways @ both[: F.model.n], arms, _turns(F, both, spun)]), spun
+    along = ways @ both[: F.model.n]
+    along[:, -1] += ways @ F.model.rest.q
+    return True, np.vstack([sums, along, arms, _turns(F, both, spun)]), spun
 
 
 def _spun(F: Flattened) -> np.ndarray:
@@ -218,7 +227,9 @@ def _sums(F: Flattened, both: np.ndarray) -> np.ndarray | None:
     T = motion.jacobian(F.model.rest)
     on_places, on_rates = (np.asarray(T @ part) for part in (both[:n], both[n:]))
     found = np.zeros((g.rows, both.shape[1]))
-    winding = dict(zip(g.turns[3::4].tolist(), np.asarray(motion.winding @ both[:n]), strict=True))
+    wound = np.asarray(motion.winding @ both[:n])
+    wound[:, -1] += motion.winding @ F.model.rest.q
+    winding = dict(zip(g.turns[3::4].tolist(), wound, strict=True))
     for i in range(g.rows):
         if i in winding:
             found[i] = winding[i]
@@ -252,7 +263,9 @@ def _cell(F: Flattened, cell: int, on_places: np.ndarray, on_rates: np.ndarray) 
         drive, what = divmod(cell - base, DRIVE_SLOT)
         if drive >= len(motion.drives) or motion.rigid[drive] or what > 1:
             return None
-        return np.asarray((on_places, on_rates)[what][motion.source_base + drive])
+        row = np.array((on_places, on_rates)[what][motion.source_base + drive])
+        row[-1] += 0.0 if what else F.model.rest.q[motion.sources[drive]]
+        return row
     node, what = divmod(cell, NODE_SLOT)
     if 6 * node >= motion.source_base or not (what < 3 or 12 <= what < 18):
         return None

@@ -10,12 +10,12 @@ __all__ = ["entry", "entry_energy", "entry_slope"]
 
 
 @cache
-def entry() -> Kernel:
-    """Load − (k (q + step) + c v + m a)."""
+def entry(parts: int) -> Kernel:
+    """Load − (k q + c v + m a), q being the sum of some parts."""
     import casadi as ca
 
-    x, p = ca.SX.sym("x", 4), ca.SX.sym("p", 4)
-    return Kernel("entry", x, p, p[3] - (p[0] * (x[0] + x[1]) + p[1] * x[2] + p[2] * x[3]))
+    x, p = ca.SX.sym("x", parts + 2), ca.SX.sym("p", 4)
+    return Kernel("entry", x, p, p[3] - (p[0] * ca.sum1(x[:parts]) + p[1] * x[parts] + p[2] * x[parts + 1]))
 
 
 @cache
@@ -28,10 +28,12 @@ def entry_slope() -> Kernel:
 
 
 @cache
-def entry_energy() -> Kernel:
-    """½ v m v, ½ q k q − load q, and v c v of one entry: kinetic, stored, dissipated."""
+def entry_energy(parts: int) -> Kernel:
+    """½ v m v, ½ q k q − load q, and v c v of one entry: kinetic, stored, dissipated; q is the sum of some parts."""
     import casadi as ca
 
-    x, p = ca.SX.sym("x", 4), ca.SX.sym("p", 4)
-    stored = 0.5 * p[0] * x[0] * x[2] - p[3] * x[0]
-    return Kernel("entry_energy", x, p, ca.vertcat(0.5 * p[2] * x[1] * x[3], stored, p[1] * x[1] * x[3]))
+    x, p = ca.SX.sym("x", 2 * (parts + 1)), ca.SX.sym("p", 4)
+    v, other = x[parts], x[2 * parts + 1]
+    q, across = ca.sum1(x[:parts]), ca.sum1(x[parts + 1 : 2 * parts + 1])
+    stored = 0.5 * p[0] * q * across - p[3] * q
+    return Kernel("entry_energy", x, p, ca.vertcat(0.5 * p[2] * v * other, stored, p[1] * v * other))

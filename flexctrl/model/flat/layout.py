@@ -190,7 +190,7 @@ class Layout:
         """Return the model on a workspace of its own, with so many entries more behind it."""
         z = _aligned(self.length + spare)
         part = {name: z[start : start + self.sizes[name]] for name, start in self.starts.items()}
-        for hidden in {"slots", "drawn"} & set(part):
+        for hidden in {"slots", "drawn", "back"} & set(part):
             del part[hidden]
         vectors: dict[str, Any] = {"z": z, **part}
         flat = Flat(
@@ -306,12 +306,18 @@ class Layout:
             "gusts": (self._gusts(),) if self.model.gusts else (),
         }
 
+    @property
+    def _coordinates(self) -> tuple[str, ...]:
+        """What adds up to the coordinates at the start of a step, as the equations count them."""
+        return ("q",)
+
     def _entry_forces(self) -> Run:
         rows, columns, values = self.entries
         at = self.position[columns]
-        gather = np.column_stack([self.starts[name] + at for name in ("q", "step", "v", "rate")])
+        place = (*self._coordinates, "step")
+        gather = np.column_stack([self.starts[name] + at for name in (*place, "v", "rate")])
         scatter = self.starts["force"] + self.position[rows][:, None]
-        return self.backend.bind(entry(), gather, values, scatter)
+        return self.backend.bind(entry(len(place)), gather, values, scatter)
 
     def _entry_slopes(self) -> Run:
         rows, columns, values = self.entries
@@ -320,9 +326,10 @@ class Layout:
 
     def _entry_energies(self) -> Run:
         rows, columns, values = self.entries
-        ends = [self.starts[name] + self.position[cells] for cells in (rows, columns) for name in ("q", "v")]
+        place = self._coordinates
+        ends = [self.starts[name] + self.position[cells] for cells in (rows, columns) for name in (*place, "v")]
         books = np.tile(np.arange(3), (len(rows), 1))
-        return self.backend.bind(entry_energy(), np.column_stack(ends), values, books)
+        return self.backend.bind(entry_energy(len(place)), np.column_stack(ends), values, books)
 
     def _follows(self) -> np.ndarray:
         follows = self.model.signals.follows

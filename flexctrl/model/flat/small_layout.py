@@ -31,11 +31,22 @@ class SmallLayout(Layout):
             **dict.fromkeys(("force", "load"), self.padded),
             "shift": 6 * nodes,
             "drawn": 12 * nodes,
+            "back": self.padded if self.model.about else 0,
         }
 
     @cached_property
     def constants(self) -> tuple[int, np.ndarray]:
-        return self.starts["drawn"], np.hstack([self.model.rest.x, self.model.rest.R.reshape(-1, 9)]).ravel()
+        rest, first, last = self.model.rest, self.starts["drawn"], self.starts["back"]
+        values = np.zeros(last - first + self.sizes["back"])
+        values[: 12 * len(rest.x)] = np.hstack([rest.x, rest.R.reshape(-1, 9)]).ravel()
+        if self.model.about:
+            values[last - first + self.plan.position] = -rest.q
+        return first, values
+
+    @property
+    def _coordinates(self) -> tuple[str, ...]:
+        """From where it rests on: what is small, and nothing of which is lost to what is not."""
+        return ("q", "back") if self.model.about else ("q",)
 
     @cached_property
     def entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -91,6 +102,7 @@ class SmallLayout(Layout):
 
     @cached_property
     def runs(self) -> dict[str, Any]:
+        cells = np.arange(6 * len(self.motion.place))
         return {
             "turn": (),
             "linkage": self._linkage(),
@@ -98,7 +110,7 @@ class SmallLayout(Layout):
             "forces": (self._entry_forces(),),
             "tangents": (self._entry_slopes(),),
             "energies": (self._entry_energies(),),
-            "shifts": (self._along(("q", "step"), np.arange(6 * len(self.motion.place)), self.starts["shift"]),),
+            "shifts": (self._along((*self._coordinates, "step"), cells, self.starts["shift"]),),
             "gusts": (),
         }
 
