@@ -99,8 +99,7 @@ class Exact:
 
         plain = ExactStepper(model, feed, tolerance, self.modes, self.step)
         marched: Any = LeapingStepper(plain)
-        paired = not model.motion.flows.size  # modal states are marched in pairs
-        return marched if can_march(model) and paired and not feed.continuous else plain
+        return marched if can_march(model) and not feed.continuous else plain
 
 
 def _modal(model: Model, modes: int | None) -> tuple[ModalEquations, Propagator]:

@@ -72,7 +72,8 @@ class Turnover:
         rates = np.hstack([e.first.C[n:], e.first.D[n:]])
         loads = np.array([model.loads(model.rest, unit) for unit in np.eye(len(none))]).reshape(-1, n).T
         work = rates.T @ (loads @ np.hstack([e.gain, e.direct]))
-        return 0.5 * (work + work.T), rates.T @ (damping @ rates)
+        lost = rates.T @ (damping @ rates)
+        return 0.5 * (work + work.T), 0.5 * (lost + lost.T)
 
     def _doubled(self, h: float) -> tuple[np.ndarray, np.ndarray]:
         first = self.equations.first

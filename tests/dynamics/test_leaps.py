@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.design import FilteredRate, MinimumJerk, OpenLoop, Ramp, pid
+from flexctrl.design import FilteredRate, MinimumJerk, OpenLoop, Ramp, Together, pid
 
 pytest.importorskip("llvmlite")
 
@@ -141,3 +141,38 @@ def test_leaps_turn_what_shows_its_rotation(monkeypatch):
     a, b = both(model, monkeypatch, **how)
     assert np.abs(b["elbow"]).max() > 0.01
     assert np.allclose(a.y, b.y, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "lags", [{"left_drive": 0.05, "right_drive": 0.05}, {"left_drive": 0.03}, {"left_drive": 1e-5}]
+)
+def test_leaps_hold_motor_lags(lags, monkeypatch):
+    """A lag is linear: its torque is a modal state beside the others, coupled with all that the motor moves."""
+    model = fc.assemble(
+        fc.cranes.bridge_crane(),
+        [fc.Gravity(), fc.Flexible(), fc.GeometricStiffness(), fc.RayleighDamping(0.01, 1e-3), fc.MotorLag(lags)],
+    )
+    loops = [
+        pid(40.0, 0.0, 8.0, measured=f"{side}_angle", rate=FilteredRate(0.02), command=f"{side}_torque")
+        for side in ("left", "right")
+    ]
+    law = fc.Saturated(
+        fc.Sampled(
+            Together(
+                *(
+                    fc.Tracking(p, {f"{s}_angle": MinimumJerk(2.0, 0.4)})
+                    for p, s in zip(loops, ("left", "right"), strict=True)
+                )
+            ),
+            0.02,
+        ),
+        {"left_torque": 30.0, "right_torque": 30.0},
+    )
+    how = {"controller": law, "until": 0.6, "method": fc.Exact(0.01), "every": 0.02, "start": fc.equilibrium(model)}
+    a, b = both(model, monkeypatch, **how)
+    for name in a.outputs:
+        assert np.allclose(a[name], b[name], rtol=1e-9, atol=1e-9 * (1.0 + np.abs(b[name]).max()))
+    assert np.allclose(a.final.q, b.final.q, rtol=1e-9, atol=1e-10)
+    assert a.report.energy.work == pytest.approx(b.report.energy.work, rel=1e-9)
+    assert a.report.energy.dissipated == pytest.approx(b.report.energy.dissipated, rel=1e-9)
+    assert max(a.report.energy_residual, b.report.energy_residual) < 1e-6
