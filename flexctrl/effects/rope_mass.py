@@ -65,9 +65,19 @@ class RopeMass(Effect):
         """
         return isinstance(part, Rope) and part.rhoA > 0.0 and (not self.of or part.name in self.of)
 
+    def left_out(self, structure: Structure, beside: Sequence[Effect]) -> tuple[str, ...]:
+        """Ropes that no mass is given of."""
+        ropes = [p for p in structure.elements if isinstance(p, Rope) and not p.rhoA and not self.of]
+        return tuple(
+            f"mass of rope {p.name} is left out: it has none per length; give it Rope({p.name!r}, …, rhoA=…) in kg/m"
+            for p in ropes
+        )
+
     def check_on(self, structure: Structure) -> None:
         """Look for every rope."""
         known = [p.name for p in structure.elements if isinstance(p, Rope) and p.rhoA]
         for name in self.of:
             if name not in known:
-                raise StructureError(f"RopeMass: there is no rope {name!r} with rhoA{did_you_mean(name, known)}")
+                raise StructureError(
+                    f"RopeMass: there is no rope {name!r} with rhoA, its mass per length{did_you_mean(name, known)}"
+                )

@@ -170,7 +170,7 @@ def _stiffened_section(name: str, scene: Subject) -> Subject:
 
 def snake(kind: type) -> str:
     """Return a type's name as scenes write it: ``rope_stretch``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower()
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__.replace("LuGre", "Lugre")).lower()
 
 
 def _flat(scene: Subject) -> list[Effect]:

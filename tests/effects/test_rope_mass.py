@@ -140,3 +140,19 @@ def test_only_the_named_ropes_have_mass_and_stretch():
 def test_impossible_heavy_ropes_are_refused(make, message):
     with pytest.raises(StructureError, match=message):
         make()
+
+
+def test_a_rope_without_mass_per_length_is_named():
+    light, heavy = (
+        fc.Rope("light", (0, 0, 0), (0, 0, -1), EA=1e6),
+        fc.Rope("heavy", (1, 0, 0), (1, 0, -1), EA=1e6, rhoA=1.0),
+    )
+    joints = [fc.Support(light.start), fc.Support(heavy.start)]
+    loads = [fc.PointMass(f"{rope.name}_load", rope.end, 5.0) for rope in (light, heavy)]
+    pins = [fc.Pin(rope.end, load.node) for rope, load in zip((light, heavy), loads, strict=True)]
+    model = fc.assemble(
+        fc.Structure([light, heavy, *loads], [*joints, *pins]), [LARGE, fc.Gravity(), HEAVY, fc.RopeStretch()]
+    )
+    [note] = model.notes
+    assert "mass of rope light is left out" in note
+    assert "rhoA=…" in note
