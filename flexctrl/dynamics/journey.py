@@ -134,9 +134,16 @@ class Journey:
             self.fault = error.__cause__
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
-        if self.status is Status.FINISHED and (unresolved := self.books.unresolved):
+        self._judge()
+
+    def _judge(self) -> None:
+        """Hold an end by the clock or by an event against the books; others are told what these say beside."""
+        if self.status in (Status.FINISHED, Status.STOPPED) and (unresolved := self.books.unresolved):
+            ended = f" (it would have ended: {self.message})" if self.message else ""
             self.status = Status.FAILED
-            self.message = f"{unresolved} at t = {self.point.state.t:.6g} s; {self._remedy}"
+            self.message = f"{unresolved} at t = {self.point.state.t:.6g} s{ended}; {self._remedy}"
+        elif self.status is not Status.FAILED:
+            self.notes += self.books.doubts
 
     @property
     def _tick(self) -> float:

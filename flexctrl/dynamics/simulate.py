@@ -276,7 +276,7 @@ def _report(journey: Journey) -> Report:
         worst=model.coordinates[counts.worst] if model.n else "",
         closure_error=sums.closure,
         message=journey.message,
-        notes=(*model.notes, *journey.notes, *(() if journey.message else journey.books.doubts)),
+        notes=(*model.notes, *journey.notes),
     )
 
 

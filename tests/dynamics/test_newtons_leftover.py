@@ -39,7 +39,10 @@ def test_a_stiff_line_is_a_rod(k, step, rho, until):
     assert run.report.energy_residual < 1e-3
 
 
-@pytest.mark.parametrize(("k", "step", "rho"), [(1e8, 1e-3, 0.9), (1e7, 5e-3, 0.6), (1e6, 1e-2, 0.6)])
+@pytest.mark.parametrize(
+    ("k", "step", "rho"),
+    [(1e8, 1e-3, 0.9), (1e7, 5e-3, 0.6), (1e6, 1e-2, 0.6), (1e10, 1e-3, 0.3), (1e11, 5e-4, 0.6), (1e11, 5e-4, 0.3)],
+)
 def test_a_tighter_test_changes_nothing(k, step, rho):
     how = {"until": 3.0, "method": fc.GeneralizedAlpha(step, rho), "every": 0.5}
     usual, tight = (fc.simulate(on_a_spring(k), tolerance=t, **how) for t in (None, fc.Tolerance(absolute=1e-11)))

@@ -163,3 +163,23 @@ def test_stiff_shafts_with_inertia_in_time(record, stiffness, ratio):
         source="rigid motion and the shaft's swing",
         tolerance=Absolute(1e-4 + (0.0 if resolved else 2.0 * swing)),
     )
+
+
+@pytest.mark.parametrize("backend", [None, fc.CasadiVM()])
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-3)])
+def test_a_machine_without_any_mass_is_where_forces_balance(backend, method):
+    """A lever on a spring, pushed by a motor without inertia."""
+    lever = fc.RigidBody("lever", (0, 0, 0), 0.0, (0.0, 0.0, 0.0), {"hub": (0, 0, 0), "tip": (1, 0, 0)})
+    spring = fc.Spring("spring", lever.point("tip"), (1, 0, -1), stiffness=100.0)
+    motor = fc.RotaryDrive("motor", lever.point("hub"), axis="y", stiffness=10.0, ratio=10.0)
+    joints = [
+        fc.Support(lever.point("hub"), "u v w rx rz"),
+        fc.Pin(lever.point("tip"), spring.start),
+        fc.Support(spring.end),
+    ]
+    torque, angle = fc.MotorTorque("torque", motor), fc.Rotation("angle", lever.point("hub"), "y")
+    structure = fc.Structure([lever, spring], joints, [motor], [torque], [angle])
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity()], backend)
+    run = fc.simulate(model, until=0.1, inputs={"torque": 0.1}, every=0.05, method=method)
+    assert run.status is fc.Status.FINISHED
+    assert run["angle"][-1] == pytest.approx(fc.equilibrium(model, inputs={"torque": 0.1}).outputs["angle"], abs=1e-9)

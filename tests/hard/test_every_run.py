@@ -48,6 +48,36 @@ def test_energy_that_was_made_and_lost_again_on_the_way_is_not_forgotten(rho, st
     assert len(run.t) > 10
 
 
+def test_an_event_that_ends_a_run_vouches_for_nothing():
+    """A pendulum on a rope of 10¹² N in steps that make energy on it, ended by an event on its way."""
+    rope = fc.Rope("rope", (0, 0, 0), (1, 0, 0), EA=1e12)
+    bob = fc.PointMass("bob", rope.end, 1.0)
+    joints = [fc.Support(rope.start), fc.Pin(rope.end, bob.node)]
+    structure = fc.Structure([rope, bob], joints, outputs=[fc.Position("z", bob.node, "z")])
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()])
+    event = fc.Event("through", "z", at=-0.4, terminal=True)
+    run = fc.simulate(model, until=0.3, method=fc.GeneralizedAlpha(1e-3, rho=0.5), events=[event])
+    assert run.report.energy_residual > 0.5
+    assert run.status is Status.FAILED
+    assert "the motion is not resolved" in run.report.message
+    assert "through" in run.report.message
+
+
+def test_an_interrupted_run_says_what_its_books_miss():
+    calls = iter(range(10**6))
+
+    def interrupting(seen):
+        if next(calls) > 100:
+            raise KeyboardInterrupt
+        return 1.0
+
+    method = fc.GeneralizedAlpha(0.1)
+    run = fc.simulate(chain(3, 1e7), until=50.0, method=method, events=[fc.Event("never", interrupting)])
+    assert run.status is Status.INTERRUPTED
+    assert run.report.energy_residual > 0.05
+    assert "resolved" in run.report.notes[-1]
+
+
 def test_steps_that_are_controlled_reach_the_end_of_the_same_run():
     run = fc.simulate(chain(), until=5.0)
     assert run.status is Status.FINISHED

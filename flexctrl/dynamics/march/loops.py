@@ -54,7 +54,7 @@ _LEFT = 0.02
 _SURE = 1e-4
 _DOUBT = 4.0
 _TRUSTED = 8
-_QUIET, _SMALLEST = 1e-6, 1e-14
+_QUIET, _SMALLEST = 1e-7, 1e-14
 _MASSLESS = 1e-14
 
 

@@ -52,7 +52,7 @@ from flexctrl.model.state import State
 
 __all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
 
-_SHARE, _KEEPING = 1e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
+_SHARE, _KEEPING = 3e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
 _HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed", "swift")
 _PACED = (CONTROLLED, SAMPLED)
 _MADE, _ASKED = 5.0, 100.0

@@ -239,7 +239,8 @@ class _Drawing:
         self.mass, self.still = self.balance()
         inputs = ca.symvar(self.mass)
         values = self._values_at_rest()
-        M = np.array(ca.Function("mass", inputs, [self.mass])(*[values[s.name()] for s in inputs]), dtype=float)
+        given = [values[s.name()] for s in inputs]
+        M = np.array(ca.Function("mass", inputs, [self.mass]).call(given)[0], dtype=float)
         if not (np.isfinite(M).all() and (np.diag(M) > 0.0).all()):
             return False
         scale = 1.0 / np.sqrt(np.diag(M))
