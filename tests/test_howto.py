@@ -1,4 +1,4 @@
-"""How-to pages: their blocks run in order and print what is shown after them."""
+"""Pages with code: their blocks run in order and print what is shown after them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import pytest
 
 mpl.use("Agg")
 
-PAGES = Path(__file__).resolve().parents[1] / "docs" / "howto"
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+PAGES = DOCS / "howto"
 PAGES_RUN = (
     "bode",
     "root_locus",
@@ -27,7 +28,9 @@ PAGES_RUN = (
     "travelling",
     "long_runs",
     "integrators",
+    "paths",
 )
+OTHER_PAGES = ("theory/linear", "scenes")
 PAGES_OF_STUDIES = ("effects", "accuracy")
 """Pages that study the scenes shipped, here a small one in their place; what they print depends on the clock."""
 SMALL = """
@@ -90,10 +93,10 @@ BLOCK = re.compile(r"^```python\n(?P<code>.*?)^```$(?:\n\n```text\n(?P<shown>.*?
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::UserWarning")  # of python-control's layouts and unused signals
-@pytest.mark.parametrize("name", PAGES_RUN)
+@pytest.mark.parametrize("name", [*(f"howto/{name}" for name in PAGES_RUN), *OTHER_PAGES])
 def test_a_page_runs_and_prints_what_it_shows(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
     blocks = list(BLOCK.finditer(text))
     assert len(blocks) == text.count("```python\n")
     names: dict[str, object] = {"__name__": name}
@@ -125,6 +128,16 @@ def test_a_page_of_studies_runs_on_a_small_scene(name: str, tmp_path: Path, monk
     pictures = re.findall(r'savefig\("(.*?)"\)', text)
     assert pictures
     assert all((tmp_path / picture).stat().st_size > 5_000 for picture in pictures)
+
+
+def test_every_page_with_code_is_run() -> None:
+    pages = [
+        p.relative_to(DOCS)
+        for p in DOCS.rglob("*.md")
+        if "_build" not in p.parts and BLOCK.search(p.read_text("utf-8"))
+    ]
+    run = {*(f"howto/{name}.md" for name in (*PAGES_RUN, *PAGES_OF_STUDIES)), *(f"{name}.md" for name in OTHER_PAGES)}
+    assert {p.as_posix() for p in pages} == run
 
 
 @pytest.mark.parametrize("name", [*PAGES_RUN, *PAGES_OF_STUDIES])
