@@ -89,7 +89,17 @@ def test_the_page_needs_nothing_else(report):
     cost = re.search(r'<section id="cost".*?<pre>(.*?)</pre>', text, re.DOTALL)[1].splitlines()
     assert "cheapest within 0.1" in cost[-1] or "no setting" in cost[-1]
     assert all(line.endswith("*") for line in cost[3:] if not re.match("reference|passed|cheapest|no setting", line))
-    for title in ("Machine", "Modes", "Bode", "Root locus", "Closed loop", "Effects", "Accuracy", "Versions"):
+    for title in (
+        "Machine",
+        "Modes",
+        "Bode",
+        "Root locus",
+        "Closed loop",
+        "Fidelity",
+        "Effects",
+        "Accuracy",
+        "Versions",
+    ):
         assert f">{title}<" in text
 
 
@@ -110,7 +120,7 @@ def test_a_browser_shows_every_section_without_errors(report):
     try:
         browser.get(report.as_uri())
         tabs = browser.find_elements("css selector", "nav button")
-        assert len(tabs) == 9
+        assert len(tabs) == 10
         for tab in tabs:
             tab.click()
             shown = [s for s in browser.find_elements("css selector", "main section") if s.is_displayed()]

@@ -33,10 +33,15 @@ LEADS = {
         "Whether the run can be trusted. The energy residual is what the balance of energy misses, over the "
         "energy turned over: well below 1e-2 is good. Rejected steps were tried again with shorter ones."
     ),
+    "ladder": (
+        "The same scene from rigid to refined: the largest error of an output against a certified reference, "
+        "over the time of the run (1: a fixed small calculation on this computer). Within the grey band the "
+        "reference knows no better."
+    ),
     "ledger": (
         "What the answer loses without each effect (change of outputs, poles, margins) and how long the run "
-        "then takes (time: 0.5 is twice as fast). Kept, in blue, is the smallest set that changes no output "
-        "by more than is borne."
+        "then takes (time: 0.5 is twice as fast). Of pole: the pole that changes most, 100 % if it is gone or "
+        "new. Kept, in blue, is the smallest set that changes no output, pole or margin by more than is borne."
     ),
     "cost": (
         "Error of many ways to compute the scene against a certified reference, over their time (1: a fixed "
