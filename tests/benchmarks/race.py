@@ -191,7 +191,7 @@ def chain_race(quick: bool) -> dict[str, object]:
         for n in CHAINS[: 3 if quick else None]:
             steps = max(100 if quick else 400, min(2000, 100_000 // n))
             ours, theirs, newton = [], [], (0, 0)
-            for _ in range(2 if n > 1000 else 3):
+            for _ in range(3 if n > 1000 else 5):
                 tip, seconds, k = our_chain(n, angle, steps)
                 ours.append(seconds)
                 other = exudyn_chain(n, angle, CHAIN_STEP, steps)
@@ -217,7 +217,7 @@ def growth(quick: bool) -> dict[str, object]:
     for name, angle in SWINGS.items():
         times, newton = {}, {}
         for n in (100, 1000) if quick else (100, 1000, LARGEST):
-            short, long = (100, 200) if n > 1000 else (200, 600)
+            short, long = (100, 400) if n > 1000 else (500, 2500)
             tries = [[our_chain(n, angle, steps)[1:] for steps in (short, long)] for _ in range(3)]
             first, both = (min(two[k][0] for two in tries) for k in (0, 1))
             times[n] = (both - first) / (long - short)
