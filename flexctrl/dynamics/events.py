@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -262,6 +262,10 @@ class Watch:
         first = len(self.events)
         self.sides[first : first + len(self.names)] = 1.0
 
+    def withheld(self, switch: int) -> None:
+        """Note that a switching law of force is kept from switching over the next step."""
+        self.sides[len(self.events) + switch] = 0.0
+
     def crossings(self, curve: Curve, before: Point, after: Point) -> list[Crossing]:
         """Return where gauges cross zero over a step, in order; sides stay as they are."""
         if self.quiet and self._calm(after.state, before.state):
@@ -292,7 +296,7 @@ class Watch:
     def _through(self, gauge: int, corners: Sequence[tuple[float, float]], value: _Along) -> list[Crossing]:
         side, found = self.sides[gauge], []
         dust = self.dusts[gauge]
-        direction = self.events[gauge].direction if gauge < len(self.events) else Direction.EITHER
+        direction = self._directions[gauge]
         for (a, fa), (b, fb) in pairwise(corners):
             if abs(fb) <= dust or np.sign(fb) == side:
                 continue
@@ -303,6 +307,11 @@ class Watch:
                 found.append(Crossing(at, gauge, rising))
             side = np.sign(fb)
         return found
+
+    @cached_property
+    def _directions(self) -> tuple[Direction, ...]:
+        switches, corners = [Direction.FALLING] * len(self.names), [Direction.EITHER] * len(self.corner_names)
+        return (*(event.direction for event in self.events), *switches, *corners)
 
     def leaps(self, point: Point) -> list[Crossing]:
         """Return the events that the inputs' jump to those of a point has brought about; sides stay as they are."""
@@ -327,6 +336,7 @@ class Watch:
         values = self.values(after.state, after.supply.u)
         clear = np.abs(values) > self.dusts
         self.sides = np.where(clear, np.sign(values), self.sides)
+        self.switched()
 
     def cross(self, crossing: Crossing) -> None:
         """Note that a gauge has crossed, though its value may still be on either side of zero by round-off."""

@@ -23,9 +23,11 @@ from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.midpoint import ConservingMidpoint
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
+from flexctrl.dynamics.scales import farthest
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Joining, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
+from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
@@ -33,7 +35,7 @@ __all__ = ["SMALLEST", "Journey", "Plan"]
 
 SMALLEST = 1e-12
 _NEAR = 1e-9
-_LANDINGS, _LANDINGS_MOST = 5, 60
+_LANDINGS, _LANDINGS_MOST = 12, 60
 _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
 _LEAD, _LEAD_LEAST, _LEAD_MOST, _LEAD_FAR = 1e-8, 1e-9, 1e-7, 1e-4
 _NUDGES = 8
@@ -392,8 +394,9 @@ class Journey:
             watch.settle(after)
             self.mark.stuck = 0
             return after, None
-        earlier = [c for c in crossings if c.t < landing.t]
+        earlier, slid = [c for c in crossings if c.t < landing.t], after
         after, landing = self._land(before, after, landing)
+        brief = 0 <= switch < len(watch.names) and self._brief(before, after, slid, switch)
         self._note(earlier, curve, before)
         watch.settle(after)
         watch.cross(landing)
@@ -403,7 +406,9 @@ class Journey:
             return after, None
         short = landing.t - before.state.t < 1e-6 * self.mark.size
         self.mark.stuck = self.mark.stuck + 1 if short else 0
-        return (after, landing) if switch >= len(watch.names) else (self._anew(after, switch), None)
+        if switch >= len(watch.names):
+            return after, landing
+        return self._withheld(after, switch) if brief else self._anew(after, switch), None
 
     def _over(self, crossing: Crossing) -> bool:
         """Tell whether an event asked for has been told, or is beyond the end."""
@@ -415,6 +420,29 @@ class Journey:
         state = self.plan.model.switches.after(at.state, supply.u, switch)
         self.watch.switched()
         return self.stepper.renew(replace(at, state=state), supply, self.mark.size)
+
+    def _brief(self, before: Point, after: Point, slid: Point, switch: int) -> bool:
+        """Tell whether a contact that breaks loose here sticks again at once, for all that a step can see.
+
+        Where steps are chosen, they are shortened first, until what one makes of the slip is within tolerance.
+        """
+        switches, h = self.plan.model.switches, slid.state.t - before.state.t
+        if after.state.t > before.state.t or switches.phases(before.state)[switch] == STUCK:
+            return False
+        if isinstance(self.plan.method.pace, Controlled):
+            held, v, moved = switches.withheld(before.state, switch), slid.state.v, self.books.sums.moved
+            slip = h * np.abs(v - switches.still(held, v)) / self.books.reach
+            if (slip > self.plan.tolerance.of(farthest(self.plan.model, moved))).any():
+                raise _Missed(self.stepper.counts.worst, "a slip is over within less than the step")
+        return True
+
+    def _withheld(self, at: Point, switch: int) -> Point:
+        """Hold for a step what would slip for less than that, whatever pulls; after it, that is tried again."""
+        state = self.plan.model.switches.withheld(at.state, switch)
+        if self.mark.stuck > 1:  # nothing has happened: it has broken loose and stuck again where the step begins
+            del self.events[-2:]
+        self.watch.withheld(switch)
+        return self.stepper.renew(replace(at, state=state), self.plan.feed.restart(state, at.supply), self.mark.size)
 
     def _beyond(self, at: Point, corner: Crossing) -> Point:
         """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
@@ -466,6 +494,7 @@ class Journey:
         if crossing.gauge >= len(self.watch.events) + len(self.watch.names):
             return self._short_of(before, after, crossing)
         t, h, gauge, at = before.state.t, after.state.t - before.state.t, crossing.gauge, crossing.t
+        low, high = t, t + h
         for _ in range(_LANDINGS):
             if at - t <= SMALLEST * h:
                 return before, replace(crossing, t=t)
@@ -476,7 +505,9 @@ class Journey:
             off = self.watch.offset(self.track.curve(before, after), before, after, gauge)
             if abs(off) <= _NEAR * h:
                 break
-            at = min(max(after.state.t + off, t), t + h)
+            left = self.watch.sides[gauge] * self.watch.values(after.state, after.supply.u, before.state)[gauge]
+            low, high = (at, high) if left > 0.0 else (low, at)
+            at = after.state.t + off if low < after.state.t + off < high else 0.5 * (low + high)
         return after, replace(crossing, t=after.state.t)
 
     def _short_of(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:

@@ -54,7 +54,7 @@ _LEFT = 0.02
 _SURE = 1e-4
 _DOUBT = 4.0
 _TRUSTED = 8
-_QUIET, _SMALLEST = 1e-7, 1e-14
+_QUIET, _LAST = 1e-7, 1e-14
 _MASSLESS = 1e-14
 
 
@@ -338,7 +338,7 @@ def tighten(m: March, rough: float, steady: float, pull: float) -> None:
     back in the next step are no error to go by: they may be what he left. And what he leaves is an acceleration,
     which adds up: it is to be small beside those there are.
     """
-    floor = min(m.least, max(_QUIET * m.beta * m.h * m.h * pull, _SMALLEST))
+    floor = min(m.least, max(_QUIET * m.beta * m.h * m.h * pull, _LAST))
     error = abs(m.beta - 1.0 / 6.0) * m.h * m.h * steady
     m.tolerance = min(max(floor, m.share * error * min(1.0, rough)), m.loosest)
 

@@ -259,6 +259,23 @@ class Switches:
             phases[contact] = STUCK
         return self._settled(state, u, phases)
 
+    def withheld(self, state: State, contact: int) -> State:
+        """Return a state in which a contact sticks, however large the force on it is.
+
+        Parameters
+        ----------
+        state : State
+        contact : int
+
+        Returns
+        -------
+        State
+        """
+        phases = self.phases(state).copy()
+        phases[contact] = STUCK
+        state = self._with(state, phases)
+        return state.with_(v=self.still(state, state.v))
+
     def _settled(self, state: State, u: np.ndarray, phases: np.ndarray) -> State:
         """Break loose what cannot be held, the worst first, each once; what would then slide back is held after all."""
         loosened: set[int] = set()
