@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 __all__ = [
     "ChartError",
@@ -19,6 +20,7 @@ __all__ = [
     "SceneError",
     "SingularMatrixError",
     "StructureError",
+    "check_kind",
     "did_you_mean",
     "shortened",
 ]
@@ -124,6 +126,31 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
         return f"; did you mean {lowered[(close or within)[0]]!r}?"
     more = f" … ({len(names)} in all)" if len(names) > _MOST_NAMES else ""
     return f"; known: {', '.join(names[:_MOST_NAMES])}{more}" if names else ""
+
+
+def check_kind(
+    value: object, kinds: Any, what: str, expected: str, error: type[FlexctrlError] = StructureError
+) -> None:
+    """Raise unless a value is of a kind.
+
+    Parameters
+    ----------
+    value : object
+    kinds : type, tuple or union of types
+    what : str
+        Whose value it is, as ``"lqr: plant"``.
+    expected : str
+        What is to be given instead.
+    error : type
+        What is raised.
+
+    Raises
+    ------
+    FlexctrlError
+        Of the type given.
+    """
+    if not isinstance(value, kinds):
+        raise error(f"{what} = {shortened(value)}; expected {expected}")
 
 
 def shortened(value: object) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Protocol, cast, runtime_checkable
 import numpy as np
 
 from flexctrl.errors import ControllerError, did_you_mean
+from flexctrl.structure.freedoms import listed
 
 __all__ = ["Controller", "IOSystemController", "LinearController", "as_controller"]
 
@@ -253,6 +254,7 @@ def as_controller(
     ControllerError
         If it is no controller, has no definite time base, or a name is unknown to the plant.
     """
+    plant_inputs, plant_outputs = listed(plant_inputs, "plant inputs"), listed(plant_outputs, "plant outputs")
     found = _from_control(controller) if _is_control_system(controller) else _from_object(controller)
     for name in found.outputs if plant_inputs else ():
         if name not in plant_inputs:

@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from flexctrl.design.piecewise import require_finite
-from flexctrl.errors import ControllerError
+from flexctrl.design.wrapping import check_plant, matrix
+from flexctrl.errors import ControllerError, check_kind
+from flexctrl.structure.freedoms import numbers
 
 __all__ = ["FilteredRate", "observer", "observer_feedback", "pd", "pi", "pid", "state_feedback"]
 
@@ -32,7 +34,7 @@ class FilteredRate:
     time: float
 
     def __post_init__(self) -> None:
-        if not self.time > 0:
+        if not numbers([self.time])[0] > 0:
             raise ControllerError(f"FilteredRate: the time constant {self.time} s must be > 0")
 
 
@@ -132,7 +134,8 @@ def state_feedback(gain: np.ndarray, plant: Any) -> Any:
     ControllerError
         If K x cannot be told from the outputs, naming the state that is missing most.
     """
-    K = _shaped(gain, (plant.ninputs, plant.nstates), "state_feedback: the gain")
+    check_plant(plant, "state_feedback")
+    K = matrix(gain, (plant.ninputs, plant.nstates), "state_feedback: the gain")
     if np.any(plant.D):
         raise ControllerError(
             "state_feedback: an output of the plant depends on its inputs directly (an acceleration?): leave it "
@@ -169,7 +172,8 @@ def observer(plant: Any, gain: np.ndarray) -> Any:
     """
     import control
 
-    L = _shaped(gain, (plant.nstates, plant.noutputs), "observer: the gain")
+    check_plant(plant, "observer")
+    L = matrix(gain, (plant.nstates, plant.noutputs), "observer: the gain")
     n = plant.nstates
     return control.StateSpace(
         plant.A - L @ plant.C,
@@ -204,8 +208,9 @@ def observer_feedback(gain: np.ndarray, observer_gain: np.ndarray, plant: Any) -
     """
     import control
 
-    K = _shaped(gain, (plant.ninputs, plant.nstates), "observer_feedback: the gain")
-    L = _shaped(observer_gain, (plant.nstates, plant.noutputs), "observer_feedback: the observer gain")
+    check_plant(plant, "observer_feedback")
+    K = matrix(gain, (plant.ninputs, plant.nstates), "observer_feedback: the gain")
+    L = matrix(observer_gain, (plant.nstates, plant.noutputs), "observer_feedback: the observer gain")
     return control.StateSpace(
         plant.A - plant.B @ K - L @ plant.C + L @ plant.D @ K,
         L,
@@ -229,6 +234,8 @@ def _law(states: list[State], direct: list[list[float]], inputs: Sequence[str], 
     """First-order states driven by the first input, side by side."""
     import control
 
+    for name in (*inputs, command):
+        check_kind(name, str, "feedback law: a signal", "the name of one", ControllerError)
     if not states:
         return _static(np.array(direct), inputs, [command])
     names, poles, drives, weights = zip(*states, strict=True)
@@ -250,10 +257,3 @@ def _static(gain: np.ndarray, inputs: Sequence[str], outputs: Sequence[str]) -> 
 
 def _legal(state: str) -> str:
     return state if state.isidentifier() else state.replace("[", "_").replace("]", "")
-
-
-def _shaped(matrix: np.ndarray, shape: tuple[int, int], what: str) -> np.ndarray:
-    array = np.atleast_2d(np.asarray(matrix, dtype=float))
-    if array.shape != shape or not np.isfinite(array).all():
-        raise ControllerError(f"{what} must be finite and of shape {shape}, not {array.shape}")
-    return array

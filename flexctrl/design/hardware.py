@@ -14,7 +14,7 @@ import numpy as np
 
 from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.wrapping import Wrapper, by_name, check_names, discretised
-from flexctrl.errors import ControllerError
+from flexctrl.errors import ControllerError, shortened
 from flexctrl.structure.freedoms import numbers
 
 __all__ = ["AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated"]
@@ -388,5 +388,6 @@ def _require_samples(controller: Controller, what: str) -> None:
 
 
 def _require_whole(value: int, what: str) -> None:
-    if value != int(value) or value < 0:
-        raise ControllerError(f"{what} = {value} must be a whole number, 0 or more")
+    number = numbers([value])[0]
+    if not number >= 0 or number % 1.0 != 0.0:
+        raise ControllerError(f"{what} = {shortened(value)} must be a whole number, 0 or more")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.design.feedback import observer_feedback
-from flexctrl.design.wrapping import by_name
+from flexctrl.design.wrapping import by_name, check_plant, matrix
 from flexctrl.errors import ControllerError, DesignError
 
 __all__ = ["Estimator", "Regulator", "bryson", "kalman", "lqg", "lqr"]
@@ -80,6 +80,7 @@ def bryson(plant: Any, outputs: Mapping[str, float], inputs: Mapping[str, float]
     tuple of numpy.ndarray
         Q, shape (n, n), and R, shape (n_inputs, n_inputs), for `lqr`.
     """
+    check_plant(plant, "bryson")
     largest = by_name(outputs, plant.output_labels, np.inf, "bryson: outputs")
     command = by_name(inputs, plant.input_labels, np.inf, "bryson: inputs")
     if np.isinf(command).any() or min(command.min(initial=1), largest.min(initial=1)) <= 0:
@@ -114,6 +115,7 @@ def lqr(plant: Any, state_cost: np.ndarray, input_cost: np.ndarray) -> Regulator
     DesignError
         If no stabilising solution was found; names the mode that cannot be moved or that the cost does not see.
     """
+    check_plant(plant, "lqr")
     A, B = plant.A, plant.B
     Q, R = _cost(state_cost, len(A), "state cost"), _cost(input_cost, B.shape[1], "input cost")
     equation = _Riccati(A, B, Q, R, bool(plant.isdtime(strict=True)))
@@ -142,6 +144,7 @@ def kalman(plant: Any, process: np.ndarray, measurement: np.ndarray) -> Estimato
     DesignError
         If no stable filter was found; names the mode that no output sees or that no noise moves.
     """
+    check_plant(plant, "kalman")
     A, C = plant.A, plant.C
     W, V = _cost(process, len(A), "process noise"), _cost(measurement, len(C), "measurement noise")
     equation = _Riccati(A.T, C.T, W, V, bool(plant.isdtime(strict=True)))
@@ -278,10 +281,8 @@ def _loses_rank(matrix: np.ndarray) -> bool:
     return bool(np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-9)
 
 
-def _cost(matrix: np.ndarray, n: int, what: str) -> np.ndarray:
-    array = np.atleast_2d(np.asarray(matrix, dtype=float))
-    if array.shape != (n, n) or not np.isfinite(array).all():
-        raise ControllerError(f"the {what} must be finite and of shape {(n, n)}, not {array.shape}")
+def _cost(given: np.ndarray, n: int, what: str) -> np.ndarray:
+    array = matrix(given, (n, n), f"the {what}")
     if not np.allclose(array, array.T, rtol=1e-10, atol=1e-12 * np.abs(array).max(initial=0.0)):
         raise ControllerError(f"the {what} must be symmetric")
     return (array + array.T) / 2

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.errors import ControllerError
-from flexctrl.structure.freedoms import numbers
+from flexctrl.errors import ControllerError, shortened
+from flexctrl.structure.freedoms import listed, numbers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,8 +117,10 @@ class PiecewisePolynomial(Trajectory):
 
     def __post_init__(self) -> None:
         # Plain floats: numpy's scalars would make every evaluation several times slower.
-        object.__setattr__(self, "knots", tuple(map(float, self.knots)))
-        object.__setattr__(self, "coefficients", tuple(tuple(map(float, row)) for row in self.coefficients))
+        object.__setattr__(self, "knots", reals(self.knots, "piecewise polynomial: knots"))
+        row_of = "piecewise polynomial: coefficients"
+        object.__setattr__(self, "coefficients", tuple(reals(row, row_of) for row in listed(self.coefficients, row_of)))
+        require_finite("piecewise polynomial: before", self.before)
         object.__setattr__(self, "before", float(self.before))
         if len(self.knots) != len(self.coefficients) or not self.knots:
             raise ControllerError(f"{len(self.knots)} knots need as many rows, not {len(self.coefficients)}")
@@ -305,6 +307,14 @@ def distinct(instants: Iterable[float]) -> tuple[float, ...]:
         if not kept or instant - kept[-1] > _ROUND_OFF * (1.0 + abs(instant)):
             kept.append(instant)
     return tuple(kept)
+
+
+def reals(values: object, what: str) -> tuple[float, ...]:
+    """Return a list of numbers as floats; raise a `ControllerError` for what is none."""
+    found = numbers(values)
+    if not found or any(map(math.isnan, found)):
+        raise ControllerError(f"{what} = {shortened(values)}; expected a list of finite numbers")
+    return found
 
 
 def require_finite(what: str, *values: float) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
+from flexctrl.design.piecewise import reals
 from flexctrl.errors import ControllerError
 from flexctrl.structure.freedoms import numbers
 
@@ -45,8 +46,8 @@ class Shaper:
 
     def __post_init__(self) -> None:
         # Plain floats: numpy's scalars would make every evaluation of a shaped command several times slower.
-        object.__setattr__(self, "amplitudes", tuple(map(float, self.amplitudes)))
-        object.__setattr__(self, "times", tuple(map(float, self.times)))
+        object.__setattr__(self, "amplitudes", reals(self.amplitudes, "shaper: amplitudes"))
+        object.__setattr__(self, "times", reals(self.times, "shaper: times"))
         object.__setattr__(self, "modes", tuple(Mode(float(m[0]), float(m[1])) for m in self.modes))
         values = np.array([*self.amplitudes, *self.times], dtype=float)
         if len(self.amplitudes) != len(self.times) or not self.times or not np.isfinite(values).all():

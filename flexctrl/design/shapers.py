@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.design.shaper import Mode, Shaper, check_mode
 from flexctrl.errors import ControllerError
+from flexctrl.structure.freedoms import numbers
 
 __all__ = ["ei", "um_zv", "um_zv_fit", "um_zvd", "um_zvd_fit", "zv", "zvd", "zvdd"]
 
@@ -86,7 +87,7 @@ def ei(omega: float, zeta: float = 0.0, tolerance: float = 0.05) -> Shaper:
     """
     check_mode(omega, zeta)
     V, z, period = tolerance, zeta, _damped_period(omega, zeta)
-    if not 0 < V < 1:
+    if not 0 < numbers([V])[0] < 1:
         raise ControllerError(f"EI shaper: the tolerance {V} must lie between 0 and 1 (0.05 is usual)")
     if z == 0:
         return Shaper(((1 + V) / 4, (1 - V) / 2, (1 + V) / 4), (0.0, period / 2, period), (Mode(omega, z),))

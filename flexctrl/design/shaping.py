@@ -13,6 +13,8 @@ import numpy as np
 
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, distinct, simplified
 from flexctrl.design.shaper import Shaper
+from flexctrl.errors import ControllerError, check_kind
+from flexctrl.structure.freedoms import check_seconds
 
 __all__ = ["CoarseGridWarning", "Shaped", "check_grid", "fir"]
 
@@ -35,6 +37,10 @@ class Shaped(Trajectory):
 
     trajectory: Trajectory
     shaper: Shaper
+
+    def __post_init__(self) -> None:
+        check_kind(self.trajectory, Trajectory, "Shaped: trajectory", "one, as MinimumJerk(…)", ControllerError)
+        check_kind(self.shaper, Shaper, "Shaped: shaper", "one, as zvd(omega)", ControllerError)
 
     def __call__(self, t: float) -> float:
         return self._value(t)
@@ -118,6 +124,10 @@ def fir(shaper: Shaper, sample_time: float, *, source: str, shaped: str) -> Any:
     """
     import control
 
+    check_kind(shaper, Shaper, "fir: shaper", "one, as zvd(omega)", ControllerError)
+    for name in (source, shaped):
+        check_kind(name, str, "fir: a signal", "the name of one", ControllerError)
+    check_seconds(sample_time, "sample_time", "fir")
     check_grid(shaper.shortest_period, sample_time)
     taps = _taps(shaper, sample_time)
     n = len(taps) - 1

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from numbers import Real
 
 import numpy as np
 
-from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, require_finite
-from flexctrl.errors import ControllerError
+from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, reals, require_finite
+from flexctrl.errors import ControllerError, check_kind
 from flexctrl.structure.freedoms import numbers
 
 __all__ = [
@@ -34,6 +35,10 @@ class _Profile(Trajectory):
         """The same trajectory as polynomials."""
 
     def __post_init__(self) -> None:
+        for given in fields(self):  # type: ignore[arg-type]
+            if given.type == "float":
+                what = f"{type(self).__name__}: {given.name}"
+                check_kind(getattr(self, given.name), Real, what, "a number", ControllerError)
         _ = self.pieces  # made once, so that what cannot be is refused at construction
 
     def __call__(self, t: float) -> float:
@@ -290,7 +295,7 @@ def _accelerated(
 
 
 def _points(what: str, times: Sequence[float], values: Sequence[float]) -> tuple[list[float], list[float]]:
-    t, v = [float(x) for x in times], [float(x) for x in values]
+    t, v = list(reals(times, f"{what}: times")), list(reals(values, f"{what}: values"))
     if len(t) != len(v) or len(t) < 2:
         raise ControllerError(f"a {what} needs two or more times and as many values, not {len(t)} and {len(v)}")
     require_finite(what, *t, *v)

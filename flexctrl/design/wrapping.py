@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
-from flexctrl.errors import ControllerError, did_you_mean, shortened
+from flexctrl.errors import ControllerError, check_kind, did_you_mean, shortened
 from flexctrl.structure.freedoms import numbers
 
 __all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised"]
@@ -170,6 +170,51 @@ def discretised(controller: Controller, sample_time: float) -> Controller:
         )
     sampler: Any = getattr(controller, "sampled", None)
     return sampler(sample_time) if sampler else IntegratedController(controller, sample_time)
+
+
+def check_plant(plant: Any, owner: str) -> None:
+    """Raise unless a plant is a python-control model in state space.
+
+    Parameters
+    ----------
+    plant : object
+    owner : str
+
+    Raises
+    ------
+    ControllerError
+    """
+    import control
+
+    expected = "a control.StateSpace, as linear.to_ss() gives"
+    check_kind(plant, control.StateSpace, f"{owner}: plant", expected, ControllerError)
+
+
+def matrix(values: Any, shape: tuple[int, int], what: str) -> np.ndarray:
+    """Return a matrix of finite numbers.
+
+    Parameters
+    ----------
+    values : array_like
+    shape : tuple of int
+    what : str
+
+    Returns
+    -------
+    numpy.ndarray
+
+    Raises
+    ------
+    ControllerError
+        If it has another shape, or holds what is no finite number.
+    """
+    try:
+        array = np.atleast_2d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise ControllerError(f"{what} = {shortened(values)}; expected a matrix of numbers, {shape}") from None
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ControllerError(f"{what} must be finite and of shape {shape}, not {array.shape}")
+    return array
 
 
 def by_name(values: Mapping[str, float], names: Sequence[str], default: float, what: str) -> np.ndarray:

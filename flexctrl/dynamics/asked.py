@@ -47,7 +47,7 @@ def check_arguments(given: Mapping[str, object]) -> None:
     """
     for name, value in given.items():
         kinds, expected = _KINDS[name]
-        if value is None or (type(value), name) in _known:
+        if (value is None and name != "model") or (type(value), name) in _known:
             continue
         if isinstance(value, type) or not isinstance(value, kinds):
             raise StructureError(f"simulate: {name} = {shortened(value)}; expected {expected}")

@@ -129,6 +129,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     StructureError
         If the file is no checkpoint of this version.
     """
+    check_path(path, "load_checkpoint")
     try:
         with np.load(Path(path), allow_pickle=False) as file:
             content = json.loads(file["tree"].tobytes().decode())

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
-from flexctrl.errors import ControllerError, StructureError, did_you_mean, shortened
-from flexctrl.structure.freedoms import numbers
+from flexctrl.errors import ControllerError, StructureError, check_kind, did_you_mean, shortened
+from flexctrl.structure.freedoms import check_finite, check_seconds, check_whole, numbers
 
 if TYPE_CHECKING:
     import control
@@ -70,9 +70,12 @@ def sampled_response(
     """
     import control
 
+    check_kind(plant, control.InputOutputSystem, "sampled_response: plant", "a control system, as linear.to_ss() gives")
     law = as_controller(controller, plant.input_labels, plant.output_labels)
     _check(law, until, points)
     base = _base(plant, inputs or {})
+    for name, share in (("rtol", rtol), ("atol", atol)):
+        check_finite(share, name, "sampled_response", above=0.0)
     x = np.zeros(plant.nstates) if initial_state is None else _checked_state(initial_state, plant.nstates)
     solver = {"method": method or _fitting(plant, x, base, law.sample_time), "rtol": rtol, "atol": atol}
     *stretches, last = _stretches(plant, law, x, base, until, points, solver)
@@ -156,14 +159,15 @@ def _check(law: Controller, until: float, points: int) -> None:
             "sampled_response: the controller is continuous; connect it with control.interconnect, or sample it: "
             "Sampled(controller, 0.01)"
         )
-    if not (math.isfinite(until) and until > 0.0 and points > 0):
-        raise StructureError(f"sampled_response: until = {until}, points = {points}; expected seconds > 0, points > 0")
+    check_seconds(until, "until", "sampled_response")
+    check_whole(points, "points", "sampled_response", least=1)
 
 
 def _base(plant: control.InputOutputSystem, inputs: Mapping[str, float]) -> np.ndarray:
+    check_kind(inputs, Mapping, "sampled_response: inputs", "a mapping of names to values")
     base = np.zeros(plant.ninputs)
     for name, value in inputs.items():
         if name not in plant.input_labels:
             raise StructureError(f"the plant has no input {name!r}{did_you_mean(name, plant.input_labels)}")
-        base[plant.input_labels.index(name)] = value
+        base[plant.input_labels.index(name)] = check_finite(value, f"input {name!r}", "sampled_response")
     return base

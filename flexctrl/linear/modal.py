@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import NoneType
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from flexctrl.errors import LinearizationError
+from flexctrl.errors import LinearizationError, check_kind
 from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled, static_response
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
@@ -96,6 +97,7 @@ def modal_system(linear: LinearModel, modes: Modes | None = None) -> ModalSystem
             f"a complete modal form of {len(linear.coordinates)} freedoms is too much; give modes(count) or "
             "reduce the model first"
         )
+    check_kind(modes, (Modes, NoneType), "modes", "Modes, as linear.modes(count) gives")
     if linear._scaled.massless.pushed.shape[1] and modes is not None:
         raise LinearizationError(
             "some massless freedoms follow velocities of others, which the modes do not know: take the modes of "

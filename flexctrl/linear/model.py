@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from flexctrl.errors import LinearizationError, StructureError, did_you_mean
 from flexctrl.linear.parts import PartMatrices, projected_parts
 from flexctrl.linear.place import Place
+from flexctrl.structure.freedoms import listed
 
 if TYPE_CHECKING:
     import control
@@ -363,7 +364,7 @@ def _check_matrix(name: str, value: np.ndarray | sp.spmatrix, shape: tuple[int, 
 def _indices(wanted: Sequence[str], known: tuple[str, ...], kind: str) -> list[int]:
     if isinstance(wanted, str):
         raise StructureError(f"{kind}s = {wanted!r}; expected a list, [{wanted!r}]")
-    for name in wanted:
+    for name in (wanted := listed(wanted, f"{kind}s")):
         if name not in known:
             raise StructureError(f"{kind} {name!r} is not a signal of this model{did_you_mean(name, known)}")
     return [known.index(name) for name in wanted]

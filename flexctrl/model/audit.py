@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from types import NoneType
+
 import numpy as np
 
+from flexctrl.errors import check_kind
 from flexctrl.linear.condense import Audit, Freedom
 from flexctrl.linear.condense import audit as audit_linear
 from flexctrl.linear.model import LinearModel
@@ -33,6 +36,8 @@ def audit(model: Model, at: Rest | State | None = None) -> Audit:
         Names of the freedoms by label; ``mechanisms`` lists what moves in each motion that has neither mass
         nor stiffness. Never raises for one; `linearize` and `simulate` do.
     """
+    check_kind(model, Model, "audit: model", "a Model, as flexctrl.assemble(structure, effects) gives")
+    check_kind(at, (Rest, State, NoneType), "audit: at", "a Rest or a State")
     state = (model.rest if at is None else at.state if isinstance(at, Rest) else at).loose
     u, n = at.inputs if isinstance(at, Rest) else np.zeros(len(model.inputs)), model.n
     M, C, K = tangents(model, state, u)

@@ -31,7 +31,7 @@ from flexctrl.model.signals import Signals, signals_of
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
-from flexctrl.structure.freedoms import check_finite
+from flexctrl.structure.freedoms import check_finite, numbers
 from flexctrl.structure.lines import Spring
 from flexctrl.structure.structure import Structure
 
@@ -418,8 +418,8 @@ class Model:
         if isinstance(q, Mapping):
             for name, value in q.items():
                 step[self.coordinate(name)] = check_finite(value, f"coordinate {name!r}", "model")
-        elif np.shape(q) == step.shape and np.isfinite(q).all():
-            step[:] = q
+        elif len(values := numbers(q)) == self.n and np.isfinite(values).all():
+            step[:] = values
         else:
             raise StructureError(f"displace: expected {self.n} finite numbers, one a coordinate, got {q!r}")
         state = self.advance(self.rest, step, np.zeros(self.n), 0.0)

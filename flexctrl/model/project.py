@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, check_kind
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.consistent import extent
 from flexctrl.model.state import State
@@ -140,6 +140,9 @@ def project(
     >>> float(round(abs(found.moved[0][2]), 3))
     0.001
     """
+    from flexctrl.model.model import Model  # which makes projections
+
+    check_kind(model, Model, "project: model", "a Model, as flexctrl.assemble(structure, effects) gives")
     asked = _asked(model, wish)
     state = _nearest(asked, _first(model, wish))
     state, wanted = _moving(model, state, wish, velocities or {})

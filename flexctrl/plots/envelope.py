@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flexctrl.errors import StructureError
-from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
+from flexctrl.plots.style import FLEXIBLE, INK, RIGID, axes_of, new_figure, tidy
 from flexctrl.study.envelope import Envelope
 
 __all__ = ["compared_curves", "envelope_figure", "plot_envelope"]
@@ -56,7 +56,7 @@ def plot_envelope(envelope: Envelope, ax: Axes | None = None) -> Axes:
         raise StructureError(
             f"plot_envelope: {envelope!r} is no envelope; give one from validity_envelope, each with its own ax"
         )
-    ax = new_figure(6.0, 4.0).subplots() if ax is None else ax
+    ax = axes_of(ax, 6.0, 4.0)
     finite = [tried for tried in envelope.trials if np.isfinite(tried.error) and tried.error > 0.0]
     ax.loglog([x.amplitude for x in finite], [100.0 * x.error for x in finite], "o-", color=FLEXIBLE, markersize=3)
     ax.axhline(100.0 * envelope.error, color=RIGID, linewidth=1.0)

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.response import FrequencyResponse
 from flexctrl.plots.modes import modes_picture
-from flexctrl.plots.style import CYCLE, INK, by_label, new_figure, tidy
+from flexctrl.plots.style import CYCLE, INK, by_label, new_figure, tidy, two_axes
 
 if TYPE_CHECKING:
     import control
@@ -50,8 +50,8 @@ def plot_bode(
     -------
     numpy.ndarray of matplotlib.axes.Axes, shape (2,)
     """
-    gain, phase = new_figure(7.5, 5.6).subplots(2, 1, sharex=True) if axes is None else axes
     shown = by_label(responses, "response")
+    gain, phase = new_figure(7.5, 5.6).subplots(2, 1, sharex=True) if axes is None else two_axes(axes)
     for number, (label, response) in enumerate(shown.items()):
         values = channel_values(response, channel)
         hertz, style = np.asarray(response.omega) / HZ, line_style(number)
@@ -152,12 +152,15 @@ def channel_values(response: Any, channel: tuple[str, str] | None) -> np.ndarray
     if isinstance(response, FrequencyResponse):
         values, outputs, inputs = response.values, response.outputs, response.inputs
     else:
+        if not hasattr(response, "frdata"):
+            raise StructureError(f"a response = {shortened(response)}; expected what linear.frequency_response() gives")
         values, outputs, inputs = response.frdata, tuple(response.output_labels), tuple(response.input_labels)
     if channel is None and values.shape[:2] == (1, 1):
         return np.asarray(values[0, 0])
-    if channel is None or channel[0] not in outputs or channel[1] not in inputs:
+    pair = channel if isinstance(channel, tuple | list) and len(channel) == 2 else ("", "")
+    if pair[0] not in outputs or pair[1] not in inputs:
         raise StructureError(f"channel = {channel}: give (output, input) out of {outputs} and {inputs}")
-    return np.asarray(values[outputs.index(channel[0]), inputs.index(channel[1])])
+    return np.asarray(values[outputs.index(pair[0]), inputs.index(pair[1])])
 
 
 def degrees(values: np.ndarray) -> np.ndarray:

@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
 
+from flexctrl.errors import StructureError, shortened
 from flexctrl.plots.frequency import HZ, degrees, line_style, plot_bode
-from flexctrl.plots.style import INK, PALE, by_label, new_figure, tidy
+from flexctrl.plots.style import INK, PALE, axes_of, by_label, new_figure, tidy
+from flexctrl.structure.freedoms import check_finite, numbers
 from flexctrl.study.frequency import Margins, loop_grid
 from flexctrl.study.frequency import margins as margins_of
 from flexctrl.study.loop import Loop
@@ -82,7 +84,8 @@ def plot_nyquist(
     -------
     matplotlib.axes.Axes
     """
-    ax = new_figure(6.0, 5.6).subplots() if ax is None else ax
+    ax = axes_of(ax, 6.0, 5.6)
+    check_finite(radius, "radius", "plot_nyquist", above=0.0)
     ax.add_patch(Circle((0, 0), 1.0, fill=False, color=PALE, linewidth=1.0))
     if margins is not None:
         ax.add_patch(Circle((-1, 0), margins.modulus.value, fill=False, color=INK, linewidth=0.9, linestyle="--"))
@@ -116,7 +119,9 @@ def plot_nichols(
     -------
     matplotlib.axes.Axes
     """
-    ax = new_figure(6.4, 5.6).subplots() if ax is None else ax
+    ax = axes_of(ax, 6.4, 5.6)
+    if not (len(limits := numbers(gain)) == 2 and limits[0] < limits[1]):
+        raise StructureError(f"plot_nichols: gain = {shortened(gain)}; expected (lowest, highest) in dB")
     seen = [np.array([-180.0])]
     shown = by_label(loops, "loop", Loop)
     for number, (label, loop) in enumerate(shown.items()):
@@ -168,7 +173,7 @@ def plot_sensitivities(
     -------
     matplotlib.axes.Axes
     """
-    ax = new_figure(6.4, 4.0).subplots() if ax is None else ax
+    ax = axes_of(ax, 6.4, 4.0)
     shown = by_label(loops, "loop", Loop)
     for number, (label, loop) in enumerate(shown.items()):
         omega, L = loop_grid(loop)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from flexctrl.linear.reduction import Reduced
 from flexctrl.plots.frequency import HZ, channel_values, line_style
-from flexctrl.plots.style import CYCLE, INK, by_label, new_figure, tidy
+from flexctrl.plots.style import CYCLE, INK, axes_of, by_label, new_figure, tidy
 
 __all__ = ["plot_reduction", "reduction_figure"]
 
@@ -38,7 +38,7 @@ def plot_reduction(
     """
     several: Mapping[str, Reduced] = {"difference": reduced} if isinstance(reduced, Reduced) else {}
     several = several or by_label(reduced, "reduction", Reduced)
-    ax = new_figure(7.5, 4.5).subplots() if ax is None else ax
+    ax = axes_of(ax, 7.5, 4.5)
     full = next(iter(several.values())).full
     response = full.frequency_response()
     exact, hertz = channel_values(response, channel), response.omega / HZ

@@ -8,7 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.plots.style import CYCLE, INK, by_label, new_figure, tidy
+from flexctrl.errors import check_kind
+from flexctrl.plots.style import CYCLE, INK, axes_of, by_label, new_figure, tidy
+from flexctrl.structure.freedoms import check_finite, listed
 from flexctrl.study.root_locus import CriticalGain, RootLocus
 from flexctrl.study.zeros import Zeros
 
@@ -45,7 +47,11 @@ def plot_root_locus(
     -------
     matplotlib.axes.Axes
     """
-    ax = new_figure(7.0, 5.6).subplots() if ax is None else ax
+    ax = axes_of(ax, 7.0, 5.6)
+    for crossing in listed(critical, "plot_root_locus: critical"):
+        check_kind(crossing, CriticalGain, "plot_root_locus: critical", "what critical_gains(loop) gives")
+    if top is not None:
+        check_finite(top, "top", "plot_root_locus", above=0.0)
     several = by_label(loci, "locus", RootLocus)
     shown = {label: locus.in_s() for label, locus in several.items()}
     for number, (label, locus) in enumerate(shown.items()):

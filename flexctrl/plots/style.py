@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from types import NoneType
 from typing import TypeVar
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, check_kind, shortened
 
 T = TypeVar("T")
 
@@ -53,6 +55,50 @@ def by_label(given: Mapping[str, T] | T, kind: str, of: type | tuple[type, ...] 
             f"nothing to draw by label in {given!r}; expected one {kind}, or a mapping of label to {kind}"
         )
     return {getattr(given, "name", "") or kind: given}
+
+
+def axes_of(ax: Axes | None, width: float, height: float) -> Axes:
+    """Return axes to draw into: those given, or of a new figure.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes or None
+    width, height : float
+        Of the new figure, inches.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    StructureError
+        For what is no axes.
+    """
+    check_kind(ax, (Axes, NoneType), "plot: ax", "axes, as pyplot.subplots()[1]")
+    return new_figure(width, height).subplots() if ax is None else ax
+
+
+def two_axes(axes: Sequence[Axes]) -> tuple[Axes, Axes]:
+    """Return the two axes of a Bode plot.
+
+    Parameters
+    ----------
+    axes : sequence of matplotlib.axes.Axes
+
+    Returns
+    -------
+    tuple of matplotlib.axes.Axes
+
+    Raises
+    ------
+    StructureError
+        For what is no pair of axes.
+    """
+    given = list(axes) if isinstance(axes, Sequence | np.ndarray) else []
+    if len(given) != 2 or not all(isinstance(ax, Axes) for ax in given):
+        raise StructureError(f"plot: axes = {shortened(axes)}; expected two axes, as pyplot.subplots(2)[1]")
+    return given[0], given[1]
 
 
 def new_figure(width: float, height: float) -> Figure:

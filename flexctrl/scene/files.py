@@ -11,7 +11,7 @@ from typing import Any
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.errors import FlexctrlError, SceneError
+from flexctrl.errors import FlexctrlError, SceneError, check_kind
 from flexctrl.scene import laws, parts, physics
 from flexctrl.scene.reading import Kind, Place, checked, flag, keys, mapping, number, one_of, positive, several, text
 from flexctrl.scene.scene import Channel, Scene, Simulation, Start
@@ -36,6 +36,7 @@ def load_scene(path: str | Path) -> Scene:
     SceneError
         Naming the file, the table and the key, and what was expected there.
     """
+    check_kind(path, (str, Path), "load_scene: path", "the name of a .toml or .py file", SceneError)
     file = Path(path)
     if not file.is_file():
         raise SceneError(f"{file}: there is no such file")

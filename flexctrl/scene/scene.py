@@ -20,7 +20,7 @@ from flexctrl.effects.flexibility import Flexible
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.errors import SceneError, StructureError, did_you_mean, shortened
+from flexctrl.errors import SceneError, StructureError, check_kind, did_you_mean, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
@@ -28,7 +28,7 @@ from flexctrl.model.holding import held_at
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import check_seconds
+from flexctrl.structure.freedoms import check_seconds, listed
 from flexctrl.structure.structure import Structure
 from flexctrl.study.bookkeeping import ledger
 
@@ -152,7 +152,8 @@ class Scene:
             raise SceneError(f"Scene: structure = {shortened(self.structure)}; expected a Structure")
         if not isinstance(self.simulation, Simulation | None):
             raise SceneError(f"Scene: simulation = {shortened(self.simulation)}; expected a Simulation(until=…)")
-        object.__setattr__(self, "effects", tuple(self.effects))
+        object.__setattr__(self, "effects", tuple(listed(self.effects, "Scene: effects")))
+        check_kind(self.loads, Mapping, "Scene: loads", "a mapping of inputs to values", SceneError)
         object.__setattr__(self, "name", self.name or self.structure.name)
         if sum(isinstance(e, Automatic) for e in self.effects) > 1:
             raise SceneError(f"{self.name}: Automatic stands twice among the effects; give it once, with one tolerance")

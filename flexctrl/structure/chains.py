@@ -10,7 +10,7 @@ import numpy as np
 
 from flexctrl.errors import StructureError
 from flexctrl.structure.beams import Beam
-from flexctrl.structure.freedoms import check_finite, check_whole, parse_direction, parse_point
+from flexctrl.structure.freedoms import check_finite, check_whole, listed, parse_direction, parse_point
 from flexctrl.structure.joints import Weld
 from flexctrl.structure.nodes import Node
 from flexctrl.structure.sections import Section
@@ -58,12 +58,12 @@ class BeamChain:
         up: str | Sequence[float] | Sequence[Sequence[float] | str] | None = None,
     ) -> None:
         owner = f"BeamChain {name!r}"
-        places = [parse_point(point, owner) for point in points]
+        places = [parse_point(point, owner) for point in listed(points, f"{owner}: points")]
         count = len(places) - 1
         if count < 1:
             raise StructureError(f"{owner}: {len(places)} points; give two at least")
-        sections = [section] * count if isinstance(section, Section) else list(section)
-        ups = [up] * count if up is None or _single(up) else list(up)
+        sections = [section] * count if isinstance(section, Section) else listed(section, f"{owner}: section")
+        ups = [up] * count if up is None or _single(up) else listed(up, f"{owner}: up")
         for what, given in (("sections", sections), ("directions up", ups)):
             if len(given) != count:
                 raise StructureError(f"{owner}: {len(given)} {what} for {count} beams; give one, or one for each")

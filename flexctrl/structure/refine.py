@@ -7,8 +7,9 @@ from dataclasses import fields, is_dataclass
 from math import gcd
 from typing import Any, TypeVar
 
-from flexctrl.errors import StructureError, did_you_mean, shortened
+from flexctrl.errors import StructureError, check_kind, did_you_mean
 from flexctrl.structure.beams import Beam
+from flexctrl.structure.freedoms import check_whole, listed
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.lines import Rope
 from flexctrl.structure.nodes import Node
@@ -37,10 +38,8 @@ def refine(structure: Structure, factor: int) -> Structure:
     StructureError
         For a factor that is no whole number ≥ 1, or a structure tied by a table of numbers.
     """
-    if not isinstance(structure, Structure):
-        raise StructureError(f"refine: {shortened(structure)} is no Structure")
-    if factor != int(factor) or factor < 1:
-        raise StructureError(f"refine: factor = {factor!r}; expected a whole number ≥ 1")
+    check_kind(structure, Structure, "refine: structure", "a Structure")
+    check_whole(factor, "factor", "refine", least=1)
     _check_joints(structure, "refine")
     meshed = _meshed(structure, {b.name: factor * b.elements for b in _beams(structure)})
     return meshed.with_(elements=[_finer(e, factor) if isinstance(e, Rope) else e for e in meshed.elements])
@@ -67,8 +66,9 @@ def coarsen(structure: Structure, of: Sequence[str] = ()) -> Structure:
     StructureError
         For a name that is no beam of the structure, or a structure tied by a table of numbers.
     """
+    check_kind(structure, Structure, "coarsen: structure", "a Structure")
     beams = {b.name: b for b in _beams(structure)}
-    for name in of:
+    for name in listed(of, "coarsen: of"):
         if name not in beams:
             raise StructureError(
                 f"coarsen: structure {structure.name!r} has no beam {name!r}{did_you_mean(name, list(beams))}"

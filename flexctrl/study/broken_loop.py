@@ -12,7 +12,7 @@ from flexctrl.design.controller import Controller, LinearController, as_controll
 from flexctrl.design.hardware import Delayed
 from flexctrl.design.tracking import Commanded, OpenLoop, Together
 from flexctrl.design.wrapping import Wrapper
-from flexctrl.errors import ControllerError, StructureError, did_you_mean
+from flexctrl.errors import ControllerError, StructureError, check_kind, did_you_mean
 from flexctrl.linear.model import LinearModel
 from flexctrl.study.loop import Loop, open_loop
 
@@ -121,6 +121,7 @@ def broken_loop(plant: LinearModel, controller: Any, input: str) -> Loop:
     ControllerError
         If the controller is not linear.
     """
+    check_kind(plant, LinearModel, "broken_loop: plant", "a LinearModel, as linearize(model) gives")
     law = linear_law(controller)
     if input not in law.outputs:
         raise StructureError(f"the controller does not command {input!r}{did_you_mean(input, law.outputs)}")

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.alpha import Integrator
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, check_kind
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
+from flexctrl.structure.freedoms import numbers
 from flexctrl.study.amplitudes import (
     Amplitude,
     Case,
@@ -174,7 +175,9 @@ def validity_envelope(
     StructureError
         For an unknown name, an error that is not positive, or a quantity the linear model does not have.
     """
-    if not 0.0 < error < 10.0:
+    check_kind(vary, Amplitude, "validity_envelope: vary", "what is varied, as InitialSpeed('swing')")
+    check_kind(quantity, Quantity, "validity_envelope: quantity", "what is told, as Period('swing')")
+    if not 0.0 < numbers([error])[0] < 10.0:
         raise StructureError(f"validity_envelope: error = {error}; expected e.g. 0.01 for one per cent")
     case = _case(model, at)
     unit = vary.unit(case)

@@ -191,6 +191,7 @@ def critical_gains(loop: Loop, locus: RootLocus | None = None) -> tuple[Critical
     """
     if locus is not None and not isinstance(locus, RootLocus):
         raise StructureError(f"critical_gains: locus = {locus!r}; expected what root_locus(loop) returns, or nothing")
+    check_loop(loop, "critical_gains")
     locus = root_locus(loop) if locus is None else locus
     found = _on_branches(loop, locus) + _on_response(loop, float(locus.gains[-1]))
     apart: list[CriticalGain] = []

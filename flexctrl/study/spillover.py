@@ -16,6 +16,7 @@ from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
+from flexctrl.structure.freedoms import numbers
 from flexctrl.study.broken_loop import linear_law
 from flexctrl.study.critical_mode import CriticalMode, critical_mode
 from flexctrl.study.gain_family import Crossing, GainFamily, first_crossing, gain_family
@@ -195,7 +196,7 @@ def spillover(
     ControllerError
         If the controller is not linear.
     """
-    if not 0.0 < least < 1.0 < most:
+    if not 0.0 < numbers([least])[0] < 1.0 < numbers([most])[0]:
         raise StructureError(f"spillover: gains from {least} to {most}; expected 0 < least < 1 < most")
     law = linear_law(controller)
     if isinstance(plant, LinearModel):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
-from flexctrl.errors import LinearizationError, StructureError, shortened
+from flexctrl.errors import LinearizationError, StructureError, check_kind, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import unsymmetric
 from flexctrl.study.channel import Quadruple, channel_states
@@ -247,6 +247,7 @@ def sensor_choices(linear: LinearModel, below: float = np.inf) -> tuple[SensorCh
     """
     if not isinstance(below, int | float | np.number) or not below > 0.0:
         raise StructureError(f"sensor_choices: below = {below!r}; expected a positive angular frequency in rad/s")
+    check_kind(linear, LinearModel, "sensor_choices: linear", "a LinearModel, as linearize(model) gives")
     condensed = linear.condense()
     omega, right, left = _two_sided(condensed) if unsymmetric(condensed) else _one_sided(condensed)
     seen = omega <= below

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import NoneType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.errors import StructureError, did_you_mean, shortened
+from flexctrl.errors import StructureError, check_kind, did_you_mean, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
@@ -195,6 +196,7 @@ def equilibrium_path(
     """
     if not isinstance(model, Model):
         raise StructureError(f"equilibrium_path: {shortened(model)} is no Model; give what flexctrl.assemble returns")
+    check_kind(hold, (Mapping, NoneType), "equilibrium_path: hold", "a mapping of freedoms to values")
     pushed = model.input_vector(load)
     if not pushed.any():
         raise StructureError("equilibrium_path: the load is nothing; name an input, e.g. load={'push': 1.0}")
