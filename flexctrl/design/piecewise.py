@@ -312,8 +312,8 @@ def distinct(instants: Iterable[float]) -> tuple[float, ...]:
 def reals(values: object, what: str) -> tuple[float, ...]:
     """Return a list of numbers as floats; raise a `ControllerError` for what is none."""
     found = numbers(values)
-    if not found or any(map(math.isnan, found)):
-        raise ControllerError(f"{what} = {shortened(values)}; expected a list of finite numbers")
+    if any(map(math.isnan, found)) or not isinstance(values, Sequence | np.ndarray):
+        raise ControllerError(f"{what} = {shortened(values)}: not a finite number each; expected a list of them")
     return found
 
 

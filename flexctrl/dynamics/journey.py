@@ -15,6 +15,7 @@ from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Curve, Track
 from flexctrl.dynamics.ending import ends_before
 from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
+from flexctrl.dynamics.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.impact import LASTING, lasts
 from flexctrl.dynamics.interrupt import Interruption
@@ -193,6 +194,8 @@ class Journey:
     def _remedy(self) -> str:
         """What to do where steps of this length make energy."""
         pace, method = self.plan.method.pace, self.plan.method
+        if isinstance(method, ExplicitRungeKutta):
+            return "stiff parts are for implicit methods: take AdaptiveAlpha, or GeneralizedAlpha(step)"
         if not isinstance(pace, Fixed):
             return "give a smaller Tolerance"
         smaller = f"take steps smaller than {pace.step:g} s, or AdaptiveAlpha, which finds them"

@@ -169,13 +169,6 @@ class Scene:
                 if name not in known:
                     raise SceneError(f"{self.name}: {what}: the machine has no {name!r}{did_you_mean(name, known)}")
 
-    @classmethod
-    def from_toml(cls, path: str) -> Scene:
-        """Read a scene file; see `load_scene`."""
-        from flexctrl.scene.files import load_scene
-
-        return load_scene(path)
-
     def with_(
         self,
         *,

@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass
 from math import gcd
 from typing import Any, TypeVar
 
-from flexctrl.errors import StructureError, check_kind, did_you_mean
+from flexctrl.errors import StructureError, check_kind, did_you_mean, shortened
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.freedoms import check_whole, listed
 from flexctrl.structure.join_table import JoinTable
@@ -38,7 +38,8 @@ def refine(structure: Structure, factor: int) -> Structure:
     StructureError
         For a factor that is no whole number ≥ 1, or a structure tied by a table of numbers.
     """
-    check_kind(structure, Structure, "refine: structure", "a Structure")
+    if not isinstance(structure, Structure):
+        raise StructureError(f"refine: {shortened(structure)} is no Structure")
     check_whole(factor, "factor", "refine", least=1)
     _check_joints(structure, "refine")
     meshed = _meshed(structure, {b.name: factor * b.elements for b in _beams(structure)})
