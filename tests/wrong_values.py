@@ -122,6 +122,7 @@ STRUCTURE: dict[str, Call] = {
 EFFECT: dict[str, Call] = {
     "Automatic": (fc.Automatic, {"tolerance": 0.01}),
     "Within": (fc.Within, {"outputs": 0.1, "poles": 0.1, "margins": 0.1}),
+    "GeometricStiffness": (fc.GeometricStiffness, {"hold": {"motor_source": 0.0}, "inputs": {"push": 0.0}}),
     "Gravity": (fc.Gravity, {"g": (0, 0, -9.81)}),
     "ComponentModes": (fc.ComponentModes, {"count": 2, "of": ("bar",)}),
     "BeamFlexibility": (fc.BeamFlexibility, {"of": ("bar",)}),
