@@ -162,6 +162,14 @@ def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     return ca.vertcat(*[m.frame @ block for block in blocks])
 
 
+def whole_force(m: BeamMotion, force: BeamForce) -> ca.SX:
+    """Return a force on the nodes of an element, in space axes, and then on its own modes."""
+    import casadi as ca
+
+    nodal = nodal_force(m, force)
+    return ca.vertcat(nodal, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else nodal
+
+
 def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal: tuple[ca.SX, ...] = ()) -> BeamMotion:
     """Return the motion of an element from that of its nodes.
 

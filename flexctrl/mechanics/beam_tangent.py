@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, beam_motion, framed_motion, nodal_force
+from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, beam_motion, framed_motion, whole_force
 from flexctrl.mechanics.rotation import inverse_tangent
 
 if TYPE_CHECKING:
@@ -30,32 +30,36 @@ class _Seen:
     theta: tuple[ca.SX, ...]
     rates: tuple[ca.SX, ...]
     accelerations: tuple[ca.SX, ...]
+    modal: tuple[ca.SX, ...]
 
     @classmethod
-    def symbols(cls) -> _Seen:
+    def symbols(cls, modes: int) -> _Seen:
         import casadi as ca
 
         def some(name: str, count: int) -> tuple[ca.SX, ...]:
             return tuple(ca.SX.sym(f"{name}{i}", 3) for i in range(count))
 
         frame, middle, chord = ca.SX.sym("frame", 3, 3), ca.SX.sym("middle", 3), ca.SX.sym("chord")
-        return cls(frame, middle, chord, some("side", 2), some("theta", 2), some("rate", 4), some("acceleration", 4))
+        modal = tuple(ca.SX.sym(f"modal{i}", modes) for i in range(3)) if modes else ()
+        around = (some("side", 2), some("theta", 2), some("rate", 4), some("acceleration", 4))
+        return cls(frame, middle, chord, *around, modal)
 
     @classmethod
     def of(cls, m: BeamMotion, first: NodeMotion, second: NodeMotion, rest: ca.SX) -> _Seen:
         sides = tuple(m.frame.T @ (node.R @ rest[:, 1]) for node in (first, second))
-        return cls(m.frame, m.middle, m.chord, sides, m.theta, m.rates, m.accelerations)
+        return cls(m.frame, m.middle, m.chord, sides, m.theta, m.rates, m.accelerations, m.modal)
 
     @property
     def all(self) -> ca.SX:
         """All but the frame."""
         import casadi as ca
 
-        return ca.vertcat(self.middle, self.chord, *self.sides, *self.theta, *self.rates, *self.accelerations)
+        nodal = (self.middle, self.chord, *self.sides, *self.theta, *self.rates, *self.accelerations)
+        return ca.vertcat(*nodal, *self.modal)
 
     def motion(self, p: dict[str, ca.SX], rates: tuple[ca.SX, ...] | None = None) -> BeamMotion:
         seen = (self.middle, self.chord, self.sides, self.theta, rates or self.rates, self.accelerations)
-        return framed_motion(p, self.frame, *seen)
+        return framed_motion(p, self.frame, *seen, self.modal)
 
 
 def beam_slope(
@@ -64,8 +68,9 @@ def beam_slope(
     parameters: ca.SX,
     seeds: ca.SX,
     force: Callable[[BeamMotion], BeamForce],
+    modal: tuple[ca.SX, ...] = (),
 ) -> ca.SX:
-    """Return ∂(nodal force)/∂(increment of both nodes), 12 × 12, in space axes.
+    """Return ∂force/∂(increment of both nodes and of the element's own modes), 12 × 12 and more, in space axes.
 
     Parameters
     ----------
@@ -76,28 +81,31 @@ def beam_slope(
         What an increment adds to place, rates and accelerations.
     force : callable
         The force on the element of its motion.
+    modal : tuple of casadi.SX
+        Amplitudes, rates and accelerations of the modes; empty: it has none.
 
     Returns
     -------
     casadi.SX
+        Nodes first, modes last.
     """
     import casadi as ca
 
-    m = beam_motion(first, second, parameters)
-    seen = _Seen.symbols()
+    m, modes = beam_motion(first, second, parameters, modal), sum(eta.numel() for eta in modal[:1])
+    seen = _Seen.symbols(modes)
     local = seen.motion(m.p)
-    push = ca.cse(nodal_force(replace(local, frame=ca.SX.eye(3)), force(local)))
+    push = ca.cse(whole_force(replace(local, frame=ca.SX.eye(3)), force(local)))
     on_seen, on_frame = ca.jacobian(push, seen.all), ca.jacobian(push, ca.vec(seen.frame))
-    increment, turn = ca.SX.sym("increment", 12), ca.SX.sym("turn", 3)
+    increment, turn = ca.SX.sym("increment", 12 + modes), ca.SX.sym("turn", 3)
     change = _change(seen, increment, turn, seeds)
-    carried = ca.vertcat(*[ca.cross(turn, push[3 * i : 3 * i + 3]) for i in range(4)])
+    carried = ca.vertcat(*[ca.cross(turn, push[3 * i : 3 * i + 3]) for i in range(4)], ca.SX(modes, 1))
     turned = on_frame @ ca.jacobian(ca.vec(seen.frame @ ca.skew(turn)), turn) + ca.jacobian(carried, turn)
     on_turn = on_seen @ ca.jacobian(change, turn) + seeds[0] * turned
-    spin = seen.motion(m.p, tuple(ca.vertsplit(increment, 3))).spin
+    spin = seen.motion(m.p, tuple(ca.vertsplit(increment[:12], 3))).spin
     slope = on_seen @ ca.jacobian(change, increment) + on_turn @ ca.jacobian(spin, increment)
     now = _Seen.of(m, first, second, ca.reshape(parameters[:9], 3, 3).T)
     slope = ca.substitute(slope, ca.vertcat(seen.all, ca.vec(seen.frame)), ca.vertcat(now.all, ca.vec(now.frame)))
-    out_of_frame = ca.diagcat(*[m.frame] * 4)
+    out_of_frame = ca.diagcat(*[m.frame] * 4, ca.SX.eye(modes))
     return out_of_frame @ slope @ out_of_frame.T
 
 
@@ -105,7 +113,7 @@ def _change(seen: _Seen, increment: ca.SX, turn: ca.SX, seeds: ca.SX) -> ca.SX:
     """Return how what is seen changes with an increment of the nodes (in the frame) and a turn of the frame."""
     import casadi as ca
 
-    u = ca.vertsplit(increment, 3)
+    u = ca.vertsplit(increment[:12], 3)
     twists = [u[1] - turn, u[3] - turn]
     sides = [ca.cross(twist, side) for twist, side in zip(twists, seen.sides, strict=True)]
     # the rate of a rotation vector is T⁻¹ times the spin; T⁻¹(θ) = T⁻ᵀ(−θ)
@@ -113,4 +121,5 @@ def _change(seen: _Seen, increment: ca.SX, turn: ca.SX, seeds: ca.SX) -> ca.SX:
     place = ca.vertcat(0.5 * seen.frame @ (u[0] + u[2]), (u[2] - u[0])[0], *sides, *theta)
     rates = [seeds[1] * d - seeds[0] * ca.cross(turn, v) for d, v in zip(u, seen.rates, strict=True)]
     accelerations = [seeds[2] * d - seeds[0] * ca.cross(turn, a) for d, a in zip(u, seen.accelerations, strict=True)]
-    return ca.vertcat(seeds[0] * place, *rates, *accelerations)
+    modal = [seeds[k] * increment[12:] for k in range(len(seen.modal))]
+    return ca.vertcat(seeds[0] * place, *rates, *accelerations, *modal)

@@ -20,7 +20,7 @@ from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.mechanics import beam, pieces
 from flexctrl.mechanics.beam_tangent import beam_slope
 from flexctrl.model.laws import part_kinds
-from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kind, moved, symbols_of
+from flexctrl.model.laws.kinds import NODE_SLOT, Kind, moved, symbols_of
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -63,24 +63,12 @@ def _beam_geometric(
 ) -> tuple[ca.SX, ca.SX]:
     import casadi as ca
 
-    if kind.drives:
-        return _modal_geometric(kind, symbols, parameters, stress)
     first, second = _still(kind, symbols, ca.SX(kind.width, 1))
-    slope = beam_slope(first, second, parameters, ca.SX([1, 0, 0]), lambda m: beam.stress_force(m, stress))
-    m = beam.beam_motion(first, second, parameters)
-    return slope, beam.nodal_force(m, beam.stress_force(m, stress))
-
-
-def _modal_geometric(kind: Kind, symbols: ca.SX, parameters: ca.SX, stress: ca.SX) -> tuple[ca.SX, ca.SX]:
-    import casadi as ca
-
-    increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
-    amplitudes = symbols[NODE_SLOT * kind.nodes :: DRIVE_SLOT] + increment[-kind.drives :]
-    still = ca.SX.zeros(kind.drives)
-    first, second = _still(kind, symbols, increment)
-    m = beam.beam_motion(first, second, parameters, (amplitudes, still, still))
-    force = part_kinds.whole_force(m, beam.stress_force(m, stress))
-    return ca.substitute(ca.jacobian(force, increment), increment, zero), ca.substitute(force, increment, zero)
+    modes = part_kinds.modes_in(symbols[NODE_SLOT * kind.nodes :])
+    modal = (modes[0], *[ca.SX.zeros(eta.shape) for eta in modes[1:]]) if modes else ()
+    slope = beam_slope(first, second, parameters, ca.SX([1, 0, 0]), lambda m: beam.stress_force(m, stress), modal)
+    m = beam.beam_motion(first, second, parameters, modal)
+    return slope, beam.whole_force(m, beam.stress_force(m, stress))
 
 
 def _line_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parameters: ca.SX) -> ca.SX:

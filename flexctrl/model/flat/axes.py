@@ -94,7 +94,7 @@ def _three(cells: np.ndarray, of: np.ndarray, position: np.ndarray) -> np.ndarra
 def _pairs(model: Model, pattern: tuple[np.ndarray, np.ndarray], of: np.ndarray) -> np.ndarray:
     """Return the axes that meet in some piece; what has no direction in space meets nothing."""
     names, motion = model.coordinates, model.motion
-    scalar = np.array([name.endswith(("_turn", "_slide", "_source")) for name in names])
+    scalar = np.array([name.endswith(("_turn", "_slide", "_source", *motion.scales)) for name in names])
     for i, _ in motion.linkage.lines:
         cells = motion.place[motion.nodes[i], 3:]
         scalar[cells[cells < motion.n]] = True
@@ -105,5 +105,5 @@ def _pairs(model: Model, pattern: tuple[np.ndarray, np.ndarray], of: np.ndarray)
 
 
 def _turning(model: Model) -> np.ndarray:
-    ends = ("_u", "_v", "_w", "_slide", "_source")
+    ends = ("_u", "_v", "_w", "_slide", "_source", *model.motion.scales)
     return np.array([not name.endswith(ends) for name in model.coordinates], dtype=bool)

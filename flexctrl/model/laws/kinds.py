@@ -42,8 +42,8 @@ class Shares:
 Physics = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX"], Shares]
 """(effects, node motions, slots of drives and inner freedoms, parameters) → what acts on the piece."""
 
-Slope = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX"], "ca.SX"]
-"""(effects, node motions, parameters, seeds) → ∂force/∂(raw motion)."""
+Slope = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX", "ca.SX"], "ca.SX"]
+"""(effects, node motions, slots of inner freedoms, parameters, seeds) → ∂force/∂(raw motion)."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,8 @@ class Kernels:
 
         zero = ca.SX(self.kind.width, 1)
         if self.kind.slope is not None and not turning(self.effects):
-            return self.kind.slope(self.effects, moved(self.kind, symbols, zero, seeds), parameters, seeds)
+            nodes, slot = moved(self.kind, symbols, zero, seeds), symbols[NODE_SLOT * self.kind.nodes :]
+            return self.kind.slope(self.effects, nodes, slot, parameters, seeds)
         increment = ca.SX.sym("increment", self.kind.width)
         shares = self._evaluate(symbols, parameters, increment, seeds)
         slope = ca.jacobian(ca.cse(shares.force + shares.inertia), increment)

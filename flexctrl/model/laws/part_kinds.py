@@ -34,8 +34,8 @@ def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
         parked = (seen_outside(effects, standing(first)), seen_outside(effects, standing(second)))
         still = tuple(0.0 * eta if k else eta for k, eta in enumerate(modal))
         carried = beam_inertia.kinetic_energy(beam.beam_motion(*parked, parameters, still))
-    inertia = whole_force(felt, beam_inertia.inertial_force(felt))
-    return Shares(inertia, whole_force(m, force), beam_inertia.kinetic_energy(m), stored - carried)
+    inertia = beam.whole_force(felt, beam_inertia.inertial_force(felt))
+    return Shares(inertia, beam.whole_force(m, force), beam_inertia.kinetic_energy(m), stored - carried)
 
 
 def modes_in(slot: ca.SX) -> tuple[ca.SX, ...]:
@@ -43,19 +43,13 @@ def modes_in(slot: ca.SX) -> tuple[ca.SX, ...]:
     return tuple(slot[k::DRIVE_SLOT] for k in range(3)) if slot.numel() else ()
 
 
-def whole_force(m: beam.BeamMotion, force: beam.BeamForce) -> ca.SX:
-    """Return a force on the nodes of an element and then on its own modes."""
-    import casadi as ca
-
-    nodal = beam.nodal_force(m, force)
-    return ca.vertcat(nodal, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else nodal
-
-
-def _beam_slope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], parameters: ca.SX, seeds: ca.SX) -> ca.SX:
+def _beam_slope(
+    effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX, seeds: ca.SX
+) -> ca.SX:
     def force(m: beam.BeamMotion) -> beam.BeamForce:
         return sum((e.beam(m) for e in effects), beam_inertia.inertial_force(m))
 
-    return beam_slope(nodes[0], nodes[1], parameters, seeds, force)
+    return beam_slope(nodes[0], nodes[1], parameters, seeds, force, modes_in(slot))
 
 
 def _spring(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
@@ -184,7 +178,7 @@ SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(beam.PARAMETERS + beam.SHEARI
 @cache
 def modal_beam(count: int) -> Kind:
     """Return the kind of beam elements with some of their own modes in each plane."""
-    return Kind(f"beam_with_{count}_modes", 2, 6, 2 * count, len(beam.PARAMETERS), _beam)
+    return Kind(f"beam_with_{count}_modes", 2, 6, 2 * count, len(beam.PARAMETERS), _beam, _beam_slope)
 
 
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
