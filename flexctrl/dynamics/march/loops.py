@@ -528,8 +528,8 @@ def run_on(m: March) -> None:
 
 
 def spent(m: March) -> bool:
-    """Tell whether the mass was believed in as long as it may, and making it takes less than looking at it again."""
-    return m.asking == 0 and m.probes.groups == 0 and m.believed >= _TRUSTED
+    """Tell whether the mass was looked at in vain when last it was, and can be made here."""
+    return m.asking == 0 and m.probes.groups == 0 and m.believed > _TRUSTED
 
 
 def small(m: March) -> bool:
@@ -599,7 +599,8 @@ def balanced(m: March) -> bool:
             first = change
         if k == 1:
             m.missed = _DOUBT * change / max(first, _TINY)
-            m.believed = 0
+            in_vain = m.made_for > 0.0 and first * share * m.missed > m.tolerance
+            m.believed = _TRUSTED + 1 if in_vain else 0
         size = change / max(largest_rate(m), _TINY)
         if size <= _EXACT or change * share <= m.tolerance:
             return True
