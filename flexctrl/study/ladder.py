@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 __all__ = ["Ladder", "Rung", "ladder", "rungs"]
 
 _REPEATS = 3
-_FINER = 2
+_FINER = 4
+_COARSER = 4.0
+_NIMBLE = (Fidelity.RIGID, Fidelity.RIGID_WITH_SHAFTS, Fidelity.COMPONENT_MODES)
+"""Rungs that leave out what moves fast."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +119,10 @@ class Ladder:
 def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     """Return the rungs that a scene has, by name, from the least physics to the most.
 
-    Every rung is run as the scene is, but for the linear one, which is integrated exactly, and the refined one: twice
+    Rungs are run as the scene is, but for the linear one, which is integrated exactly, and the refined one: four times
     the elements and half the steps. Where steps are controlled, these follow from an eighth of the tolerance, and none
-    is longer than half a sample of the controller.
+    is longer than half a sample of the controller. Where they are not, rigid parts and component modes, which leave out
+    what moves fast, take one step for four, none longer than a sample.
 
     Parameters
     ----------
@@ -132,8 +136,16 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     found = [(s.fidelity.value, s) for s in sweep(scene, meshes=(1,), methods=[(method, tolerance)])]
     exact = Exact(spacing_of(scene))
     fewest = dict(reversed(found))  # component modes of the lowest order
-    named = [(n, replace(s, method=exact) if s.fidelity is Fidelity.LINEAR else s) for n, s in reversed(fewest.items())]
+    ways = {Fidelity.LINEAR: exact} | dict.fromkeys(_NIMBLE, _coarser(scene, method))
+    named = [(n, replace(s, method=ways.get(s.fidelity, method))) for n, s in reversed(fewest.items())]
     return (*named, ("refined", Setting(Fidelity.FULL, _FINER, *_finer(scene, method, tolerance))))
+
+
+def _coarser(scene: Subject, method: Integrator) -> Integrator:
+    if not isinstance(method, GeneralizedAlpha):
+        return method
+    sample = scene.law.sample_time if scene.law is not None else 0.0
+    return replace(method, step=max(method.step, min(_COARSER * method.step, sample or np.inf)))
 
 
 def _finer(scene: Subject, method: Integrator, tolerance: Tolerance) -> tuple[Integrator, Tolerance]:

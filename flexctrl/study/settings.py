@@ -22,6 +22,7 @@ from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import check_whole
+from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.refine import coarsen, refine
 from flexctrl.structure.structure import Structure
 from flexctrl.study.subject import Subject, planned
@@ -42,8 +43,25 @@ def _shafts(effects: Sequence[Effect]) -> list[Effect]:
     return [e for e in effects if not isinstance(e, Deforming) or isinstance(e, ShaftElasticity)]
 
 
-def _modes(effects: Sequence[Effect], count: int = _MODES) -> list[Effect]:
-    return [ComponentModes(count, e.of) if type(e) is BeamFlexibility else e for e in effects]
+def _modes(effects: Sequence[Effect], structure: Structure, count: int = _MODES) -> list[Effect]:
+    """Modes where they save elements; on every beam if they do nowhere."""
+    beams, coarse = ([p for p in s.elements if isinstance(p, Beam)] for s in (structure, _coarse(structure)))
+    fewer = {b.name for b, c in zip(beams, coarse, strict=True) if c.elements < b.elements}
+    found: list[Effect] = []
+    for effect in effects:
+        if type(effect) is not BeamFlexibility:
+            found.append(effect)
+            continue
+        named = effect.of or tuple(b.name for b in beams)
+        modal = tuple(name for name in named if name in fewer)
+        plain = tuple(name for name in named if name not in fewer) if modal else ()
+        found += [ComponentModes(count, modal or effect.of), *([BeamFlexibility(plain)] if plain else [])]
+    return found
+
+
+def _coarse(structure: Structure) -> Structure:
+    """As few elements as nodes in use allow; those there are where numbers tie the nodes."""
+    return structure if isinstance(structure.joints, JoinTable) else coarsen(structure)
 
 
 def _linear(effects: Sequence[Effect]) -> list[Effect]:
@@ -59,12 +77,14 @@ class Fidelity(Enum):
     COMPONENT_MODES = "component modes"
     FULL = "full"
 
-    def effects(self, given: Sequence[Effect]) -> list[Effect]:
+    def effects(self, given: Sequence[Effect], structure: Structure) -> list[Effect]:
         """Return the effects of this rung out of a scene's.
 
         Parameters
         ----------
         given : sequence of Effect
+        structure : Structure
+            The scene's: modes are for beams that need fewer elements with them, if there are any.
 
         Returns
         -------
@@ -75,7 +95,7 @@ class Fidelity(Enum):
             Fidelity.RIGID: _rigid,
             Fidelity.RIGID_WITH_SHAFTS: _shafts,
             Fidelity.LINEAR: _linear,
-            Fidelity.COMPONENT_MODES: _modes,
+            Fidelity.COMPONENT_MODES: lambda effects: _modes(effects, structure),
             Fidelity.FULL: list,
         }
         return rungs[self](flat)
@@ -151,9 +171,9 @@ class Setting:
         structure = self.fidelity.structure(scene.structure)
         structure = refine(structure, self.mesh) if self.mesh > 1 else structure
         simulation = replace(scene.simulation, method=self.method, tolerance=self.tolerance)
-        effects = self.fidelity.effects(scene.effects)
+        effects = self.fidelity.effects(scene.effects, scene.structure)
         if self.fidelity is Fidelity.COMPONENT_MODES:
-            effects = _modes([part for e in scene.effects for part in e.parts()], self.modes)
+            effects = _modes([part for e in scene.effects for part in e.parts()], scene.structure, self.modes)
         return scene.with_(structure=structure, effects=effects, simulation=simulation)
 
 
@@ -201,9 +221,9 @@ def sweep(
     found: list[Setting] = []
     parts = (*scene.structure.elements, *scene.structure.drives)
     seen: list[list[Effect]] = []
-    whole = [e for e in Fidelity.FULL.effects(scene.effects) if _acts(e, parts)]
+    whole = [e for e in Fidelity.FULL.effects(scene.effects, scene.structure) if _acts(e, parts)]
     for fidelity in fidelities:
-        effects = fidelity.effects(scene.effects)
+        effects = fidelity.effects(scene.effects, scene.structure)
         acting = [e for e in effects if _acts(e, parts)]
         if acting in seen or (acting == whole and fidelity is not Fidelity.FULL and Fidelity.FULL in fidelities):
             continue
