@@ -19,19 +19,21 @@ def marcher(model: fc.Model) -> Marcher:
 
 
 @pytest.mark.parametrize(
-    ("structure", "effects"),
+    ("structure", "effects", "whole"),
     [
-        (fc.cranes.flexible_arm, [fc.Flexible(), fc.RayleighDamping(0.0, 1e-3)]),
-        (fc.cranes.flexible_arm, []),
-        (fc.cranes.ceiling_crane, []),
-        (fc.cranes.flexible_arm, [fc.ComponentModes(1), fc.ShaftElasticity()]),
+        (fc.cranes.flexible_arm(), [fc.Flexible(), fc.RayleighDamping(0.0, 1e-3)], 0),
+        (fc.cranes.flexible_arm(), [], 0),
+        (fc.cranes.ceiling_crane(), [], 0),
+        (fc.coarsen(fc.cranes.flexible_arm()), [fc.ComponentModes(1), fc.ShaftElasticity()], 0),
+        (fc.coarsen(fc.cranes.flexible_arm()), [fc.ComponentModes(1), fc.ShaftElasticity()], 1),
     ],
 )
 @pytest.mark.parametrize("seeds", [(1.0, 2e2, 4e4), (0.0, 0.0, 1.0)])
-def test_probed_tangents_are_the_assembled_ones(structure, effects, seeds):
-    model = fc.assemble(structure(), [fc.Gravity(), fc.LargeRotation(), *effects])
+def test_probed_tangents_are_the_assembled_ones(structure, effects, whole, seeds):
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), *effects])
     found, rng = marcher(model), np.random.default_rng(1)
     F, m = found.flattened, found.march
+    assert m.whole >= whole
     state = model.advance(model.rest, 1e-2 * rng.standard_normal(model.n) * yardsticks(model), np.zeros(model.n), 0.0)
     v, a = (scale * rng.standard_normal(model.n) * yardsticks(model) for scale in (0.2, 1.0))
     u = rng.uniform(0.5, 1.0, len(model.inputs))
@@ -39,7 +41,7 @@ def test_probed_tangents_are_the_assembled_ones(structure, effects, seeds):
     found.supply(u)
     found.open(state.q, np.zeros(model.n), False)
     F.flat.v[:], F.flat.rate[:] = F.ordered(v), F.ordered(a)
-    probe(m.probes, F.flat, *seeds, m.entries)
+    probe(m.probes, F.flat, whole, *seeds, m.entries)
     wanted = model.slope(state.with_(v=v), v, a, seeds, u).toarray()
     rows, columns = (cells.ravel() for cells in np.indices(wanted.shape))
     inside = np.zeros(wanted.shape, dtype=bool)

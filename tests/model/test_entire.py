@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.model.flat.flat import accelerate, arrive, drive, energy, load, place, pull, push
+from flexctrl.model.flat.flat import accelerate, arrive, dissipate, drive, energy, load, place, press_entire, pull, push
 from flexctrl.model.flat.flattening import Flattened, flatten
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
@@ -27,6 +27,17 @@ MACHINES = {
     "ceiling_crane": fc.cranes.ceiling_crane(),
     "shafts": fc.cranes.flexible_arm(),
 }
+
+
+def cantilever() -> fc.Structure:
+    section = fc.Section(EA=1e5, EI_y=30.0, EI_z=20.0, GJ=10.0, rhoA=1.5, rhoJ=0.01)
+    bar = fc.Beam("bar", (0, 0, 0), (2.0, 0.3, 0.1), section, elements=2)
+    tip = fc.PointMass("tip", bar.end, 2.0)
+    held, pinned = fc.Support(bar.start), fc.Pin(bar.end, tip.node)
+    return fc.Structure([bar, tip], [held, pinned], inputs=[fc.Force("push", bar.node(1), "y")])
+
+
+MODAL = {"levers": fc.coarsen(fc.cranes.flexible_arm()), "plain": cantilever()}
 
 
 def moved(model: fc.Model, seed: int = 0) -> tuple[Flattened, fc.State]:
@@ -46,6 +57,16 @@ def moved(model: fc.Model, seed: int = 0) -> tuple[Flattened, fc.State]:
 def assembled(name: str) -> fc.Model:
     effects = [*EFFECTS, fc.ShaftElasticity()] if name == "shafts" else EFFECTS
     return fc.assemble(MACHINES[name], effects)
+
+
+@cache
+def modal(name: str) -> fc.Model:
+    """Machines of beams in a few modes."""
+    return fc.assemble(MODAL[name], [*EFFECTS, fc.ComponentModes(1), fc.ShaftElasticity()])
+
+
+def made(name: str) -> fc.Model:
+    return assembled(name) if name in MACHINES else modal(name)
 
 
 @pytest.fixture(params=MACHINES)
@@ -76,7 +97,24 @@ def test_accelerations_balance_all_forces(small):
     assert np.abs(f.force[: f.n]).max() < 1e-11 * max(1.0, acting)
 
 
-def test_nodes_and_drives_arrive_where_they_are_placed(small):
+@pytest.mark.parametrize("name", MODAL)
+def test_forces_on_beams_in_modes_are_those_of_the_pieces(name):
+    """Nodes need not be placed."""
+    f = moved(modal(name))[0].flat
+    assert f.pressing
+    f.rate[: f.n] = np.random.default_rng(1).uniform(-1.0, 1.0, f.n)
+    press_entire(f)
+    found = f.force[: f.n].copy()
+    place(f)
+    drive(f)
+    push(f)
+    assert np.abs(found).max() > 1.0
+    assert np.allclose(found, f.force[: f.n], rtol=0.0, atol=1e-11 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("name", [*MACHINES, *MODAL])
+def test_nodes_and_drives_arrive_where_they_are_placed(name):
+    small, _ = moved(made(name))
     f = small.flat
     place(f)
     drive(f)
@@ -84,13 +122,15 @@ def test_nodes_and_drives_arrive_where_they_are_placed(small):
     F, _ = moved(small.model)
     arrive(F.flat)
     slots = np.arange(f.drive_base).reshape(-1, NODE_SLOT)[:, :18].ravel()
-    shafts = f.drive_base + np.arange(f.drives * DRIVE_SLOT).reshape(-1, DRIVE_SLOT)[:, [0, 1, 3]].ravel()
+    shafts = f.drive_base + np.arange((f.drives + f.inner) * DRIVE_SLOT).reshape(-1, DRIVE_SLOT)[:, [0, 1, 3]].ravel()
     for cells in (slots, shafts):
         assert np.allclose(F.flat.z[cells], wanted[cells], rtol=0.0, atol=1e-13 * max(1.0, np.abs(wanted).max()))
     assert np.allclose(F.flat.found, found, rtol=0.0, atol=1e-13)
 
 
-def test_forces_of_inputs_and_energies_are_those_of_the_pieces(small):
+@pytest.mark.parametrize("name", [*MACHINES, *MODAL])
+def test_forces_of_inputs_and_energies_are_those_of_the_pieces(name):
+    small, _ = moved(made(name))
     f = small.flat
     place(f)
     drive(f)
@@ -98,6 +138,9 @@ def test_forces_of_inputs_and_energies_are_those_of_the_pieces(small):
     pull(f)
     energy(f)
     mine = f.force[: f.n].copy(), f.books.copy()
+    f.books[2] = 0.0
+    dissipate(f)
+    assert f.books[2] == pytest.approx(mine[1][2], rel=1e-12)
     state = small.state(f.v, 0.0)
     model = small.model
     found = model.advance(state, small.own(f.step), small.own(f.v), 0.0)

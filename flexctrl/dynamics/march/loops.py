@@ -36,7 +36,7 @@ from flexctrl.dynamics.march.record import (
 from flexctrl.dynamics.march.step import blended, refactored, sloped, step, to_rate, to_v
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
-from flexctrl.model.flat.flat import accelerate, arrive, clear, drive, energy, keep, load, place, pull, push
+from flexctrl.model.flat.flat import accelerate, arrive, clear, dissipate, drive, energy, keep, load, place, press_entire, pull, push
 from flexctrl.model.flat.fronts import factor
 from flexctrl.model.gauges import read
 
@@ -365,10 +365,12 @@ def enter(m: March) -> None:
     m.gained += total(work)
     due = drawn_now(m)
     if m.losing == 1 or due:
-        if m.swift != 1:
+        if m.swift != 1 and m.whole != 1:
             drive(f)
-        if m.leaping == 0 or due:
+        if due:
             energy(f)
+        elif m.leaping == 0:
+            dissipate(f)
     if m.leaping == 1:
         m.lost += m.leap.lost
     elif m.losing == 1:
@@ -386,7 +388,7 @@ def drawn_now(m: March) -> bool:
 
 def reach(m: March) -> None:
     """Put nodes and drives where the step takes them."""
-    if m.swift == 1:
+    if m.swift == 1 or m.whole == 1:
         arrive(m.flat)
     else:
         place(m.flat)
@@ -409,7 +411,7 @@ def note(m: March) -> None:
     f = m.flat
     row = m.rows[(1 + m.gauges.outputs) * m.done :]
     row[0] = m.t
-    if m.gauges.moving == 1 and m.losing == 0 and m.swift != 1:
+    if m.gauges.moving == 1 and m.losing == 0 and m.swift != 1 and m.whole != 1:
         drive(f)
     read(m.gauges, f.z, row[1:])
     if m.keeping == 1 or m.t >= m.due:
@@ -589,8 +591,11 @@ def balanced(m: March) -> bool:
     last = math.inf
     first = 0.0
     for k in range(_SOLUTIONS):
-        drive(f)
-        push(f)
+        if m.whole == 1:
+            press_entire(f)
+        else:
+            drive(f)
+            push(f)
         f.force[f.n] = 0.0
         released(m.flows, f.force)
         solved(m.axes, m.mass, m.fronts, f.force)

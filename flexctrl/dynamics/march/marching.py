@@ -239,8 +239,8 @@ class Marcher:
         m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
         m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
         m.lean, m.phase, m.attempt, m.t = point.lean, FRESH, 0, point.state.t
-        if m.swift and not F.keeps_shape:
-            m.swift = 0
+        if (m.swift or m.whole) and not F.keeps_shape:
+            m.swift = m.whole = 0
         self.supply(point.supply.u)
         self.open(point.state.q, np.zeros(self.model.n), False)
         return self
@@ -479,7 +479,8 @@ def _march(F: Flattened, method: Method, leaping: int) -> March:
         price=_MADE + probes.groups if flat.tangents or probes.groups else _ASKED,
         leaping=leaping,
         asking=int(not flat.tangents and not probes.groups),
-        swift=int(flat.quick > 0),
+        swift=int(flat.quick > 0 and not flat.pressing),
+        whole=flat.pressing,
         tolerance=method.least,
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
-from flexctrl.model.flat.flat import Flat, clear, drive, place, push
+from flexctrl.model.flat.flat import Flat, clear, drive, place, press_entire, push
 from flexctrl.model.flat.layout import Flattened
 
 __all__ = ["Probes", "probe", "probes_of"]
@@ -106,8 +106,11 @@ def _grouped(F: Flattened) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.
 
 
 @seldom
-def probe(p: Probes, f: Flat, on_place: float, on_rate: float, on_acceleration: float, entries: Reals) -> None:
-    """Fill in the slope of the forces for motions that add these times an increment."""
+def probe(
+    p: Probes, f: Flat, whole: int, on_place: float, on_rate: float, on_acceleration: float, entries: Reals
+) -> None:
+    """Fill in the slope of the forces, by kernels of the whole machine maybe, for motions that add these times an
+    increment."""
     clear(f.entries, entries)
     for i in range(f.drives):
         p.driven[i] = f.driven[i]
@@ -117,7 +120,7 @@ def probe(p: Probes, f: Flat, on_place: float, on_rate: float, on_acceleration: 
         put(p.v[i:], eight(f.v[i:]))
         put(p.rate[i:], eight(f.rate[i:]))
     far = _STEP if on_place > 0.0 else _PULL
-    forces(f, on_place)
+    forces(f, whole, on_place)
     for i in range(0, f.padded, 8):
         put(p.base[i:], eight(f.force[i:]))
     for k in range(p.groups):
@@ -127,7 +130,7 @@ def probe(p: Probes, f: Flat, on_place: float, on_rate: float, on_acceleration: 
             f.step[j] += on_place * way
             f.v[j] += on_rate * way
             f.rate[j] += on_acceleration * way
-        forces(f, on_place)
+        forces(f, whole, on_place)
         for c in range(p.starts[k], p.starts[k + 1]):
             j = p.columns[c]
             way = far * p.size[j]
@@ -137,13 +140,16 @@ def probe(p: Probes, f: Flat, on_place: float, on_rate: float, on_acceleration: 
             f.step[j] = p.step[j]
             f.v[j] = p.v[j]
             f.rate[j] = p.rate[j]
-    forces(f, on_place)
+    forces(f, whole, on_place)
     for i in range(f.drives):
         f.driven[i] = p.driven[i]
 
 
-def forces(f: Flat, on_place: float) -> None:
+def forces(f: Flat, whole: int, on_place: float) -> None:
     """Sum up the forces of the motion under way."""
+    if whole == 1:
+        press_entire(f)
+        return
     if on_place > 0.0:
         place(f)
     drive(f)

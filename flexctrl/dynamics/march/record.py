@@ -177,6 +177,8 @@ class March:
     swift : int
         1: accelerations come from kernels of the whole machine, and Newton's method takes the mass at hand for the
         tangent; 0: the machine has none; below: steps until that is tried again, after one for which it was not enough.
+    whole : int
+        1: forces come from kernels of the whole machine, while nodes stay where they were till the end of the step.
     habit, trusted : float, int
         How much smaller each correction has been than the one before, and in how many steps that was only believed.
     price, spent, lately, served : float, int
@@ -258,6 +260,7 @@ class March:
     leaping: int
     paced: int = 1
     swift: int = 0
+    whole: int = 0
     tolerance: float = 0.0
     error: float = 0.0
     h: float = 0.0

@@ -13,7 +13,7 @@ from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import accelerate, drive, load, place, push, tangent
+from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
 from flexctrl.model.flat.fronts import factor
 
 __all__ = ["blended", "refactored", "sloped", "step", "to_rate", "to_v"]
@@ -79,12 +79,18 @@ def newton(m: March) -> int:
         if m.swift == 1:
             lag(m)
         elif m.phase == EVALUATE:
-            place(f)
-            drive(f)
-            push(f)
+            if m.whole == 1:
+                press_entire(f)
+            else:
+                place(f)
+                drive(f)
+                push(f)
             m.phase = CORRECT
             if m.attempt == 1 or m.contraction > _POOR or (m.iteration == 0 and stale(m)):
                 m.last = math.inf
+                if m.whole == 1:
+                    place(f)
+                    drive(f)
                 if m.asking == 1:
                     return WANTS_TANGENT
                 sloped(m, 1.0, to_v(m), to_rate(m))
@@ -121,7 +127,7 @@ def lag(m: March) -> None:
 def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) -> None:
     """Fill in the slope of the forces for motions that add these times an increment."""
     if m.probes.groups > 0:
-        probe(m.probes, m.flat, on_place, on_rate, on_acceleration, m.entries)
+        probe(m.probes, m.flat, m.whole, on_place, on_rate, on_acceleration, m.entries)
     else:
         tangent(m.flat, on_place, on_rate, on_acceleration, m.entries)
 

@@ -1,5 +1,7 @@
 """Machines of few freedoms as a few kernels: accelerations of all of it at once, and where all of it ends up.
 
+Beams in a few modes are stiff for most steps, so of machines with such the forces are drawn up, not the accelerations.
+
 The kernels are drawn up by running the flat model once more on symbols: on the workspace as casadi expressions, with
 pieces and levers that write down what they compute. What is 0 or ±1 in every pose (a girder that only yaws tilts no
 axis) is such a number then, and whatever is multiplied by it falls away. Mass matrix and the forces beside it follow
@@ -29,7 +31,7 @@ __all__ = ["Entire", "entire_of"]
 _Drawn = tuple[Kernel, np.ndarray, np.ndarray, np.ndarray]
 """A kernel, what it reads, its parameters, and where it writes."""
 
-_FREEDOMS = 12
+_FREEDOMS, _BENDING = 12, 24
 _LARGE, _MOST = 8000, 4000
 """Instructions of pieces and levers; of the kernel of accelerations: beyond, there is nothing to be gained."""
 _TURN = 2.0 * np.pi
@@ -45,24 +47,28 @@ class Entire:
     Attributes
     ----------
     runs : tuple of Run
-        Accelerations from the pose at the start of a step, the step, and rates at its end; slots of nodes and drives
-        at the end of a step; forces of the inputs, and energies, from slots. None: the machine is no such one.
+        Accelerations (or forces) from the pose at the start of a step, the step, and rates at its end; slots of nodes
+        and drives at the end of a step; forces of the inputs, energies, and the dissipated power alone, from slots.
+        None: the machine is no such one.
     cells : numpy.ndarray of int
         Entries of poses that never change.
     values : numpy.ndarray
         What they are.
+    pressing : bool
+        Whether the first kernel gives forces.
     """
 
     runs: tuple[Run, ...]
     cells: np.ndarray
     values: np.ndarray
+    pressing: bool = False
 
 
 _NONE = Entire((), np.zeros(0, dtype=int), np.zeros(0))
 
 
 def entire_of(layout: Layout) -> Entire:
-    """Return the kernels of a model; none if it is large, bends, or has freedoms of first order.
+    """Return the kernels of a model; none if it is large, bends but in component modes, or has others of first order.
 
     Parameters
     ----------
@@ -73,15 +79,16 @@ def entire_of(layout: Layout) -> Entire:
     Entire
     """
     model, motion = layout.model, layout.motion
-    if not model.large or not 0 < motion.n <= _FREEDOMS:
+    modal = bool(motion.inner.size) and all(i.order == 2 for i in motion.effects)
+    if not model.large or not 0 < motion.n <= (_BENDING if modal else _FREEDOMS):
         return _NONE
-    if motion.plain or motion.inner.size or motion.flows.size:
+    if modal and motion.linkage.loops or not modal and (motion.plain or motion.inner.size or motion.flows.size):
         return _NONE
     pieces = sum(f.count * f.kernels.force.instructions for f in model.forces.families)
     if pieces + motion.linkage.kernels[0].instructions > _LARGE:
         return _NONE
     drawing = _Drawing(layout)
-    return drawing.made() if drawing.sound() else _NONE
+    return drawing.made(modal) if modal or drawing.sound() else _NONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,25 +205,28 @@ class _Drawing:
                 slot[3] = ca.floor(f.found[i] / _TURN + 0.5)
             own = f.q[f.shafts[i]] + f.step[f.shafts[i]]
             slot[0] = f.ratios[i] * f.found[i] if f.rigid[i] else own
+        for i in range(f.drives, f.drives + f.inner):
+            f.z[f.drive_base + DRIVE_SLOT * i] = f.q[f.shafts[i]] + f.step[f.shafts[i]]
 
-    def made(self) -> Entire:
-        """The kernels, bound; none if they are too large."""
-        accelerating = self._accelerating()
-        if accelerating[0].instructions > _MOST:
+    def made(self, pressing: bool) -> Entire:
+        """The kernels, bound, the first of them giving accelerations or forces; none if they are too large."""
+        first = self._pressing() if pressing else self._accelerating()
+        if first[0].instructions > _MOST:
             return _NONE
         arriving = self._arriving()
         start = self.layout.starts["pose"]
         cells = np.array(sorted(self.fixed), dtype=int)
-        found = (accelerating, arriving, self._pulling(), self._booking())
+        found = (first, arriving, self._pulling(), self._booking(range(3)), self._booking([2]))
         runs = tuple(self.layout.model.backend.bind(*one) for one in found)
-        return Entire(runs, start + cells, np.array([self.fixed[int(i)] for i in cells]))
+        return Entire(runs, start + cells, np.array([self.fixed[int(i)] for i in cells]), pressing)
 
     def _pressed(self) -> Flat:
         """All forces at the end of a step."""
         f = self.workspace(self.fixed, False)
-        first: Any = f.linkage[0]
-        loose: Any = replace(first, kernel=self.layout.motion.linkage.freely)
-        f = replace(f, linkage=(loose, *f.linkage[1:]))
+        if f.linking:
+            first: Any = f.linkage[0]
+            loose: Any = replace(first, kernel=self.layout.motion.linkage.freely)
+            f = replace(f, linkage=(loose, *f.linkage[1:]))
         load(f)
         self.placed(f)
         drive(f)
@@ -260,13 +270,17 @@ class _Drawing:
         rates = _eliminated(self.mass, self.still)
         return self._drawn("accelerating", [(start + i, rates[i]) for i in range(rates.numel())])
 
+    def _pressing(self) -> _Drawn:
+        start, force = self.layout.starts["force"], self._pressed().force
+        return self._drawn("pressing", [(start + i, force[i]) for i in range(self.layout.motion.n)])
+
     def _arriving(self) -> _Drawn:
         f = self.workspace(self.fixed, False)
         before = f.z.copy()
         self.placed(f)
         drive(f)
         node = [NODE_SLOT * i + k for i in range(f.nodes) for k in range(18 if not self._closes else NODE_SLOT)]
-        drives = [f.drive_base + DRIVE_SLOT * i + k for i in range(f.drives) for k in (0, 1, 3)]
+        drives = [f.drive_base + DRIVE_SLOT * i + k for i in range(f.drives + f.inner) for k in (0, 1, 3)]
         found = [self.layout.starts["found"] + i for i in range(f.drives)]
         changed = [c for c in (*node, *drives, *found) if _changed(f.z[c], before[c])]
         self.moving = frozenset(changed)
@@ -284,11 +298,11 @@ class _Drawing:
         start = self.layout.starts["force"]
         return self._drawn("pulling", [(start + i, f.force[i]) for i in range(f.n)])
 
-    def _booking(self) -> _Drawn:
+    def _booking(self, entries: Sequence[int]) -> _Drawn:
         f = self.workspace(self.fixed, True)
         energy(f)
         start = self.layout.starts["books"]
-        return self._drawn("booking", [(start + i, f.books[i]) for i in range(3)])
+        return self._drawn("booking", [(start + i, f.books[i]) for i in entries])
 
     def _drawn(self, name: str, results: Sequence[tuple[int, Any]]) -> _Drawn:
         """A kernel of what is found, on the symbols it takes, and its tables."""

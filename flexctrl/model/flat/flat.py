@@ -21,11 +21,13 @@ __all__ = [
     "accelerate",
     "arrive",
     "clear",
+    "dissipate",
     "drive",
     "energy",
     "keep",
     "load",
     "place",
+    "press_entire",
     "pull",
     "push",
     "tangent",
@@ -96,6 +98,8 @@ class Flat:
         Kernels of the whole machine, where it has few freedoms; see `flexctrl.model.flat.entire`.
     quick : int
         How many there are.
+    pressing : int
+        Whether the first of them gives forces (`press_entire`) rather than accelerations.
     """
 
     LASTING = ("linking", "carried", "quick")
@@ -163,6 +167,7 @@ class Flat:
     answer: Reals
     entire: Runs = ()
     quick: int = 0
+    pressing: int = 0
 
 
 def load(f: Flat) -> None:
@@ -276,6 +281,19 @@ def push(f: Flat) -> None:
 def accelerate(f: Flat) -> None:
     """Find the accelerations at the end of the step, of machines with kernels for all of it."""
     f.entire[0](f.z, f.z)
+
+
+def press_entire(f: Flat) -> None:
+    """Sum up all forces at the end of the step, of machines with kernels for all of it; nodes stay where they were."""
+    f.entire[0](f.z, f.z)
+
+
+def dissipate(f: Flat) -> None:
+    """Work out the dissipated power of the slots, maybe the energies too."""
+    if f.quick > 0:
+        f.entire[4](f.z, f.z)
+        return
+    energy(f)
 
 
 def arrive(f: Flat) -> None:

@@ -200,6 +200,7 @@ class Layout:
             **self.runs,
             entire=self.entire.runs,
             quick=len(self.entire.runs),
+            pressing=int(self.entire.pressing),
         )
         shown, summed = np.zeros((2, self._gauges.turning))
         gauges = replace(self._gauges, sums=np.zeros(self._gauges.rows), shown=shown, summed=summed)
