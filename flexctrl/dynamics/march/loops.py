@@ -36,7 +36,20 @@ from flexctrl.dynamics.march.record import (
 from flexctrl.dynamics.march.step import blended, refactored, sloped, step, to_rate, to_v
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
-from flexctrl.model.flat.flat import accelerate, arrive, clear, dissipate, drive, energy, keep, load, place, press_entire, pull, push
+from flexctrl.model.flat.flat import (
+    accelerate,
+    arrive,
+    clear,
+    dissipate,
+    drive,
+    energy,
+    keep,
+    load,
+    place,
+    press_entire,
+    pull,
+    push,
+)
 from flexctrl.model.flat.fronts import factor
 from flexctrl.model.gauges import read
 

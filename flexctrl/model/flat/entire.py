@@ -82,7 +82,8 @@ def entire_of(layout: Layout) -> Entire:
     modal = bool(motion.inner.size) and all(i.order == 2 for i in motion.effects)
     if not model.large or not 0 < motion.n <= (_BENDING if modal else _FREEDOMS):
         return _NONE
-    if modal and motion.linkage.loops or not modal and (motion.plain or motion.inner.size or motion.flows.size):
+    apt = not motion.linkage.loops if modal else not (motion.plain or motion.inner.size or motion.flows.size)
+    if not apt:
         return _NONE
     pieces = sum(f.count * f.kernels.force.instructions for f in model.forces.families)
     if pieces + motion.linkage.kernels[0].instructions > _LARGE:
