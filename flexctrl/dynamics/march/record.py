@@ -218,7 +218,7 @@ class March:
         Poses, degrees of freedom, rates, driven coordinates, angles of outputs, and the time.
     """
 
-    LASTING = ("leaping", "swift")
+    LASTING = ("leaping", "swift", "whole")
 
     flat: Flat
     gauges: Gauges
