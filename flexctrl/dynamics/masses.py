@@ -92,10 +92,11 @@ class Masses:
             change = -self._solve(residual)
             if float(np.abs(change).max(initial=0.0)) <= _EXACT * float(np.abs(value + change).max(initial=0.0)):
                 return value + change, True
-            before, power = power, float(residual @ change)
-            direction = change + (power / before) * direction
-            pushed = gap(guess + direction) - start
-            curvature = float(direction @ pushed)
+            with np.errstate(over="ignore", invalid="ignore"):  # a trial far too long: it is turned down below
+                before, power = power, float(residual @ change)
+                direction = change + (power / before) * direction
+                pushed = gap(guess + direction) - start
+                curvature = float(direction @ pushed)
             if not curvature > 0.0:
                 break
             share = power / curvature

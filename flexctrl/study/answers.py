@@ -22,6 +22,7 @@ from flexctrl.study.subject import Subject
 __all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
 
 _SLOW = 6  # poles that are compared, each with any of twice as many
+_SURELY, _PARTED = 1e-6, 30.0
 _ROUNDING = 1e-12  # of the machine's size; thousands of roundings
 
 
@@ -152,9 +153,15 @@ def _closed(linear: LinearModel, law: LinearController) -> np.ndarray:
 
 
 def _slow(poles: np.ndarray) -> np.ndarray:
-    """The poles that are neither at rest nor the lower half of a pair, the slowest first."""
+    """The poles that are neither at rest nor the lower half of a pair, the slowest first.
+
+    Rounding ε parts two poles at rest by about √(ε |s|max |s|), |s| of the slowest poles that move.
+    """
     size = np.abs(poles)
-    moving = poles[(size > 1e-6 * size.max(initial=0.0)) & (poles.imag >= 0.0)]
+    fastest = float(size.max(initial=0.0))
+    surely = float(size[size > _SURELY * fastest].min(initial=fastest))
+    rest = min(_SURELY * fastest, _PARTED * np.sqrt(np.finfo(float).eps * fastest * surely))
+    moving = poles[(size > rest) & (poles.imag >= 0.0)]
     return moving[np.argsort(np.abs(moving))][: 2 * _SLOW]
 
 

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 import flexctrl as fc
-from flexctrl.study.answers import Curves, outputs_apart
+from flexctrl.study.answers import Curves, _slow, outputs_apart
 
 
 def sideways(push: float, *, linear: bool = False) -> fc.Run:
@@ -65,3 +66,15 @@ def test_rounding_is_measured_by_the_machine():
     assert noise["tilt"] == pytest.approx(1e-12)
     assert noise["sway"] == pytest.approx(2e-12 * size / 2.0, rel=1e-6)
     assert noise["pull"] == pytest.approx(2e-12 * size * 1e6 / 2.0 * (1.0 + 1e-4 / 1e-3), rel=1e-3)  # and its damping
+
+
+@pytest.mark.parametrize("fastest", [1e2, 1e5, 1e7])
+def test_slow_poles_of_stiff_machines_are_seen_and_poles_at_rest_are_not(fastest):
+    """Two integrators beside a creep of 0.01 1/s and vibrations up to the fastest: rounding parts the integrators."""
+    A = block_diag(
+        [[0.0, 1.0], [0.0, 0.0]], [[-0.01]], [[0.0, 10.0], [-10.0, -1.0]], [[0.0, fastest], [-fastest, -1.0]]
+    )
+    turned = np.linalg.qr(np.random.default_rng(5).normal(size=A.shape))[0]
+    poles = _slow(np.linalg.eigvals(turned @ A @ turned.T))
+    assert len(poles) == 3
+    assert np.abs(poles[0] + 0.01) < 1e-3
