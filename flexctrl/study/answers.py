@@ -22,7 +22,7 @@ from flexctrl.study.subject import Subject
 __all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
 
 _SLOW = 6  # poles that are compared, each with any of twice as many
-_SURELY, _PARTED = 1e-6, 30.0
+_SURELY, _PARTED, _LOOKS = 1e-6, 30.0, 3
 _ROUNDING = 1e-12  # of the machine's size; thousands of roundings
 
 
@@ -159,8 +159,10 @@ def _slow(poles: np.ndarray) -> np.ndarray:
     """
     size = np.abs(poles)
     fastest = float(size.max(initial=0.0))
-    surely = float(size[size > _SURELY * fastest].min(initial=fastest))
-    rest = min(_SURELY * fastest, _PARTED * np.sqrt(np.finfo(float).eps * fastest * surely))
+    rest = _SURELY * fastest
+    for _ in range(_LOOKS):  # a slower pole that moves sets the limit lower
+        slowest = float(size[size > rest].min(initial=fastest))
+        rest = min(rest, _PARTED * np.sqrt(np.finfo(float).eps * fastest * slowest))
     moving = poles[(size > rest) & (poles.imag >= 0.0)]
     return moving[np.argsort(np.abs(moving))][: 2 * _SLOW]
 
