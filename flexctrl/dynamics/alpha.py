@@ -177,8 +177,7 @@ class Stepper:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
         c, zero = self.coefficients, np.zeros(self.model.n)
         M = self._massive(-self.model.slope(state, state.v, zero, (0.0, 0.0, 1.0), supply.u))
-        smallest = M.diagonal().min(initial=np.inf)
-        if smallest > 1e-14 * M.diagonal().max(initial=0.0):
+        if (M.diagonal() > self.model.dust).all():
             try:
                 return factorise(M)
             except SingularMatrixError:

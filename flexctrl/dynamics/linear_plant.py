@@ -175,6 +175,11 @@ class LinearPlant:
         return self.linear.outputs
 
     @property
+    def dust(self) -> np.ndarray:
+        """Masses are taken as they are."""
+        return np.zeros(self.n)
+
+    @property
     def structure(self) -> _Machine:
         return _Machine(self.linear.name)
 

@@ -16,7 +16,6 @@ from flexctrl.model.state import State
 __all__ = ["Masses"]
 
 _EXACT = 1e-12
-_MASSLESS = 1e-14
 _SWEEPS = 12
 
 
@@ -55,9 +54,9 @@ class Masses:
         """
         nothing = np.zeros(len(self.model.inputs))
         slope = self.model.slope(state, self._still, self._still, (0.0, 0.0, 1.0), nothing)
-        diagonal = -slope.diagonal()
-        if diagonal.size and not diagonal.min() > _MASSLESS * diagonal.max():
-            raise SingularMatrixError(int(np.argmin(diagonal)))
+        light = np.flatnonzero(~(-slope.diagonal() > self.model.dust))
+        if light.size:
+            raise SingularMatrixError(int(light[0]))
         if self._plan is None or not self._plan.fits(slope):
             self._plan = plan(slope)
         self._solve = factorise(slope, self._plan)
@@ -76,11 +75,12 @@ class Masses:
         """
         if self._solve is None:
             self.make(state)
-        value, done = self._conjugate(gap, guess, _SWEEPS)
-        if done:
-            return value
-        self.make(state)
-        return self._conjugate(gap, value, _SWEEPS)[0]
+        with np.errstate(over="ignore", invalid="ignore"):  # far too long a step; who takes it sees what is not finite
+            value, done = self._conjugate(gap, guess, _SWEEPS)
+            if done:
+                return value
+            self.make(state)
+            return self._conjugate(gap, value, _SWEEPS)[0]
 
     def _conjugate(
         self, gap: Callable[[np.ndarray], np.ndarray], guess: np.ndarray, sweeps: int

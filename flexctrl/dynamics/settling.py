@@ -18,7 +18,6 @@ from flexctrl.model.state import State
 
 __all__ = ["quasistatic", "settled"]
 
-_NOTHING = 1e-14
 _EXACT = 1e-12
 _ITERATIONS = 25
 
@@ -34,7 +33,7 @@ def _quasistatic(model: Model) -> np.ndarray:
     zero, u = np.zeros(model.n), np.zeros(len(model.inputs))
     seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     stiffness, damping, mass = (np.abs(model.slope(model.rest, zero, zero, seed, u).diagonal()) for seed in seeds)
-    light = (mass <= _NOTHING * mass.max(initial=0.0)) & (damping <= _NOTHING * damping.max(initial=0.0))
+    light = (mass <= model.dust) & (damping <= model.forces.rounding((0.0, 1.0, 0.0)))
     light[model.motion.inner] = False
     return np.flatnonzero(light & (stiffness > 0.0))
 

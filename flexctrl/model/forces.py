@@ -19,6 +19,8 @@ from flexctrl.model.mixed import Excess, Mixed
 from flexctrl.model.motion import DENSE_UP_TO, Motion
 from flexctrl.model.state import State
 
+_ROUND_OFF = 1e-14
+
 
 @dataclass(frozen=True, eq=False)
 class Terms:
@@ -253,8 +255,32 @@ class Forces:
         numpy.ndarray, shape (raw,)
             [kg] or [kg m²].
         """
+        return self._largest(state, (0.0, 0.0, 1.0))
+
+    def rounding(self, seeds: tuple[float, float, float]) -> np.ndarray:
+        """Return what is left by rounding, at most, on the diagonal of a matrix where nothing should be, shape (n,).
+
+        Told from the terms of each entry alone: whatever the units, and however large the entries of other parts.
+
+        Parameters
+        ----------
+        seeds : tuple of 3 floats
+            Which matrix, as of `slope`: (0, 1, 0) is the damping, (0, 0, 1) the mass.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        motion, raw = self.motion, np.arange(self.motion.raw)
+        three = np.where(raw < motion.source_base, raw - raw % 3, raw)
+        alike = sp.csr_matrix((np.ones(motion.raw), (three, raw)), shape=(motion.raw, motion.raw))
+        T = motion.jacobian(motion.rest)
+        levers = np.sqrt(alike @ T.multiply(T))  # of a node's three: the same in all its poses
+        return np.asarray(_ROUND_OFF * (levers.T @ np.sqrt(self._largest(motion.rest, seeds))) ** 2)
+
+    def _largest(self, state: State, seeds: tuple[float, float, float]) -> np.ndarray:
         still, (rows, columns), motion = np.zeros(self.motion.n), self.pattern, self.motion
-        blocks = np.abs(self._blocks(self.slots(state, still, still), (0.0, 0.0, 1.0)))
+        blocks = np.abs(self._blocks(self.slots(state, still, still), seeds))
         own = rows == columns
         sizes = np.bincount(rows[own], weights=blocks[own], minlength=motion.raw)
         nodes = sizes[: motion.source_base].reshape(-1, 3)

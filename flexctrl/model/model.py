@@ -187,6 +187,11 @@ class Model:
         """Where laws of force have corners."""
         return Kinks(self)
 
+    @cached_property
+    def dust(self) -> np.ndarray:
+        """Mass of each degree of freedom that is but rounding of the terms it is the sum of, at most, shape (n,)."""
+        return self.forces.rounding((0.0, 0.0, 1.0))
+
     def bends(self, part: Part | Drive) -> bool:
         """Tell whether some effect lets a part deform.
 

@@ -68,7 +68,6 @@ _SURE = 1e-4
 _DOUBT = 4.0
 _TRUSTED = 8
 _QUIET, _LAST = 1e-7, 1e-14
-_MASSLESS = 1e-14
 
 
 @seldom
@@ -657,11 +656,8 @@ def weighed(m: March) -> int:
     pivot(m.flows, m.entries)
     where = factor(m.fronts, m.entries, m.mass.diagonal, m.mass.down, m.mass.up)
     m.mass_for = 0.0
-    most = 0.0
     for i in range(f.n):
-        most = max(most, m.mass.diagonal[i])
-    for i in range(f.n):
-        if not m.mass.diagonal[i] > _MASSLESS * most:
+        if not m.mass.diagonal[i] > m.dust[i]:
             where = i
     if where >= 0:
         return SINGULAR

@@ -461,6 +461,7 @@ def _march(F: Flattened, method: Method, leaping: int) -> March:
         pulled=pulled,
         weight=F.ordered(method.weight),
         turns=F.ordered(method.turning.astype(float)),
+        dust=F.ordered(F.model.dust),
         reach=reach,
         first=first,
         rows=np.zeros((1 + F.gauges.outputs) * _CAPACITY),

@@ -208,8 +208,8 @@ class March:
         At the start of the step; see `AlphaPoint`.
     pulled : Reals
         The inputs' forces at its start.
-    weight, turns : Reals
-        One over the yardsticks; 1 for what turns.
+    weight, turns, dust : Reals
+        One over the yardsticks; 1 for what turns; mass that is but rounding.
     reach, first : Reals
         Largest distance of each degree of freedom from where it was first.
     rows : Reals
@@ -240,6 +240,7 @@ class March:
     pulled: Reals
     weight: Reals
     turns: Reals
+    dust: Reals
     reach: Reals
     first: Reals
     rows: Reals

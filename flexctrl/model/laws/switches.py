@@ -34,7 +34,6 @@ T = TypeVar("T")
 _FADING = 1e4
 _STILL = 1e-10
 _SLACK = 1e-9
-_MASSLESS = 1e-14
 _DEPENDENT = 1e12
 
 
@@ -174,7 +173,7 @@ class Switches:
         loose = state.with_(dry=Dry(np.where(dry.phase == STUCK, 0.0, dry.phase), dry.anchor))
         force = model.balance(loose, state.v, a) + model.loads(loose, u)
         M = -model.slope(loose, state.v, a, (0.0, 0.0, 1.0), u)
-        heavy = np.flatnonzero(M.diagonal() > _MASSLESS * M.diagonal().max(initial=0.0))
+        heavy = np.flatnonzero(M.diagonal() > model.dust)
         solve = factorise(M if heavy.size == model.n else M[heavy][:, heavy])
         W = self._hold(state)[0][:, heavy]
         pushed, free = np.array([solve(row) for row in W]).reshape(W.shape).T, solve(force[heavy])
@@ -308,7 +307,7 @@ class Switches:
     def _check_mass(self, state: State, u: np.ndarray) -> None:
         still = np.zeros(self.model.n)
         M = -self.model.slope(state.loose, still, still, (0.0, 0.0, 1.0), u)
-        light = M.diagonal() <= _MASSLESS * M.diagonal().max(initial=0.0)
+        light = M.diagonal() <= self.model.dust
         W = self._slips.rows(state)
         bad = np.flatnonzero(np.abs(W[:, ~light]).max(axis=1, initial=0.0) == 0.0)
         if bad.size:
