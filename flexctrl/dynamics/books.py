@@ -17,7 +17,7 @@ from flexctrl.model.state import State
 
 __all__ = ["Books", "Sums"]
 
-_ABSURD, _DOUBTFUL = 0.5, 0.05
+_ABSURD, _UNRESOLVED, _DOUBTFUL = 0.5, 0.2, 0.05
 _MOSTLY = 0.9
 _VISIBLE = 1e-3
 _ROUND_OFF = 1e-6
@@ -182,7 +182,7 @@ class Books:
         """
         s = self.sums
         damped = s.made < 0.0 and -s.made >= _MOSTLY * s.gap
-        if not self._doubtful(_ABSURD) or damped:
+        if not self._doubtful(_UNRESOLVED) or damped:
             return ""
         return f"the energy books missed {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
 
@@ -194,7 +194,7 @@ class Books:
             return ()
         return (
             f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is "
-            f"{'not' if self.residual > _ABSURD else 'poorly'} resolved; take smaller steps or a smaller Tolerance",
+            f"{'not' if self.residual > _UNRESOLVED else 'poorly'} resolved; take smaller steps or a smaller Tolerance",
         )
 
     def _doubtful(self, share: float) -> bool:

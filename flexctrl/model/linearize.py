@@ -107,6 +107,35 @@ def all_free(linear: LinearModel, rest: Rest) -> LinearModel:
     return _derivative(model, state, rest.inputs, np.arange(model.n), bool(without_energy(model, rest.inputs)))[0]
 
 
+def released(rest: Rest) -> LinearModel:
+    """Linearise about an equilibrium, and let go of what was held to find it, as a run does that starts there.
+
+    Parameters
+    ----------
+    rest : Rest
+        The equilibrium.
+
+    Returns
+    -------
+    LinearModel
+        Of all coordinates. Where it takes a force to hold the machine there it has no certificate: let go, it leaves.
+
+    Raises
+    ------
+    LinearizationError, MechanismError
+        As `linearize`.
+    """
+    linear = linearize(rest.model, at=rest)
+    if not rest.held:
+        return linear
+    model, inputs = rest.model, dict(zip(rest.model.inputs, rest.inputs.tolist(), strict=True))
+    try:
+        return linearize(model, at=rest.state, inputs=inputs)
+    except LinearizationError:  # it takes a force to hold it
+        free = _free(model, rest.state)
+        return _derivative(model, rest.state.loose, rest.inputs, free, bool(without_energy(model, rest.inputs)))[0]
+
+
 def _refuse_spins(model: Model, held: Sequence[str]) -> None:
     """Refuse beams that spin about themselves without inertia; bent by a load they seem to have a trace of it."""
     beams = (p for p in model.structure.elements if isinstance(p, Beam) and model.bends(p))

@@ -25,7 +25,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.holding import held_at
-from flexctrl.model.linearize import linearize
+from flexctrl.model.linearize import released
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds, listed
@@ -236,13 +236,13 @@ class Scene:
 
     @cached_property
     def linear(self) -> LinearModel:
-        """The machine linearised about its equilibrium."""
-        return linearize(self.model, at=self.rest)
+        """The machine linearised about its equilibrium, with nothing held any more."""
+        return released(self.rest)
 
     @cached_property
     def twin_linear(self) -> LinearModel:
-        """The rigid twin linearised about its equilibrium."""
-        return linearize(self.twin, at=self.twin_rest)
+        """The rigid twin linearised about its equilibrium, with nothing held any more."""
+        return released(self.twin_rest)
 
     def _loaded(self, effect: Effect) -> Effect:
         """An effect that is laid about an equilibrium, about that of the scene unless it names one."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -165,7 +165,7 @@ def margins(loop: Loop) -> Margins:
         For what is no loop.
     """
     omega, L = loop_grid(check_loop(loop, "margins"))
-    through_one = _roots(lambda w: np.log(abs(loop.at(w))), omega, np.log(abs(L)))
+    through_one = _roots(lambda w: np.log(_size(loop.at(w))), omega, np.log(_size(L)))
     gains = tuple(Crossing(w, _wrapped(np.angle(_one(loop, w)) + np.pi)) for w in through_one)
     phases = phase_crossings(loop, omega, L)
     lags = [Crossing(g.omega, (g.margin % (2 * np.pi)) / g.omega) for g in gains]
@@ -311,6 +311,11 @@ def _lowest(function: Callable[[np.ndarray], np.ndarray], omega: np.ndarray, val
         if trial.fun < best.value:
             best = Peak(float(trial.fun), float(np.exp(trial.x)))
     return best
+
+
+def _size(L: Any) -> Any:
+    """|L|, and no zero where nothing comes back."""
+    return np.maximum(np.abs(L), np.finfo(float).tiny)
 
 
 def _return_ratio(L: np.ndarray) -> np.ndarray:

@@ -36,6 +36,22 @@ def test_freedoms_are_held_by_node_or_by_name(written):
         assert scene.twin_rest.outputs["travel"] == pytest.approx(0.3)
 
 
+def test_what_an_equilibrium_holds_is_free_in_the_linear_model(written):
+    """A hold that takes no force gives a free machine its place, and changes nothing else of it."""
+    free = load_scene(written(TROLLEY)).linear
+    held = load_scene(written(TROLLEY + '\n[equilibrium]\nhold = { "trolley.u" = 0.0 }\n')).linear
+    assert held.coordinates == free.coordinates
+    assert held.certificate.rigid_modes == free.certificate.rigid_modes
+    assert np.abs(held.damped_poles() - free.damped_poles()).max() < 1e-9 * np.abs(free.damped_poles()).max()
+
+
+def test_a_machine_held_by_a_force_is_linearised_as_it_is_let_go(written):
+    text = TROLLEY + '\n[equilibrium]\nhold = { "trolley.u" = 0.3 }\ninputs = { push = 2.0 }\n'
+    linear = load_scene(written(text)).linear
+    assert "trolley_0_u" in linear.coordinates
+    assert linear.certificate is None
+
+
 def test_an_equilibrium_that_cannot_be_is_told(written):
     scene = load_scene(written(TROLLEY + "\n[equilibrium]\ninputs = { push = 2.0 }\n"))
     with pytest.raises(EquilibriumError):

@@ -198,3 +198,10 @@ def test_what_cannot_be_a_loop_is_refused():
         open_loop(linear, ct.tf([1, 0, 0], [1]), output="x1")
     with pytest.raises(StructureError, match="one input and one output"):
         open_loop(linear, ct.ss([], [], [], np.eye(2)), output="x1")
+
+
+def test_a_loop_through_which_nothing_comes_back_has_no_crossing():
+    """A push that does not move what is measured: all margins are without end, and no warning says so instead."""
+    found = margins(open_loop(plant([[1.0]], [[0.0]], [[1.0]], [[0.0]]), ct.tf([np.sqrt(2), 1], [1])))
+    assert found.gain_up.margin == np.inf
+    assert found.phase.margin == np.inf
