@@ -398,7 +398,7 @@ class Journey:
             self.mark.stuck = 0
             return after, None
         earlier, slid = [c for c in crossings if c.t < landing.t], after
-        after, landing = self._land(before, after, landing)
+        after, landing = self._landed(before, after, landing)
         brief = 0 <= switch < len(watch.names) and self._brief(before, after, slid, switch)
         self._note(earlier, curve, before)
         watch.settle(after)
@@ -489,12 +489,27 @@ class Journey:
         if crossing.t > self.told:
             self.events.append(self.watch.occurrence(crossing, state, u))
 
+    def _landed(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
+        """Take the step again, to where the first gauge is zero: on a shorter step that may be another one."""
+        for _ in range(_LANDINGS):
+            after, crossing = self._land(before, after, crossing)
+            if after is before:
+                break
+            passed = self.watch.crossings(self.track.curve(before, after), before, after)
+            ends = (c for c in passed if c.gauge != crossing.gauge and self.watch.stops(c.gauge) and not self._over(c))
+            first = next(ends, None)
+            if first is None:
+                break
+            crossing = first
+        return after, crossing
+
     def _land(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
         """Take the step again, to where a gauge is zero; where it is at once, there is none.
 
         Forces may jump at a corner: the step ends just before it, so that one law holds all along.
         """
-        if crossing.gauge >= len(self.watch.events) + len(self.watch.names):
+        corner = crossing.gauge >= len(self.watch.events) + len(self.watch.names)
+        if corner and not self.watch.last_word(crossing.gauge):
             return self._short_of(before, after, crossing)
         t, h, gauge, at = before.state.t, after.state.t - before.state.t, crossing.gauge, crossing.t
         low, high = t, t + h

@@ -45,3 +45,38 @@ def test_a_load_that_swings_by_far_from_the_sheave_goes_on():
     run = fc.simulate(model, until=2.0, start=start, inputs={"torque": -100.0}, method=fc.AdaptiveAlpha())
     assert run.status is fc.Status.FINISHED
     assert run["z"].max() > 5.0
+
+
+def light_load(EA: float) -> fc.Model:
+    """A kilogram on 2 m of rope, hauled in by a light motor: the last piece of rope is stiff beside it."""
+    trolley, load = fc.PointMass("trolley", (0, 0, 10), 1e3), fc.PointMass("load", (0, 0, 8), 1.0)
+    winch = fc.Winch("winch", load.node, trolley.node, EA=EA, radius=0.1, ratio=10.0, inertia=1e-4)
+    outputs = [fc.Velocity("speed", load.node, "z"), fc.Tension("pull", winch), fc.DriveAngle("angle", winch)]
+    structure = fc.Structure(
+        [trolley, load], [fc.Support(trolley.node)], [winch], [fc.MotorTorque("torque", winch)], outputs
+    )
+    return fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.RopeStretch()])
+
+
+@pytest.mark.parametrize(
+    ("EA", "torque", "method"),
+    [
+        (1e5, 0.12, fc.AdaptiveAlpha()),
+        (1e6, 0.15, fc.AdaptiveAlpha()),
+        (1e6, 0.2, fc.AdaptiveAlpha()),
+        (1e5, 0.12, fc.GeneralizedAlpha(1e-2)),
+    ],
+    ids=["1e5, 0.12", "1e6, 0.15", "1e6, 0.2", "alpha"],
+)
+def test_nothing_is_hauled_through_the_sheave(EA, torque, method):
+    """On a rigid rope v² = 2 a s with a = ½ (M R/r − g), for R²J/r² = 1 kg beside the load."""
+    run = fc.simulate(light_load(EA), until=3.0, inputs={"torque": -torque}, method=method)
+    shortest = 1e-4 * 2.0
+    out, way = 2.0 + 0.01 * run["angle"], 10.0 - run.final.x[1, 2]
+    assert run.status is fc.Status.STOPPED
+    assert "the rope of winch is down to its shortest" in run.report.message
+    assert out.min() >= shortest * (1.0 - 1e-6)
+    assert min(out[-1], way) == pytest.approx(shortest, rel=1e-6)
+    assert run["speed"][-1] == pytest.approx((100.0 * torque - 9.81) ** 0.5 * (2.0 - shortest) ** 0.5, rel=0.02)
+    assert run["pull"].max() < 1e3
+    assert run.report.energy_residual < 1e-3
