@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from flexctrl.effects.flexibility import Flexible
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.model import Model
@@ -13,9 +15,14 @@ from flexctrl.structure.structure import Structure
 
 __all__ = ["held_at", "own_coordinate"]
 
+_ROUNDING = 1e-9
+
 
 def held_at(model: Model, hold: Mapping[str, float]) -> dict[str, float]:
-    """Return which coordinates of a model are held where; what its rigid parts take away is left out.
+    """Return which coordinates of a model are held where.
+
+    What rigid parts and shafts take away (a motor's source angle in the rigid twin) is held by the coordinates that
+    it moves with at rest, T q = at, wherever these equations tell them; a motion that they leave free stays free.
 
     Parameters
     ----------
@@ -32,15 +39,42 @@ def held_at(model: Model, hold: Mapping[str, float]) -> dict[str, float]:
     StructureError
         For what the joints do not leave free.
     """
-    found = {}
+    found, lost = {}, {}
     for name, at in hold.items():
-        own = own_coordinate(model, name)
-        if own:
+        if own := own_coordinate(model, name):
             found[own] = at
-        elif not _free(model.structure, name):  # else rigid parts take it away
-            hint = did_you_mean(name, model.coordinates)
-            raise StructureError(f"hold: the machine has no free coordinate {name!r}{hint}")
-    return found
+        else:
+            lost[_raw_place(model, name)] = at
+    return found | _followed(model, lost, found) if lost else found
+
+
+def _followed(model: Model, lost: Mapping[int, float], found: Mapping[str, float]) -> dict[str, float]:
+    """Return the coordinates that raw freedoms tell, by their places, where others are held already."""
+    T = model.motion.jacobian(model.motion.rest)[list(lost)].toarray()
+    own = [model.coordinate(name) for name in found]
+    rest = np.array(list(lost.values())) - T[:, own] @ np.array(list(found.values()), dtype=float)
+    T[:, own] = 0.0
+    alone = ((row, np.flatnonzero(row[:-1])) for row in _reduced(np.column_stack([T, rest])))
+    return {model.coordinates[at[0]]: float(row[-1]) for row, at in alone if at.size == 1}
+
+
+def _reduced(rows: np.ndarray) -> np.ndarray:
+    """Gauss-Jordan: each row solved for the largest of its unknowns, which no other row has; the last column is known.
+
+    What is left of a row that says nothing new is round-off, and zero.
+    """
+    rows, scale = rows.copy(), np.abs(rows[:, :-1]).max(axis=1, initial=0.0)
+    for i in range(len(rows)):
+        pivot = int(np.argmax(np.abs(rows[i, :-1]))) if rows.shape[1] > 1 else 0
+        if abs(rows[i, pivot]) <= _ROUNDING * scale[i]:
+            rows[i] = 0.0
+            continue
+        rows[i] /= rows[i, pivot]
+        others = np.arange(len(rows)) != i
+        rows[others] -= np.outer(rows[others, pivot], rows[i])
+        small = np.abs(rows[:, :-1]) <= _ROUNDING * np.abs(rows[:, :-1]).max(axis=1, keepdims=True, initial=0.0)
+        rows[:, :-1][small] = 0.0
+    return rows
 
 
 def own_coordinate(model: Model, name: str) -> str:
@@ -61,13 +95,21 @@ def own_coordinate(model: Model, name: str) -> str:
     return model.coordinates[number] if number < model.n else ""
 
 
-def _free(structure: Structure, name: str) -> bool:
-    """Whether the joints leave a freedom free, or all that can bend would have a coordinate of that name."""
+def _raw_place(model: Model, name: str) -> int:
+    """Where a freedom that the joints leave free stands in raw vectors, or one that all that can bend would have."""
+    structure = model.structure
     if "." in name:
-        return bool(structure.join_table.rows[_cell(structure, name)[0]][_cell(structure, name)[1]])
-    from flexctrl.model.assemble import assemble  # which holds freedoms itself
+        node, column = _cell(structure, name)
+        if structure.join_table.rows[node][column]:
+            return 6 * node + column
+    else:
+        from flexctrl.model.assemble import assemble  # which holds freedoms itself
 
-    return name in assemble(structure, [Flexible()]).coordinates
+        elastic = assemble(structure, [Flexible()])
+        if name in elastic.coordinates:
+            return int(np.flatnonzero(elastic.motion.cells == elastic.coordinate(name))[0])
+    hint = did_you_mean(name, model.coordinates)
+    raise StructureError(f"hold: the machine has no free coordinate {name!r}{hint}")
 
 
 def _cell(structure: Structure, name: str) -> tuple[int, int]:

@@ -1,0 +1,73 @@
+"""What an equilibrium holds stays held where rigid parts and shafts take its coordinate away."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+WIND = fc.Wind({"load": 1.0}, speed=(10.0, 0.0, 0.0))
+PUSH, WEIGHT = 0.5 * 1.25 * 10.0**2, 50.0 * 9.81
+
+
+def cart(*effects, hold=0.0):
+    """A cart on a geared motor that holds it against the wind on its load."""
+    body, load = fc.PointMass("cart", (0, 0, 0), 100.0), fc.PointMass("load", (0, 0, -2), 50.0)
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -2), EA=1e6, damping=500.0)
+    drive = fc.LinearDrive("travel", body.node, direction="x", radius=0.1, ratio=20.0, stiffness=50.0, inertia=0.01)
+    structure = fc.Structure(
+        [body, rope, load],
+        [fc.Support(body.node, "v w"), fc.Pin(body.node, rope.start), fc.Pin(rope.end, load.node)],
+        [drive],
+        [fc.MotorTorque("torque", drive)],
+        [fc.Position("x", body.node, "x"), fc.SwayAngle("sway", rope.start, rope.end, "x")],
+    )
+    given = [fc.Gravity(), fc.LargeRotation(), WIND, *effects]
+    plan = fc.Simulation(0.1, fc.GeneralizedAlpha(5e-3), start=fc.Start.EQUILIBRIUM)
+    return fc.Scene(fc.planar(structure, "y"), given, simulation=plan, hold={"travel_source": hold})
+
+
+@pytest.mark.parametrize("turned", [0.0, 4.0])
+@pytest.mark.parametrize("effects", [[fc.RopeStretch()], []])
+def test_a_motor_behind_a_rigid_shaft_is_held(effects, turned):
+    """θ_d = R x / r: at 4 rad the cart stands at 20 mm, and the rope hangs in line with wind and weight."""
+    scene = cart(*effects, hold=turned)
+    for rest in (scene.rest, scene.twin_rest):
+        assert rest.outputs["x"] == pytest.approx(turned * 0.1 / 20.0, abs=1e-12)
+        assert abs(math.tan(rest.outputs["sway"])) == pytest.approx(PUSH / WEIGHT, rel=1e-9)
+
+
+def test_the_rigid_twin_of_a_held_machine_is_compared_and_climbed():
+    scene = cart(fc.Flexible())
+    assert np.isfinite([d.rms_difference for d in fc.compare(scene).signals]).all()
+    assert not [r.failure for r in fc.ladder(scene, tolerance=0.1).rungs if r.failure]
+
+
+def test_two_motors_on_a_rigid_girder_hold_its_travel_and_its_turn():
+    """Each moves with both; together they tell both, one alone tells neither and leaves them free."""
+    girder = fc.Beam("girder", (0, 0, 0), (0, 6, 0), fc.Section(1e8, 1e6, 1e6, 1e6, 50.0, 1.0), elements=2)
+    wheels = {"left": girder.node(0), "right": girder.end}
+    drives = [
+        fc.LinearDrive(n, at, direction="x", radius=0.1, ratio=10.0, stiffness=80.0, inertia=0.01)
+        for n, at in wheels.items()
+    ]
+    structure = fc.Structure(
+        [girder],
+        [fc.Support(girder.start, "v w ry"), fc.Support(girder.end, "w")],
+        drives,
+        [fc.Force("push", girder.node(1), "x")],
+        [fc.Position("x", girder.node(1), "x")],
+    )
+    twin = fc.rigid(fc.assemble(structure, [fc.Flexible(), fc.LargeRotation()]))
+
+    def held(**hold):
+        return fc.Scene(structure, hold={f"{n}_source": at for n, at in hold.items()}, rest_inputs={"push": 100.0})
+
+    assert held(left=0.0, right=0.0).twin_rest.outputs["x"] == pytest.approx(0.0, abs=1e-12)
+    assert held(left=1.0, right=1.0).twin_rest.outputs["x"] == pytest.approx(0.01, rel=1e-9)
+    assert len(held(left=0.0, right=0.0).twin_rest.held) == twin.n == 2
+    with pytest.raises(fc.errors.EquilibriumError):
+        _ = held(right=0.0).twin_rest
