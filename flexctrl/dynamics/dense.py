@@ -38,8 +38,8 @@ class Dense(Protocol):
 class Hermite:
     """The cubic through places and rates at both ends, in the coordinates from the start of the step.
 
-    Its error over a step of length h is O(h⁴) in places and O(h³) in rates: no more than that of a method of the
-    second or third order.
+    Its error over a step of length h is O(h⁴) in places and O(h³) in rates: in places no more than that of a method of
+    up to the fourth order, in rates of up to the third.
 
     Attributes
     ----------

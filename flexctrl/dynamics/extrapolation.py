@@ -14,7 +14,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics.alpha import AlphaPoint
-from flexctrl.dynamics.dense import Curve, curves_of
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.run import Tolerance
@@ -82,10 +81,9 @@ class Richardson:
 
 @dataclass(frozen=True)
 class _Point(Point):
-    """A point with those of both runs, that of the finer one half a step before, and the difference of the two."""
+    """A point with those of both runs, and the difference of the two."""
 
     coarse: Point
-    middle: Point
     fine: Point
     gap: np.ndarray
 
@@ -104,7 +102,6 @@ class _Stepper:
     def __post_init__(self) -> None:
         self.yard = 1.0 / yardsticks(self.model)
         self.between = Difference(self.model)
-        self.curves = curves_of(self.model, self.coarse)
 
     @property
     def memory(self) -> tuple[Any, Any]:
@@ -122,7 +119,7 @@ class _Stepper:
     def start(self, state: State, supply: Supply, step: float) -> _Point:
         """Return the point of a state, both runs together."""
         coarse, fine = self.coarse.start(state, supply, step), self.fine.start(state, supply, 0.5 * step)
-        return _Point(fine.state, fine.rate, fine.supply, coarse, fine, fine, np.zeros(self.model.n))
+        return _Point(fine.state, fine.rate, fine.supply, coarse, fine, np.zeros(self.model.n))
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs; the runs stay apart."""
@@ -151,8 +148,7 @@ class _Stepper:
         """Return the point a step later."""
         before = self._spent()
         coarse = self.coarse.step(point.coarse, h)
-        middle = self.fine.step(point.fine, 0.5 * h)
-        fine = self.fine.step(middle, 0.5 * h)
+        fine = self.fine.step(self.fine.step(point.fine, 0.5 * h), 0.5 * h)
         spent = self._spent()
         self.counts.newton += spent[0] - before[0]
         self.counts.factorisations += spent[1] - before[1]
@@ -160,7 +156,7 @@ class _Stepper:
         gap = self.between(coarse.state, fine.state)
         state = self.moved_on(coarse.state, fine.state, gap)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
-        return _Point(state, rate, self._supply(state, coarse, fine), coarse, middle, fine, gap)
+        return _Point(state, rate, self._supply(state, coarse, fine), coarse, fine, gap)
 
     def _spent(self) -> tuple[int, int]:
         a, b = self.coarse.counts, self.fine.counts
@@ -182,10 +178,6 @@ class _Stepper:
         allowed = tolerance.of(farthest(self.model, moved))
         return float((local / allowed).max(initial=0.0))
 
-    def curve(self, before: _Point, after: _Point) -> Curve:
-        """Return the motion over a step."""
-        return _Curve(self, before, after)
-
 
 def _from(stepper: Stepper[Any], run: Point, start: tuple[State, Supply, float]) -> Point:
     """Start a run anew; the method's own accelerations keep their lead on the true ones."""
@@ -194,23 +186,6 @@ def _from(stepper: Stepper[Any], run: Point, start: tuple[State, Supply, float])
     if isinstance(fresh, AlphaPoint) and isinstance(run, AlphaPoint):
         return replace(fresh, algorithmic=fresh.rate + run.algorithmic - run.rate)
     return fresh
-
-
-@dataclass(frozen=True, eq=False)
-class _Curve:
-    """The motions of both runs, extrapolated at every time."""
-
-    stepper: _Stepper
-    before: _Point
-    after: _Point
-
-    def at(self, t: float) -> State:
-        """Return the state at a time of the step."""
-        s, before, after = self.stepper, self.before, self.after
-        first = t <= after.middle.state.t
-        ends = (before.fine, after.middle) if first else (after.middle, after.fine)
-        coarse, fine = s.curves(before.coarse, after.coarse).at(t), s.curves(*ends).at(t)
-        return s.moved_on(coarse, fine, s.between(coarse, fine))
 
 
 @dataclass(frozen=True, eq=False)

@@ -239,6 +239,8 @@ class Run:
     def at(self, t: float) -> Moment:
         """Return the run at any time of it, interpolated between steps to the order of the method.
 
+        Rates between steps of `Richardson` are of the third order, its places of the fourth as they are at steps.
+
         Parameters
         ----------
         t : float

@@ -161,3 +161,28 @@ def test_between_steps_the_error_falls_as_at_them(method):
     rates = [np.abs(state.v - reference.v).max() for state in found]
     assert np.log2(places[0] / places[2]) == pytest.approx(4.0, abs=0.6)
     assert np.log2(rates[0] / rates[2]) > 3.3
+
+
+@pytest.mark.parametrize("method", [lambda h: fc.GeneralizedAlpha(h, rho=1.0), fc.ConservingMidpoint])
+def test_between_steps_extrapolation_keeps_its_order(method):
+    """A mass on a spring: places between steps are of the fourth order, and no worse than at the steps; rates third."""
+    spring = fc.Spring("spring", (0, 0, 0), (0.3, 0.4, -1.0), stiffness=40.0, length=1.25**0.5)
+    mass = fc.PointMass("mass", spring.end, 1.0)
+    seen = [kind(f"{kind.__name__}_{axis}", mass.node, axis) for kind in (fc.Position, fc.Velocity) for axis in "xyz"]
+    structure = fc.Structure(
+        [spring, mass], [fc.Support(spring.start, "u v w"), fc.Pin(spring.end, mass.node)], outputs=seen
+    )
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation()])
+    start, fine = model.rest.with_(v=np.array([1.0, -0.5, 0.3])), 1.0 / 800.0
+    exact = fc.simulate(
+        model, until=0.5, start=start, method=fc.ExplicitRungeKutta(), tolerance=fc.Tolerance(0.0, 1e-13), every=fine
+    )
+    found = []
+    for h in (0.01, 0.005):
+        run = fc.simulate(model, until=0.5, start=start, method=fc.Richardson(method(h)), every=fine)
+        off = np.abs(run.y - exact.y)
+        found.append((off[:, :3].max(), off[:, 3:].max()))
+        assert off[:, :3].max() < 1.1 * off[:: round(h / fine), :3].max()
+    (places, rates), (closer, slower) = found
+    assert np.log2(places / closer) > 3.9
+    assert np.log2(rates / slower) > 2.9
