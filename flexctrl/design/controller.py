@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -333,7 +334,21 @@ def _realised(transfer: Any) -> Any:
         ) from error
 
 
+def _check_sample_time(candidate: Any) -> None:
+    given = getattr(candidate, "sample_time", 0.0)
+    try:
+        known = 0.0 <= float(given) < math.inf
+    except (TypeError, ValueError):
+        known = False
+    if not known:
+        raise ControllerError(
+            f"controller {type(candidate).__name__}: sample_time = {given!r}; expected the time between its "
+            "samples [s], or 0 (or no sample_time at all) for a continuous controller"
+        )
+
+
 def _from_object(candidate: Any) -> Controller:
+    _check_sample_time(candidate)
     if all(hasattr(candidate, name) for name in _PARTS):  # what isinstance asks, ten times quicker
         return cast(Controller, candidate)
     missing = [m for m in ("inputs", "outputs", "initial", "command") if not hasattr(candidate, m)]

@@ -187,6 +187,8 @@ class Feed:
 
     def _total(self, command: Any) -> list[float]:
         u = self._base.copy()
+        if command is None:
+            raise CommandError("the controller's command is None; return a number for each output (a missing return?)")
         column = type(command) is np.ndarray and command.ndim == 1 and command.dtype is FLOAT
         values = command.tolist() if column else _reals(command, "command").ravel().tolist()
         writes = self.writes

@@ -60,7 +60,8 @@ def simulate(
     until : float
         End [s].
     start : State, Rest or Checkpoint, optional
-        Where to begin; default: the shape as drawn, at rest. A `Rest` brings its constant inputs along. From a
+        Where to begin; default: the shape as drawn, at rest. A `Rest` brings its constant inputs along. The clock of
+        a run from these begins at 0, whatever the ``t`` of the state; only a `Checkpoint` brings its time along. From a
         `Checkpoint` the run goes on as if it had not been stopped, bit for bit; model, controller, method,
         tolerance, events and ``every`` must be those of the run it was taken from.
     inputs : mapping of str to float, optional
@@ -84,8 +85,8 @@ def simulate(
     Returns
     -------
     Run
-        Whatever happens: a step that fails, an exception in the controller and Ctrl-C end the run with their status,
-        and all that was computed until then.
+        Whatever happens once it has begun: a step that fails, an exception in the controller and Ctrl-C end the run
+        with their status, and all that was computed until then.
 
     Raises
     ------
@@ -93,7 +94,8 @@ def simulate(
         For an argument of another kind, an end that is not positive or before the checkpoint, an unknown input, a
         start that the machine cannot be in (see `project`), or a checkpoint of another run.
     ControllerError
-        If the controller's names are not the model's.
+        If the controller's names are not the model's, or if it fails when it is first asked, before there is a run: it
+        raises an exception (the cause of this one), or commands what is no column of finite numbers.
     MechanismError
         If a freedom has neither mass nor stiffness.
     """
