@@ -34,7 +34,7 @@ def _quasistatic(model: Model) -> np.ndarray:
     seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     stiffness, damping, mass = (np.abs(model.slope(model.rest, zero, zero, seed, u).diagonal()) for seed in seeds)
     light = (mass <= model.dust) & (damping <= model.forces.rounding((0.0, 1.0, 0.0)))
-    light[model.motion.inner] = False
+    light[np.setdiff1d(model.motion.inner, model.n)] = False
     return np.flatnonzero(light & (stiffness > 0.0))
 
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeGuard
 
+import numpy as np
+
 from flexctrl.effects.effect import Inner
 from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.errors import StructureError
@@ -13,9 +15,11 @@ from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import check_finite
+from flexctrl.structure.planes import held_across
 from flexctrl.structure.structure import Structure
 
 _MOST = 10
+_ALONG = 1e-9
 
 
 @dataclass(frozen=True, init=False)
@@ -25,7 +29,8 @@ class ComponentModes(BeamFlexibility):
     Static shapes of the ends and the first modes of the clamped element are the Craig–Bampton basis (Craig & Bampton
     1968) on the element's moving frame. v(x) = N(x) d + Σ φᵢ(x) ηᵢ in each plane of bending; the amplitudes ηᵢ [m]
     are freedoms named ``<beam>_<element>_y1`` (along the element's y), ``…_z1`` and so on. Weight, inertia, tension
-    and damping act on the axis as the modes bend it. Stretch and torsion stay linear along an element.
+    and damping act on the axis as the modes bend it. Stretch and torsion stay linear along an element. A beam held in
+    a plane (`planar`) has only the modes in it.
 
     It takes the place of `BeamFlexibility` on the beams it names; see `flexctrl.coarsen` for a mesh that goes with it.
 
@@ -39,8 +44,8 @@ class ComponentModes(BeamFlexibility):
     Raises
     ------
     StructureError
-        For a count that is no whole number from 0 to 10; by `assemble`, for a beam whose section shears or couples
-        (more elements do for these).
+        For a count that is no whole number from 0 to 10; by `assemble`, for a beam whose section shears or couples, or
+        whose section's axes are askew to the plane in which it is held (more elements do for these).
     """
 
     count: int = 3
@@ -53,20 +58,26 @@ class ComponentModes(BeamFlexibility):
         object.__setattr__(self, "count", int(found))
 
     def check_on(self, structure: Structure) -> None:
-        """Refuse sections that shear."""
+        """Refuse sections that shear, or lie askew to a plane that holds their beam."""
         for part in structure.elements:
-            if isinstance(part, Beam) and self.bends(part) and part.section.shears:
+            if not self.modes(part):
+                continue
+            if part.section.shears:
                 raise StructureError(
                     f"ComponentModes: the section of beam {part.name!r} shears or couples, for which there are no "
                     f"component modes; name the other beams (of=…) and give {part.name!r} more elements"
                 )
+            if np.any(np.abs(_across(structure, part) - 0.5) < 0.5 - _ALONG):
+                raise StructureError(
+                    f"ComponentModes: beam {part.name!r} is held in a plane to which its section lies askew, and modes "
+                    "along its own axes lead out of that; give it an up in the plane or across it, or more elements"
+                )
 
     def inner(self, structure: Structure) -> tuple[Inner, ...]:
-        """Amplitudes of every element, along y and then along z."""
+        """Amplitudes of every element, along y and then along z; those that a plane holds have no name."""
         return tuple(
-            Inner(f"{part.name}_{element}_{axis}{mode}", part.length, order=2)
-            for part in structure.elements
-            if self.modes(part)
+            Inner(f"{part.name}_{element}_{axis}{mode}" if axis in free else "", part.length, order=2)
+            for part, free in ((p, _free(structure, p)) for p in structure.elements if self.modes(p))
             for element in range(part.elements)
             for axis in "yz"
             for mode in range(1, self.count + 1)
@@ -84,3 +95,14 @@ class ComponentModes(BeamFlexibility):
         bool
         """
         return self.count > 0 and isinstance(part, Beam) and self.bends(part)
+
+
+def _free(structure: Structure, beam: Beam) -> str:
+    """Local axes of a beam along which it is not held in a plane."""
+    return "".join(axis for axis, share in zip("yz", _across(structure, beam), strict=True) if share < 0.5)
+
+
+def _across(structure: Structure, beam: Beam) -> np.ndarray:
+    """How much of the section's y and z leads out of a plane in which the beam is held, 0 to 1."""
+    held = [f for f in held_across(structure, beam) if f < 3]
+    return np.linalg.norm(beam.axes[held, 1:], axis=0)

@@ -24,7 +24,7 @@ class Inner:
     Attributes
     ----------
     name : str
-        Of its coordinate; empty for one that has only a phase (it sticks or slides).
+        Of its coordinate; empty for one that has only a phase (it sticks or slides), or is held.
     scale : float
         What an error of 1 is in it; infinite where the motion that it brings about is judged instead.
     frozen : bool

@@ -65,6 +65,11 @@ class Support:
         return f"Support of {self.node}"
 
 
+@dataclass(frozen=True, init=False)
+class InPlane(Support):
+    """What `planar` holds of a node. On all nodes of a beam it holds what is between them too, on any mesh."""
+
+
 @dataclass(frozen=True)
 class Weld:
     """Rigid bond: all freedoms of both nodes are the same; it bears forces and moments in all directions.
@@ -234,4 +239,4 @@ def main_axis(direction: Vector) -> int:
 Joint: TypeAlias = Support | Weld | Pin | Hinge | Slide
 """Any joint; each has ``nodes``."""
 
-__all__ = ["Hinge", "Joint", "Pin", "Slide", "Support", "Weld", "main_axis"]
+__all__ = ["Hinge", "InPlane", "Joint", "Pin", "Slide", "Support", "Weld", "main_axis"]

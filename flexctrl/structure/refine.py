@@ -9,10 +9,12 @@ from typing import Any, TypeVar
 
 from flexctrl.errors import StructureError, check_kind, did_you_mean, shortened
 from flexctrl.structure.beams import Beam
-from flexctrl.structure.freedoms import check_whole, listed
+from flexctrl.structure.freedoms import FREEDOMS, check_whole, listed
 from flexctrl.structure.join_table import JoinTable
+from flexctrl.structure.joints import InPlane, Joint
 from flexctrl.structure.lines import Rope
 from flexctrl.structure.nodes import Node
+from flexctrl.structure.planes import held_across
 from flexctrl.structure.structure import Structure
 
 T = TypeVar("T")
@@ -21,7 +23,8 @@ T = TypeVar("T")
 def refine(structure: Structure, factor: int) -> Structure:
     """Return a structure whose beams and ropes have ``factor`` times as many elements.
 
-    Joints, drives, signals stay where they are: node i of a beam becomes node ``factor``·i.
+    Joints, drives, signals stay where they are: node i of a beam becomes node ``factor``·i. A plane in which all nodes
+    of a beam are held (`planar`) holds those of the new mesh.
 
     Parameters
     ----------
@@ -49,8 +52,9 @@ def refine(structure: Structure, factor: int) -> Structure:
 def coarsen(structure: Structure, of: Sequence[str] = ()) -> Structure:
     """Return a structure whose beams have as few elements as the nodes in use allow.
 
-    A node is in use if something is joined to it, held, driven, loaded or measured there. Elements of a beam stay of
-    one length, so that nodes in use at 2 and 6 of 8 elements leave 4. For `ComponentModes`, which needs few.
+    A node is in use if something is joined to it, held, driven, loaded or measured there; a plane in which all nodes of
+    a beam are held (`planar`) takes none, and holds those of the new mesh. Elements of a beam stay of one length, so
+    that nodes in use at 2 and 6 of 8 elements leave 4. For `ComponentModes`, which needs few.
 
     Parameters
     ----------
@@ -90,7 +94,14 @@ def _beams(structure: Structure) -> list[Beam]:
 
 def _users(structure: Structure) -> tuple[Any, ...]:
     others = [e for e in structure.elements if not isinstance(e, Beam)]
-    return others, structure.joints, structure.drives, structure.inputs, structure.outputs
+    return others, _joints(structure), structure.drives, structure.inputs, structure.outputs
+
+
+def _joints(structure: Structure) -> list[Joint]:
+    """The joints without what a plane holds within beams."""
+    assert not isinstance(structure.joints, JoinTable)
+    within = {(b.name, i) for b in _beams(structure) if held_across(structure, b) for i in range(1, b.elements)}
+    return [j for j in structure.joints if not (isinstance(j, InPlane) and (j.node.part, j.node.index) in within)]
 
 
 def _nodes_in(value: Any) -> Iterator[Node]:
@@ -125,10 +136,11 @@ def _meshed(structure: Structure, elements: Mapping[str, int]) -> Structure:
             return node
         return new[node.part].node(node.index * new[node.part].elements // old[node.part].elements)
 
-    assert not isinstance(structure.joints, JoinTable)
+    within = [(n, held_across(structure, b)) for b in old.values() for n in new.get(b.name, b).nodes[1:-1]]
+    planes = [InPlane(n, [FREEDOMS[f] for f in sorted(held)]) for n, held in within if held]
     return structure.with_(
         elements=[new.get(e.name) or e for e in structure.elements],
-        joints=[with_nodes(j, moved) for j in structure.joints],
+        joints=[*(with_nodes(j, moved) for j in _joints(structure)), *planes],
         drives=[with_nodes(d, moved) for d in structure.drives],
         inputs=[with_nodes(i, moved) for i in structure.inputs],
         outputs=[with_nodes(o, moved) for o in structure.outputs],

@@ -15,7 +15,7 @@ from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import FREEDOMS, TRAVEL, check_name, listed, parse_direction
 from flexctrl.structure.join_table import JoinTable, join
-from flexctrl.structure.joints import Joint, Support, main_axis
+from flexctrl.structure.joints import InPlane, Joint, main_axis
 from flexctrl.structure.nodes import Node, check_node
 from flexctrl.structure.relations import Group, Track
 from flexctrl.structure.signals import Input, Output
@@ -235,7 +235,7 @@ def planar(structure: Structure, normal: str = "z") -> Structure:
         raise StructureError("planar: the joints are a JoinTable; give its rows with columns='u v θz' instead")
     kept = {(axis + 1) % 3, (axis + 2) % 3, 3 + axis}
     across = [(node, node.freedoms - kept) for node in structure.nodes if node.freedoms != TRAVEL]
-    supports = [Support(node, [FREEDOMS[f] for f in sorted(held)]) for node, held in across]
+    supports = [InPlane(node, [FREEDOMS[f] for f in sorted(held)]) for node, held in across]
     return structure.with_(joints=(*structure.joints, *supports))
 
 

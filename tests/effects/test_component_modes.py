@@ -187,3 +187,59 @@ def test_every_method_of_integration_takes_modes(name):
     assert run.status is fc.Status.FINISHED
     assert run.y[-1] == pytest.approx(exact.y[-1], abs=3e-4)
     assert run.report.energy_residual < 1e-3
+
+
+def arm(elements=8, up=None):
+    """A soft arm that hangs from a hinge, pushed within the plane across y."""
+    rod = fc.Beam("rod", (0, 0, 0), (1, 0, 0), SOFT, elements=elements, up=up)
+    mass = fc.PointMass("mass", rod.end, 0.2)
+    return fc.Structure(
+        [rod, mass],
+        [fc.Support(rod.start, "u v w rx rz"), fc.Pin(rod.end, mass.node)],
+        inputs=[fc.Force("push", rod.end, "z")],
+        outputs=[fc.Position(axis, rod.end, axis) for axis in "xz"],
+    )
+
+
+SOFT = fc.Section(EA=1e4, EI_y=2.0, EI_z=3.0, GJ=2.0, rhoA=1.0, rhoJ=1e-3)
+
+
+def test_a_plane_stays_on_every_mesh():
+    flat = fc.planar(arm(), "y")
+    for mesh, elements in (
+        (fc.coarsen(flat), 1),
+        (flat, 8),
+        (fc.refine(flat, 2), 16),
+        (fc.coarsen(fc.refine(flat, 2)), 1),
+    ):
+        assert mesh.elements[0].elements == elements
+        assert all(name.endswith(("_u", "_w", "_ry")) for name in model(mesh, fc.Flexible()).coordinates)
+        assert model(mesh, fc.Flexible()).n == 3 * elements + 1
+
+
+def test_supports_of_single_nodes_are_in_use_within_a_plane_too():
+    """What holds a node beside the plane takes it into use, and so does what holds every node one by one."""
+    s = fc.planar(arm(), "y")
+    rod = s.elements[0]
+    assert fc.coarsen(s.with_(joints=[*s.joints, fc.Support(rod.node(2), "w")])).elements[0].elements == 4
+    sleepers = arm().with_(joints=[*arm().joints, *(fc.Support(n, "v") for n in rod.nodes)])
+    assert fc.coarsen(sleepers).elements[0].elements == 8
+
+
+@pytest.mark.parametrize("backend", [fc.CasadiVM(), None])
+def test_a_plane_keeps_only_the_modes_in_it(backend):
+    """It swings as in space, where nothing pushes it out of the plane."""
+    space = fc.coarsen(arm())
+    machines = [model(s, fc.Gravity(), fc.ComponentModes(2), backend=backend) for s in (space, fc.planar(space, "y"))]
+    assert machines[1].coordinates == ("rod_0_ry", "rod_1_u", "rod_1_w", "rod_1_ry", "rod_0_z1", "rod_0_z2")
+    runs = [fc.simulate(m, until=0.3, inputs={"push": 2.0}, method=fc.GeneralizedAlpha(2e-3)) for m in machines]
+    assert runs[1].y == pytest.approx(runs[0].y, abs=1e-6)
+    own = [machines[0].coordinates.index(name) for name in machines[1].coordinates]
+    for matrix in ("mass", "stiffness"):
+        whole, flat = (getattr(m, matrix)().toarray() for m in machines)
+        assert np.array_equal(whole[np.ix_(own, own)], flat)
+
+
+def test_modes_askew_to_the_plane_are_refused():
+    with pytest.raises(StructureError, match="'rod' is held in a plane to which its section lies askew"):
+        model(fc.planar(arm(1, up=(0, 1, 1)), "y"), fc.ComponentModes(1))
