@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import NamedTuple
 
@@ -33,15 +33,18 @@ class Reference:
     setting : Setting
     agreement : mapping of str to float
         How far it is from a coarser mesh, from longer steps and from another integrator: largest change of an
-        output over its magnitude.
+        output over its magnitude; infinite from a run that ended early.
     refined : tuple of str
         What the disagreements were over which it was refined, in turn.
+    ended : mapping of str to str
+        Why runs that it was held against ended early.
     """
 
     run: Curves
     setting: Setting
     agreement: dict[str, float]
     refined: tuple[str, ...] = ()
+    ended: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def uncertainty(self) -> float:
@@ -111,7 +114,7 @@ def certified(
     Raises
     ------
     FlexctrlError
-        If a run fails or they do not agree; says by how much.
+        If the finest run fails, or the others do or disagree however it is refined; says why or by how much.
     """
     refined: tuple[str, ...] = ()
     traced = cache(run or (lambda setting: trace(scene, setting)))
@@ -121,6 +124,11 @@ def certified(
             return reference
         worst = max(reference.agreement, key=lambda name: reference.agreement[name])
         refined = (*refined, worst)
+    if worst in reference.ended:
+        raise FlexctrlError(
+            f"{scene.name}: the reference ({reference.setting}) was refined {_REFINEMENTS - 1} times, and {worst} to "
+            f"hold it against still fails: {reference.ended[worst]}"
+        )
     raise FlexctrlError(
         f"{scene.name}: the reference ({reference.setting}) is {reference.uncertainty:.2g} from {worst}, more than a "
         f"third of the tolerance {tolerance:g}; give settings with finer meshes or shorter steps, or a larger tolerance"
@@ -162,8 +170,13 @@ def _reference(traced: Callable[[Setting], Traced], finest: Setting, refined: tu
         "longer steps": _longer(finest),
         "another integrator": _other(finest, run),
     }
-    agreement = {name: error_of(run.curves, traced(s).curves) for name, s in others.items()}
-    return Reference(run.curves, finest, agreement, refined)
+    agreement, ended = {}, {}
+    for name, setting in others.items():
+        try:
+            agreement[name] = error_of(run.curves, traced(setting).curves)
+        except FlexctrlError as failure:  # too coarse for the scene: refined as one that disagrees
+            agreement[name], ended[name] = math.inf, str(failure)
+    return Reference(run.curves, finest, agreement, refined, ended)
 
 
 def _shorter(setting: Setting) -> Setting:

@@ -13,8 +13,9 @@ from flexctrl.errors import FlexctrlError, SceneError, StructureError
 from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
 from flexctrl.study import tryouts
+from flexctrl.study.answers import Curves
 from flexctrl.study.held_out import load_cases
-from flexctrl.study.reference import trace
+from flexctrl.study.reference import Traced, certified, trace
 from flexctrl.study.settings import Fidelity, around, sweep
 from flexctrl.study.store import Point, Store, fingerprint
 
@@ -439,6 +440,26 @@ def test_held_out_cases_scale_the_commanded_move(scene):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("limit", [1e-2, 1e-9])
+def test_a_run_that_the_reference_is_held_against_may_need_shorter_steps(scene, limit):
+    """Fixed steps of 20 ms end early where controlled ones do not: the reference is refined until they hold."""
+
+    def run(setting):
+        steps = round(50 * (1e-5 / setting.tolerance.relative))
+        if isinstance(setting.method, fc.GeneralizedAlpha) and setting.method.step > limit:
+            raise FlexctrlError("the run ended early: take shorter steps")
+        return Traced(Curves(np.array([0.0, 1.0]), ("x",), np.array([[0.0], [1.0]]), np.zeros(1)), steps)
+
+    settings = [fc.Setting(fc.Fidelity.FULL, 1, fc.AdaptiveAlpha(), fc.Tolerance(1e-4, 1e-7))]
+    if limit < 1e-6:
+        with pytest.raises(FlexctrlError, match=r"another integrator to hold it against still fails: .* shorter steps"):
+            certified(scene, settings, 0.1, run)
+    else:
+        found = certified(scene, settings, 0.1, run)
+        assert found.refined == ("another integrator",)
+        assert found.uncertainty == 0.0
+
+
 def test_a_scene_that_cannot_be_certified_says_so(scene):
     with pytest.raises(FlexctrlError, match=r"the reference .* more than a third"):
         fc.work_precision(scene, 1e-14, settings=settings(scene)[-1:])
