@@ -294,9 +294,23 @@ def test_progress_is_shown_on_a_terminal_and_wiped_away(monkeypatch, capsys):
     assert shown.endswith("\r\033[K")
 
 
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        (["ledgr", "x.toml"], "did you mean 'ledger'?"),
+        (["cost", "x.toml", "--tolerence", "0.1"], "did you mean '--tolerance'?"),
+    ],
+)
+def test_a_slip_of_the_pen_is_asked_about(typed, meant, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(typed)
+    assert stopped.value.code == 2
+    assert meant in capsys.readouterr().err
+
+
 def test_a_reader_that_leaves_early_is_no_error(scene):
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-m", "flexctrl.cli", "table", str(scene)]
+    command = [sys.executable, "-m", "flexctrl", "table", str(scene)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
         process.stdout.close()
         assert process.stderr.read() == b""

@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import flexctrl
-from flexctrl.errors import FlexctrlError, MechanismError
+from flexctrl.errors import FlexctrlError, MechanismError, did_you_mean
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -178,8 +180,19 @@ def _complain(problem: object, code: int) -> int:
     return code
 
 
+class _Parser(argparse.ArgumentParser):
+    """One that asks whether another word was meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong, and how to go on."""
+        said = re.search(r"invalid choice: '(\S+)'|unrecognized arguments: (--[\w-]+)", message)
+        known = [*COMMANDS, *(f"--{name}" for name in (*_OPTIONS, "out", "json", "version"))]
+        hint = did_you_mean(said[1] or said[2], known) if said else ""
+        super().error(message + (hint if "did you mean" in hint else ""))
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="flexctrl",
         description="Flexible machines and their controllers, from one scene file.",
         epilog="example: flexctrl run examples/ceiling_crane.toml --out results",

@@ -85,7 +85,8 @@ EFFECTS: dict[str, Kind] = {
 }
 """Effects by the name they have in a scene file."""
 
-_WITHIN = Kind(Automatic.within, dict.fromkeys(("outputs", "poles", "margins"), positive))
+_ANSWERS = ("outputs", "poles", "margins")
+_WITHIN = Kind(Automatic.within, dict.fromkeys(_ANSWERS, positive))
 _THROUGH = Kind(RayleighDamping.through, dict.fromkeys(("zeta", "omega1", "omega2"), positive))
 
 
@@ -125,7 +126,7 @@ def _effect(name: str, value: Any, place: Place) -> Effect:
 
 def _kind(name: str, value: Mapping[str, Any]) -> Kind:
     """How the parameters of an effect are told, where there is more than one way."""
-    if name == "automatic" and "tolerance" not in value:
+    if name == "automatic" and any(key in value for key in _ANSWERS):
         return _WITHIN
     return _THROUGH if name == "rayleigh_damping" and "zeta" in value else EFFECTS[name]
 

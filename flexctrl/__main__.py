@@ -1,4 +1,4 @@
-"""``python -m flexctrl.cli``."""
+"""``python -m flexctrl``."""
 
 from __future__ import annotations
 
