@@ -96,6 +96,16 @@ def test_table_holds_the_join_table_and_the_audit(told):
     assert data["notes"] == ["made up"]
 
 
+def test_the_table_tells_freedoms_that_effects_add(call, tmp_path):
+    """Ropes with mass have nodes of their own, which are not the structure's."""
+    text = TROLLEY.replace("EA = 2e5 }", "EA = 2e5, rhoA = 1.0, elements = 3 }")
+    text = text.replace("gravity = true", "gravity = true\nrope_mass = true")
+    (tmp_path / "heavy.toml").write_text(text, encoding="utf-8")
+    code, out, _ = call("table", tmp_path / "heavy.toml")
+    assert code == 0
+    assert "trolley: 4 degrees of freedom in the join table, 10 under the scene's effects" in out
+
+
 def test_bode_gives_margins_and_poles_of_both(told):
     data = told("bode")
     assert (data["input"], data["output"]) == ("torque", "travel")

@@ -54,7 +54,8 @@ def answer(request: Request) -> Answer:
     )
     heads = ("element", "kind", "nodes", "length (m)", "mass (kg)")
     parts = grid(heads, [tuple(row.values()) for row in elements], left=2)
-    text = "\n\n".join([f"{scene.name}: {table.free} degrees of freedom", str(table), parts, str(audit)])
+    effects = "" if table.free == scene.model.n else f" in the join table, {scene.model.n} under the scene's effects"
+    text = "\n\n".join([f"{scene.name}: {table.free} degrees of freedom{effects}", str(table), parts, str(audit)])
     notes = "".join(f"\nnote: {note}" for note in data["notes"])
     return Answer(text + notes, data)
 
