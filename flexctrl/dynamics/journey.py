@@ -399,6 +399,7 @@ class Journey:
             return after, None
         earlier, slid = [c for c in crossings if c.t < landing.t], after
         after, landing = self._landed(before, after, landing)
+        switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
         brief = 0 <= switch < len(watch.names) and self._brief(before, after, slid, switch)
         self._note(earlier, curve, before)
         watch.settle(after)

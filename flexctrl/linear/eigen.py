@@ -96,7 +96,7 @@ def complete_pairs(
     top = float(np.abs(lam).max())
     if top > SHORT_SPAN * np.abs(lam).min():
         shifted, lowest = _scouted(pencil, phi, SCOUTS)
-        low = int(np.count_nonzero(lam <= np.sqrt(top * lowest)))
+        low = int(np.count_nonzero(lam <= np.sqrt(top * max(lowest, 0.0))))
         lam[:low], phi[:, :low] = shifted.ritz(phi[:, :low])
     else:
         shifted = pencil.below_all(-max(top, 1.0))

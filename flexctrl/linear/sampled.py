@@ -19,6 +19,7 @@ TOGETHER = 3
 SAMPLES = 8
 FEW = 24
 MOST_COLUMNS = 400
+_ROUNDING = 1e-9
 
 Evaluator: TypeAlias = "Callable[[np.ndarray], np.ndarray]"
 
@@ -71,6 +72,11 @@ def _through(base: Scaled, inputs: np.ndarray) -> Scaled:
     return replace(base, model=replace(model, B=model.B[:, inputs], D=model.D[:, inputs], inputs=names))
 
 
+def _touched(rows: np.ndarray, rigid: np.ndarray) -> bool:
+    """Tell whether free motion is seen by some row, or pushed, beyond the rounding of its shapes."""
+    return bool((np.abs(rows @ rigid) > _ROUNDING * (np.abs(rows) @ np.abs(rigid))).any())
+
+
 def _with_rest(base: Scaled, modes: Modes, evaluate: Evaluator, s: np.ndarray) -> np.ndarray:
     """The values, at s = 0 those of the expansion there: finite where free motion is not pushed or not seen."""
     from flexctrl.linear.reduction.low_frequency import low_frequency  # its package needs responses
@@ -80,7 +86,7 @@ def _with_rest(base: Scaled, modes: Modes, evaluate: Evaluator, s: np.ndarray) -
         return evaluate(s)
     rigid = modes.shapes[:, modes.unstable : modes.unstable + modes.rigid] / base.scales[:, None]
     model = base.model
-    if (model.Cq @ rigid).any() and (rigid.T @ model.B).any():
+    if _touched(model.Cq, rigid) and _touched(model.B.T, rigid):
         raise infinite(0.0, "the model")
     values = np.empty((*model.D.shape, s.size), dtype=complex)
     values[..., ~still] = evaluate(s[~still])

@@ -171,10 +171,10 @@ class Ledger:
         heads = ("outputs", "poles", "of pole", "margins", "time", "states", "nonzeros")
         lines = [f"{'without':<{wide}}" + "".join(f"  {head:>{_width(head)}}" for head in heads)]
         lines += [self._line(e, wide) for e in self.entries]
+        lines.append(f"time: of a run without it over that of the full scene, known to {_percent(self.noise)}")
         kept = ", ".join(self.minimal_set) or "nothing"
         size = f"{self.minimal_size.states} of {self.size.states} states"
         lines += [f"kept: {kept}", f"{self.changes} (asked: {self.within}), {self.pace}, {size}{self._way}"]
-        lines.append(f"time: of a run without it over that of the full scene, known to {_percent(self.noise)}")
         if all(e.keep for e in self.entries):
             lines.append("the full set: no smaller one keeps the answer and is as fast")
         return "\n".join(lines)

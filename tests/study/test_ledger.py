@@ -17,9 +17,9 @@ from flexctrl.study.ledger import Size
 from flexctrl.study.omissions import omissions
 
 
-def trolley(**changes) -> fc.Scene:
-    content = tomllib.loads(TROLLEY)
-    content["simulation"] |= {"until": 0.1, "step": 5e-3}
+def trolley(text=TROLLEY, until=0.1, **changes) -> fc.Scene:
+    content = tomllib.loads(text)
+    content["simulation"] |= {"until": until, "step": 5e-3}
     content["effects"] |= changes.pop("effects", {})
     return scene_from(content | changes, Place("trolley.toml"), "trolley")
 
@@ -32,6 +32,17 @@ def scene():
 @pytest.fixture(scope="module")
 def drawn_up(scene):
     return fc.ledger(scene, 0.01)
+
+
+@pytest.fixture(scope="module")
+def longer():
+    """Long enough for exact integration to pay by the clock, on a busy machine too; and a short way."""
+    return trolley(TROLLEY.replace("distance = 0.5", "distance = 0.005"), until=2.0)
+
+
+@pytest.fixture(scope="module")
+def drawn_up_longer(longer):
+    return fc.ledger(longer, 0.01)
 
 
 def test_every_effect_has_a_line(drawn_up):
@@ -123,19 +134,19 @@ def omission(scene, name):
     return next(o for o in omissions(scene.with_(controller=scene.law)) if o.name == name).without(scene)
 
 
-def test_a_linear_minimal_set_is_integrated_exactly_with_no_more_modes_than_it_needs(scene, drawn_up):
+def test_a_linear_minimal_set_is_integrated_exactly_with_no_more_modes_than_it_needs(longer, drawn_up_longer):
     """Half as many would not do; poles and margins are the machine's own."""
-    method = drawn_up.scene.simulation.method
-    assert "large_rotation" not in drawn_up.minimal_set
+    method = drawn_up_longer.scene.simulation.method
+    assert "large_rotation" not in drawn_up_longer.minimal_set
     assert isinstance(method, fc.Exact)
-    assert "integrated exactly" in str(drawn_up)
+    assert "integrated exactly" in str(drawn_up_longer)
     for fewer in (1, 2):
-        if drawn_up.modes is None or fewer < drawn_up.modes:
-            plan = replace(drawn_up.scene.simulation, method=replace(method, modes=fewer))
-            apart = outputs_apart(drawn_up.full.run, drawn_up.scene.with_(simulation=plan).run())
+        if drawn_up_longer.modes is None or fewer < drawn_up_longer.modes:
+            plan = replace(drawn_up_longer.scene.simulation, method=replace(method, modes=fewer))
+            apart = outputs_apart(drawn_up_longer.full.run, drawn_up_longer.scene.with_(simulation=plan).run())
             assert max(apart.values()) > 0.01
-    assert drawn_up.minimal_change.outputs_worst <= 0.01
-    strict = fc.ledger(scene, 1e-9)
+    assert drawn_up_longer.minimal_change.outputs_worst <= 0.01
+    strict = fc.ledger(longer, 1e-9)
     assert strict.modes is None
     assert "exactly" not in str(strict)
 
@@ -323,9 +334,9 @@ def test_what_cannot_be_left_out_is_kept_with_the_reason():
 
 
 @pytest.mark.slow
-def test_automatic_picks_the_minimal_set(scene, drawn_up):
-    chosen = scene.with_(effects=[*scene.effects, fc.Automatic(0.01)])
-    assert chosen.settled.effects == drawn_up.scene.effects
-    assert chosen.settled.simulation == replace(scene.simulation, method=drawn_up.scene.simulation.method)
-    assert scene.settled is scene
-    assert chosen.model.effects == scene.model.effects  # by itself it adds nothing
+def test_automatic_picks_the_minimal_set(longer, drawn_up_longer):
+    chosen = longer.with_(effects=[*longer.effects, fc.Automatic(0.01)])
+    assert chosen.settled.effects == drawn_up_longer.scene.effects
+    assert chosen.settled.simulation == replace(longer.simulation, method=drawn_up_longer.scene.simulation.method)
+    assert longer.settled is longer
+    assert chosen.model.effects == longer.model.effects  # by itself it adds nothing
