@@ -84,7 +84,7 @@ def test_every_level_with_public_names_has_a_page() -> None:
     assert levels == set(re.findall(r"\{public-names\} (\w+)", pages))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_documentation_builds_without_warnings(tmp_path: Path) -> None:
     for package in ("sphinx", "furo", "myst_parser", "numpydoc"):
         pytest.importorskip(package, reason="the documentation is built with the extra [docs] only")

@@ -41,7 +41,11 @@ def told(*runs: fc.Run) -> list[tuple[str, float, bool]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS, ids=["adaptive", "fixed"])
-@pytest.mark.parametrize("events", [(), (fc.Event("passes", "angle", at=0.3),)], ids=["", "event"])
+@pytest.mark.parametrize(
+    "events",
+    [pytest.param((), marks=pytest.mark.long), (fc.Event("passes", "angle", at=0.3),)],
+    ids=["", "event"],
+)
 @pytest.mark.parametrize("name", MODELS)
 def test_every_cut_gives_the_same_bits_and_tells_each_event_once(name, events, method, tmp_path):
     """Just before and after what happens, where the step that the end cuts short meets it, and anywhere."""

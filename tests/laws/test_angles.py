@@ -84,7 +84,7 @@ def test_a_thousand_turns(method):
     assert run["angle"] == pytest.approx(20.0 * np.pi * run.t, abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_body_that_tumbles_shows_no_jumps():
     """Turned over and over about all axes: the angle changes as the twist does, ½(a + b)/(½ + ½ a·b) · ω."""
     body = fc.RigidBody("body", (0, 0, 0), 1.0, (1.0, 2.0, 2.5))

@@ -110,7 +110,7 @@ def test_a_planted_mechanism_is_refused_by_node_and_direction(kind):
         check(kind, seed)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_in_every_one_of_200_random_frames(kind):
     for seed in range(3, 43):

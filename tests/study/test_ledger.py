@@ -120,7 +120,7 @@ def rubbing():
     return scene.with_(effects=[*scene.effects, *rough])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_large_rotation_is_examined_without_what_cannot_be_linear(rubbing):
     entry = fc.ledger(rubbing, 0.01)["large_rotation"]
     assert entry.first == ("coulomb_friction", "backlash")
