@@ -15,14 +15,12 @@ from typing import Any
 import flexctrl
 from flexctrl.cli.answer import Answer, plain
 from flexctrl.cli.program import COMMANDS, Request
-from flexctrl.cli.progress import progress
 from flexctrl.design.hardware import Noisy
 from flexctrl.errors import FlexctrlError
 from flexctrl.report.leads import LEADS
 from flexctrl.report.modes import animation
 from flexctrl.report.page import Section, page
 from flexctrl.scene import Scene, load_scene
-from flexctrl.study.ladder import ladder
 
 _TITLES = {
     "table": "Machine",
@@ -86,26 +84,13 @@ def _chapter(name: str, title: str, request: Request, folder: Path) -> Chapter:
     own = folder / name
     own.mkdir()
     try:
-        found = _told(name, replace(request, out=own))
+        found = importlib.import_module(COMMANDS[name].module).answer(replace(request, out=own))
     except FlexctrlError as error:
         return Chapter(Section(name, title, str(error), failed=True), {})
     pictures = () if name == "run" else tuple(sorted(own.glob("*.png"), key=_rank))
     text, more = _front(found.text) if name == "cost" else (found.text, "")
     section = Section(name, title, text, pictures, moving=name == "modes", lead=LEADS[name], more=more)
     return Chapter(section, found.data)
-
-
-def _told(name: str, request: Request) -> Answer:
-    """What a command answers; the ladder has none of its own."""
-    if name != "ladder":
-        answered: Answer = importlib.import_module(COMMANDS[name].module).answer(request)
-        return answered
-    scene = load_scene(request.scene)
-    with progress(f"{scene.name}: ladder") as tell:
-        found = ladder(scene, tolerance=request.tolerance, progress=tell)
-    assert request.out is not None
-    found.plot().savefig(request.out / "ladder.png", dpi=150)
-    return Answer(f"{scene.name}: how much physics, at what error and time\n\n{found}", {})
 
 
 def _rank(picture: Path) -> tuple[int, str]:

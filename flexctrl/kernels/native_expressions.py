@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 import inspect
 import math
+import operator
 from collections.abc import Callable
-from operator import eq, ge, gt, le, lt, ne
 from typing import Any
 
 from flexctrl.errors import KernelError
@@ -29,7 +29,6 @@ from flexctrl.kernels.native_types import (
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _ORDER = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
 _EIGHTS = {getattr(eights, n): n for n in ("eight", "put", "larger", "largest", "total", "rounded", "lost")}
-_COMPARE = {ast.Lt: lt, ast.LtE: le, ast.Gt: gt, ast.GtE: ge, ast.Eq: eq, ast.NotEq: ne}
 _BUILT_IN = ("float", "int", "abs", "min", "max")
 
 
@@ -131,10 +130,10 @@ class Expressions:
             known = [self._decided(value) for value in e.values]
             ends = isinstance(e.op, ast.Or)  # one operand like this settles it
             return ends if ends in known else None if None in known else not ends
-        if isinstance(e, ast.Compare) and type(e.ops[0]) in _COMPARE and self._is_absent(e.left):
+        if isinstance(e, ast.Compare) and type(e.ops[0]) in _ORDER and self._is_absent(e.left):
             other = e.comparators[0]
             value = self.names.get(other.id) if isinstance(other, ast.Name) else getattr(other, "value", None)
-            return bool(_COMPARE[type(e.ops[0])](0, value)) if isinstance(value, int) else None
+            return bool(getattr(operator, _ORDER[type(e.ops[0])])(0, value)) if isinstance(value, int) else None
         return None
 
     def _truth(self, e: ast.expr) -> str:

@@ -49,32 +49,22 @@ def held_at(model: Model, hold: Mapping[str, float]) -> dict[str, float]:
 
 
 def _followed(model: Model, lost: Mapping[int, float], found: Mapping[str, float]) -> dict[str, float]:
-    """Return the coordinates that raw freedoms tell, by their places, where others are held already."""
+    """Return the coordinates that raw freedoms tell, by their places, where others are held already.
+
+    Told are those that no motion has which leaves the raw freedoms where they are.
+    """
+    from scipy.linalg import lstsq, null_space
+
     T = model.motion.jacobian(model.motion.rest)[list(lost)].toarray()
     own = [model.coordinate(name) for name in found]
     rest = np.array(list(lost.values())) - T[:, own] @ np.array(list(found.values()), dtype=float)
     T[:, own] = 0.0
-    alone = ((row, np.flatnonzero(row[:-1])) for row in _reduced(np.column_stack([T, rest])))
-    return {model.coordinates[at[0]]: float(row[-1]) for row, at in alone if at.size == 1}
-
-
-def _reduced(rows: np.ndarray) -> np.ndarray:
-    """Gauss-Jordan: each row solved for the largest of its unknowns, which no other row has; the last column is known.
-
-    What is left of a row that says nothing new is round-off, and zero.
-    """
-    rows, scale = rows.copy(), np.abs(rows[:, :-1]).max(axis=1, initial=0.0)
-    for i in range(len(rows)):
-        pivot = int(np.argmax(np.abs(rows[i, :-1]))) if rows.shape[1] > 1 else 0
-        if abs(rows[i, pivot]) <= _ROUNDING * scale[i]:
-            rows[i] = 0.0
-            continue
-        rows[i] /= rows[i, pivot]
-        others = np.arange(len(rows)) != i
-        rows[others] -= np.outer(rows[others, pivot], rows[i])
-        small = np.abs(rows[:, :-1]) <= _ROUNDING * np.abs(rows[:, :-1]).max(axis=1, keepdims=True, initial=0.0)
-        rows[:, :-1][small] = 0.0
-    return rows
+    moved = np.flatnonzero(T.any(axis=0))
+    if not moved.size:
+        return {}
+    places = lstsq(T[:, moved], rest, cond=_ROUNDING)[0]
+    told = np.abs(null_space(T[:, moved], rcond=_ROUNDING)).max(axis=1, initial=0.0) < _ROUNDING
+    return {model.coordinates[i]: float(at) for i, at in zip(moved[told], places[told], strict=True)}
 
 
 def own_coordinate(model: Model, name: str) -> str:

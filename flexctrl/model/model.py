@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, check_kind, did_you_mean
 from flexctrl.kernels.kernel import Backend
 from flexctrl.model.assembly import assembled, mass_blocks, modal_blocks, stiffness_blocks
 from flexctrl.model.equations import Equations, LargeMotion, Small, SmallMotion
@@ -265,8 +265,7 @@ class Model:
         StructureError
             For an unknown name.
         """
-        if not isinstance(inputs, Mapping):
-            raise StructureError(f"model: inputs = {inputs!r}; expected a mapping of input names to values")
+        check_kind(inputs, Mapping, "model: inputs", "a mapping of input names to values")
         u = np.zeros(len(self.inputs))
         for name, value in inputs.items():
             if name not in self.inputs:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import check_kind
 from flexctrl.plots.style import FLEXIBLE, INK, RIGID, axes_of, new_figure, tidy
 from flexctrl.study.envelope import Envelope
 
@@ -52,10 +52,7 @@ def plot_envelope(envelope: Envelope, ax: Axes | None = None) -> Axes:
     StructureError
         For something else than one envelope.
     """
-    if not isinstance(envelope, Envelope):
-        raise StructureError(
-            f"plot_envelope: {envelope!r} is no envelope; give one from validity_envelope, each with its own ax"
-        )
+    check_kind(envelope, Envelope, "plot_envelope: envelope", "one from validity_envelope, each with its own ax")
     ax = axes_of(ax, 6.0, 4.0)
     finite = [tried for tried in envelope.trials if np.isfinite(tried.error) and tried.error > 0.0]
     ax.loglog([x.amplitude for x in finite], [100.0 * x.error for x in finite], "o-", color=FLEXIBLE, markersize=3)

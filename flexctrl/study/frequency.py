@@ -319,7 +319,7 @@ def _size(L: Any) -> Any:
 
 
 def _return_ratio(L: np.ndarray) -> np.ndarray:
-    return np.asarray(abs(1 + L) / np.maximum(abs(L), np.finfo(float).tiny))
+    return np.asarray(abs(1 + L) / _size(L))
 
 
 def _inverse(low: Peak) -> Peak:
