@@ -20,19 +20,12 @@ from dataclasses import replace
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.bodies import PointMass
 from flexctrl.structure.drives import LinearDrive
+from flexctrl.structure.inputs import MotorTorque
 from flexctrl.structure.joints import Joint, Pin, Support
 from flexctrl.structure.lines import Rope
 from flexctrl.structure.nodes import Node
+from flexctrl.structure.outputs import DriveAngle, DriveSpeed, Output, Position, SwayAngle, Velocity
 from flexctrl.structure.sections import STEEL, Section
-from flexctrl.structure.signals import (
-    DriveAngle,
-    DriveSpeed,
-    MotorTorque,
-    Output,
-    Position,
-    SwayAngle,
-    Velocity,
-)
 from flexctrl.structure.structure import Structure
 
 SPAN = 22.5

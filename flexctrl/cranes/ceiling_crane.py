@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from flexctrl.structure.beams import Beam
+from flexctrl.structure.inputs import Force
 from flexctrl.structure.joints import Pin, Support
+from flexctrl.structure.outputs import Position
 from flexctrl.structure.sections import Section
-from flexctrl.structure.signals import Force, Position
 from flexctrl.structure.structure import Structure
 
 MEMBER = Section(EA=2e5 * math.pi, EI_y=157.0, EI_z=157.0, GJ=157.0, rhoA=1.0, rhoJ=1e-4)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.bodies import PointMass
 from flexctrl.structure.drives import RotaryDrive
+from flexctrl.structure.inputs import MotorTorque
 from flexctrl.structure.joints import Hinge, Pin, Support
+from flexctrl.structure.outputs import DriveAngle, DriveSpeed, Output, Position, Rotation
 from flexctrl.structure.sections import Material, Section
-from flexctrl.structure.signals import DriveAngle, DriveSpeed, MotorTorque, Output, Position, Rotation
 from flexctrl.structure.structure import Structure
 
 ALUMINIUM = Material(E=70e9, rho=2700.0, nu=0.33)

@@ -17,29 +17,22 @@ from flexctrl.dynamics.ending import ends_before
 from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
 from flexctrl.dynamics.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.feed import Feed
-from flexctrl.dynamics.impact import LASTING, lasts
 from flexctrl.dynamics.interrupt import Interruption
+from flexctrl.dynamics.landing import SMALLEST, Missed, landed
 from flexctrl.dynamics.march.ride import ride
-from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.midpoint import ConservingMidpoint
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
-from flexctrl.dynamics.scales import farthest
-from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Joining, Mark, Point, StepError, Stepper
+from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
+from flexctrl.dynamics.switching import anew, beyond, is_brief, lead, withheld
 from flexctrl.errors import ControllerError
-from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
-__all__ = ["SMALLEST", "Journey", "Plan"]
+__all__ = ["Journey", "Plan"]
 
-SMALLEST = 1e-12
 _NEAR = 1e-9
-_LANDINGS, _LANDINGS_MOST = 12, 60
-_SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
-_LEAD, _LEAD_LEAST, _LEAD_MOST, _LEAD_FAR = 1e-8, 1e-9, 1e-7, 1e-4
-_NUDGES = 8
 _CHATTER = 20
 _FORESEEN = 20_000
 
@@ -70,10 +63,6 @@ class Plan:
     tell: Callable[[float], None]
     autosave: Autosave | None
     began: float
-
-
-class _Missed(StepError):
-    """A step that was to end where something happens, and did not converge: shorter ones may."""
 
 
 @dataclass
@@ -309,7 +298,7 @@ class Journey:
             return self._halved(h, stop)
         try:
             self._accept(after, stop)
-        except _Missed:
+        except Missed:
             self.mark.rejected += 1
             if h < 2e-3 * self.mark.size or h < SMALLEST:
                 raise
@@ -338,7 +327,7 @@ class Journey:
         why = ""
         while True:
             if mark.led and h != mark.led:
-                self._lead(h)
+                lead(self, h)
             if h < SMALLEST * max(1.0, t):
                 raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
             try:
@@ -361,7 +350,7 @@ class Journey:
         mark.size, mark.led, mark.follow = size, 0.0, max(0, mark.follow - 1)
         try:
             self._accept(after, stop)
-        except _Missed:
+        except Missed:
             mark.rejected += 1
             mark.size = 0.25 * h
 
@@ -372,7 +361,7 @@ class Journey:
         if not self.watch.idle:
             after, corner = self._watched(before, after)
             if after.state.t == before.state.t:
-                self.point = after if corner is None else self._beyond(after, corner)
+                self.point = after if corner is None else beyond(self, after, corner)
                 return
         curve = self.track.curve(before, after)
         self.books.enter(before, after, curve)
@@ -381,13 +370,13 @@ class Journey:
         self.track.keep((after.state,), before, after)
         self.rows.within(before, after, stop - after.state.t <= self._tick)
         if corner is not None:
-            self.point = self._beyond(after, corner)
+            self.point = beyond(self, after, corner)
 
     def _watched(self, before: Point, after: Point) -> tuple[Point, Crossing | None]:
         """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
         watch, curve = self.watch, self.track.curve(before, after)
         crossings = watch.crossings(curve, before, after)
-        landing = next((c for c in crossings if watch.stops(c.gauge) and not self._over(c)), None)
+        landing = next((c for c in crossings if watch.stops(c.gauge) and not self.is_over(c)), None)
         switch = -1 if landing is None else landing.gauge - len(watch.events)
         if 0 <= switch < len(watch.names) and self.mark.stuck >= _CHATTER:
             name = watch.names[switch]
@@ -398,9 +387,9 @@ class Journey:
             self.mark.stuck = 0
             return after, None
         earlier, slid = [c for c in crossings if c.t < landing.t], after
-        after, landing = self._landed(before, after, landing)
+        after, landing = landed(self, before, after, landing)
         switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
-        brief = 0 <= switch < len(watch.names) and self._brief(before, after, slid, switch)
+        brief = 0 <= switch < len(watch.names) and is_brief(self, before, after, slid, switch)
         self._note(earlier, curve, before)
         watch.settle(after)
         watch.cross(landing)
@@ -412,73 +401,11 @@ class Journey:
         self.mark.stuck = self.mark.stuck + 1 if short else 0
         if switch >= len(watch.names):
             return after, landing
-        return self._withheld(after, switch) if brief else self._anew(after, switch), None
+        return withheld(self, after, switch) if brief else anew(self, after, switch), None
 
-    def _over(self, crossing: Crossing) -> bool:
+    def is_over(self, crossing: Crossing) -> bool:
         """Tell whether an event asked for has been told, or is beyond the end."""
         return crossing.gauge < len(self.watch.events) and crossing.t <= self.told
-
-    def _anew(self, at: Point, switch: int) -> Point:
-        """Start anew under the law of force that holds from now on."""
-        supply = self.plan.feed.restart(at.state, at.supply)
-        state = self.plan.model.switches.after(at.state, supply.u, switch)
-        self.watch.switched()
-        return self.stepper.renew(replace(at, state=state), supply, self.mark.size)
-
-    def _brief(self, before: Point, after: Point, slid: Point, switch: int) -> bool:
-        """Tell whether a contact that breaks loose here sticks again at once, for all that a step can see.
-
-        Where steps are chosen, they are shortened first, until what one makes of the slip is within tolerance.
-        """
-        switches, h = self.plan.model.switches, slid.state.t - before.state.t
-        if after.state.t > before.state.t or switches.phases(before.state)[switch] == STUCK:
-            return False
-        if isinstance(self.plan.method.pace, Controlled):
-            held, v, moved = switches.withheld(before.state, switch), slid.state.v, self.books.sums.moved
-            slip = h * np.abs(v - switches.still(held, v)) / self.books.reach
-            if (slip > self.plan.tolerance.of(farthest(self.plan.model, moved))).any():
-                raise _Missed(self.stepper.counts.worst, "a slip is over within less than the step")
-        return True
-
-    def _withheld(self, at: Point, switch: int) -> Point:
-        """Hold for a step what would slip for less than that, whatever pulls; after it, that is tried again."""
-        state = self.plan.model.switches.withheld(at.state, switch)
-        if self.mark.stuck > 1:  # nothing has happened: it has broken loose and stuck again where the step begins
-            del self.events[-2:]
-        self.watch.withheld(switch)
-        return self.stepper.renew(replace(at, state=state), self.plan.feed.restart(state, at.supply), self.mark.size)
-
-    def _beyond(self, at: Point, corner: Crossing) -> Point:
-        """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
-        watch, sign, span = self.watch, 1.0 if corner.rising else -1.0, _LEAD_LEAST * self.mark.size
-        state, v = at.state, at.state.v
-        for _ in range(_NUDGES):
-            moved = self.plan.model.advance(at.state, span * v, v, at.state.t)
-            if sign * watch.values(moved, at.supply.u)[corner.gauge] > watch.dusts[corner.gauge]:
-                state = moved
-                break
-            span *= 4.0
-        supply = self.plan.feed.restart(state, at.supply)
-        self._follow(at.state, state, supply.u)
-        self.point = replace(at, state=state, supply=supply)
-        self._lead(min(self.mark.size, self.mark.cap) if self.mark.follow else self.mark.size)
-        self.books.turn(self.point)
-        return self.point
-
-    def _lead(self, h: float) -> None:
-        """Start anew where the run stands, with a step about to be taken."""
-        stepper: Stepper[Any] = self.stepper.plain if isinstance(self.stepper, MarchingStepper) else self.stepper
-        anew = stepper.join if isinstance(stepper, Joining) else stepper.renew
-        self.point = anew(self.point, self.point.supply, h)
-        self.mark.led = h if isinstance(self.plan.method.pace, Controlled) else 0.0
-
-    def _follow(self, before: State, beyond: State, u: np.ndarray) -> None:
-        """Follow an impact by short steps, where steps are chosen and would not see it."""
-        if not isinstance(self.plan.method.pace, Controlled):
-            return
-        sums = self.books.sums
-        cap = lasts(self.plan.model, before, beyond, u, (self.plan.tolerance, sums.moved, sums.turnover))
-        self.mark.follow, self.mark.cap = (LASTING, cap) if math.isfinite(cap) else (0, 0.0)
 
     def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:
         for c in crossings:
@@ -489,85 +416,3 @@ class Journey:
         """Note an event, unless that has been done."""
         if crossing.t > self.told:
             self.events.append(self.watch.occurrence(crossing, state, u))
-
-    def _landed(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
-        """Take the step again, to where the first gauge is zero: on a shorter step that may be another one."""
-        for _ in range(_LANDINGS):
-            after, crossing = self._land(before, after, crossing)
-            if after is before:
-                break
-            passed = self.watch.crossings(self.track.curve(before, after), before, after)
-            ends = (c for c in passed if c.gauge != crossing.gauge and self.watch.stops(c.gauge) and not self._over(c))
-            first = next(ends, None)
-            if first is None:
-                break
-            crossing = first
-        return after, crossing
-
-    def _land(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
-        """Take the step again, to where a gauge is zero; where it is at once, there is none.
-
-        Forces may jump at a corner: the step ends just before it, so that one law holds all along.
-        """
-        corner = crossing.gauge >= len(self.watch.events) + len(self.watch.names)
-        if corner and not self.watch.last_word(crossing.gauge):
-            return self._short_of(before, after, crossing)
-        t, h, gauge, at = before.state.t, after.state.t - before.state.t, crossing.gauge, crossing.t
-        low, high = t, t + h
-        for _ in range(_LANDINGS):
-            if at - t <= SMALLEST * h:
-                return before, replace(crossing, t=t)
-            try:
-                after = self.stepper.step(before, at - t)
-            except StepError as error:
-                raise _Missed(error.worst, str(error)) from error
-            off = self.watch.offset(self.track.curve(before, after), before, after, gauge)
-            if abs(off) <= _NEAR * h:
-                break
-            left = self.watch.sides[gauge] * self.watch.values(after.state, after.supply.u, before.state)[gauge]
-            low, high = (at, high) if left > 0.0 else (low, at)
-            at = after.state.t + off if low < after.state.t + off < high else 0.5 * (low + high)
-        return after, replace(crossing, t=after.state.t)
-
-    def _short_of(self, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
-        """Take the step again, to just before a corner.
-
-        What lies beyond a stiff one pulls the end of a longer step back onto it, too late and with another speed: only
-        an end on the side of the start tells when the corner is.
-        """
-        t, h, gauge, watch = before.state.t, after.state.t - before.state.t, crossing.gauge, self.watch
-        lead, side, dust = max(_LEAD * h, 8.0 * math.ulp(t + h)), watch.sides[gauge], watch.dusts[gauge]
-        low, high, at, back = t, t + h, crossing.t - lead, lead
-        found, when, ahead, misses = before, t, 0.0, 0
-        for _ in range(_LANDINGS_MOST):
-            if at - t <= SMALLEST * h or high - low <= max(_LEAD_MOST * h, lead):
-                break
-            try:
-                after = self._towards(before, at - t)
-            except StepError as error:
-                raise _Missed(error.worst, str(error)) from error
-            left = side * float(watch.values(after.state, after.supply.u, before.state)[gauge])
-            if left <= dust:
-                high, back, misses = at, 8.0 * back, misses + 1
-                at = max(high - back, 0.5 * (low + high))
-                if ahead > 0.0 and misses == 1:
-                    at = low + (high - low) * ahead / (ahead - left) - lead
-                    at = at if low < at < high else 0.5 * (low + high)
-                continue
-            off = watch.offset(self.track.curve(before, after), before, after, gauge)
-            found, low, when = after, after.state.t, after.state.t + max(off, 0.0)
-            ahead, misses, missed = left, 0, low < at - lead  # missed: no step ends there
-            high = at if missed else high
-            if 0.0 <= off <= max((_LEAD_FAR if missed else _LEAD_MOST) * h, lead):
-                break
-            at = when - lead if low < when - lead < high else 0.5 * (low + high)
-        return found, replace(crossing, t=when)
-
-    def _towards(self, before: Point, h: float) -> Point:
-        """Take a step to a corner, or just short of it: where a force jumps there, no step ends on it."""
-        for short in _SHORT:
-            try:
-                return self.stepper.step(before, h * (1.0 - short))
-            except StepError as error:
-                failure = error
-        raise failure

@@ -28,8 +28,8 @@ from flexctrl.structure.beams import Beam
 from flexctrl.structure.cut import cut_ropes
 from flexctrl.structure.freedoms import listed
 from flexctrl.structure.lines import Rope
+from flexctrl.structure.outputs import Tension
 from flexctrl.structure.relations import Group
-from flexctrl.structure.signals import Tension
 from flexctrl.structure.structure import Structure
 from flexctrl.structure.trolleys import Trolley
 

@@ -22,7 +22,7 @@ from flexctrl.model.model import Model
 from flexctrl.model.signals import winch_tension
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope, Spring
-from flexctrl.structure.signals import (
+from flexctrl.structure.outputs import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,

@@ -22,23 +22,18 @@ from flexctrl.model.laws.part_kinds import rope_pull, spring_pull
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
+from flexctrl.structure.inputs import FollowerForce, FollowerTorque, Force, Input, MotorTorque, WindSpeed
 from flexctrl.structure.lines import Rope, Spring
-from flexctrl.structure.signals import (
+from flexctrl.structure.outputs import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
-    FollowerForce,
-    FollowerTorque,
-    Force,
-    Input,
-    MotorTorque,
     Output,
     Position,
     Rotation,
     SwayAngle,
     Tension,
     Velocity,
-    WindSpeed,
 )
 from flexctrl.structure.structure import Structure
 

@@ -15,7 +15,7 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.model.tangents import tangents
-from flexctrl.structure.signals import FollowerForce, FollowerTorque, Torque
+from flexctrl.structure.inputs import FollowerForce, FollowerTorque, Torque
 
 __all__ = ["leaving", "without_energy"]
 

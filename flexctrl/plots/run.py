@@ -11,12 +11,11 @@ from matplotlib.figure import Figure
 
 from flexctrl.dynamics.run import Run
 from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
-from flexctrl.structure.signals import (
+from flexctrl.structure.inputs import FollowerForce, Force
+from flexctrl.structure.outputs import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
-    FollowerForce,
-    Force,
     Position,
     Rotation,
     SwayAngle,

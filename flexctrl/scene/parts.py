@@ -30,27 +30,22 @@ from flexctrl.structure.beams import Beam
 from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.drives import LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Part
+from flexctrl.structure.inputs import FollowerForce, FollowerTorque, Force, MotorTorque, Torque, WindSpeed
 from flexctrl.structure.joints import Hinge, Pin, Slide, Support, Weld
 from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.naming import node_of
 from flexctrl.structure.nodes import Node
-from flexctrl.structure.sections import STEEL, Material, Section
-from flexctrl.structure.signals import (
+from flexctrl.structure.outputs import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
-    FollowerForce,
-    FollowerTorque,
-    Force,
-    MotorTorque,
     Position,
     Rotation,
     SwayAngle,
     Tension,
-    Torque,
     Velocity,
-    WindSpeed,
 )
+from flexctrl.structure.sections import STEEL, Material, Section
 from flexctrl.structure.structure import Structure, planar
 from flexctrl.structure.trolleys import Trolley
 

@@ -14,8 +14,8 @@ from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Joint, Pin, Support
 from flexctrl.structure.lines import Rope
 from flexctrl.structure.nodes import Node
+from flexctrl.structure.outputs import Output, Tension
 from flexctrl.structure.refine import with_nodes
-from flexctrl.structure.signals import Output, Tension
 from flexctrl.structure.structure import Structure
 
 __all__ = ["cut_ropes"]

@@ -10,25 +10,20 @@ from typing import TYPE_CHECKING
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.structure.drives import Drive, RotaryDrive, Winch
 from flexctrl.structure.freedoms import FREEDOMS
+from flexctrl.structure.inputs import FollowerForce, FollowerTorque, Force, Input, MotorTorque, Torque
 from flexctrl.structure.join_table import JoinTable, Row, drive_row
 from flexctrl.structure.joints import Hinge, Slide, Support, Weld
 from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.nodes import Node
-from flexctrl.structure.signals import (
+from flexctrl.structure.outputs import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
-    FollowerForce,
-    FollowerTorque,
-    Force,
-    Input,
-    MotorTorque,
     Output,
     Position,
     Rotation,
     SwayAngle,
     Tension,
-    Torque,
     Velocity,
 )
 from flexctrl.structure.trolleys import Trolley, check_rails, check_travels

@@ -14,11 +14,12 @@ from flexctrl.structure.bodies import RigidBody
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import FREEDOMS, TRAVEL, check_name, listed, parse_direction
+from flexctrl.structure.inputs import Input
 from flexctrl.structure.join_table import JoinTable, join
 from flexctrl.structure.joints import InPlane, Joint, main_axis
 from flexctrl.structure.nodes import Node, check_node
+from flexctrl.structure.outputs import Output
 from flexctrl.structure.relations import Group, Track
-from flexctrl.structure.signals import Input, Output
 from flexctrl.structure.soundness import COINCIDE, check_sound
 from flexctrl.structure.trolleys import tracks_of
 

@@ -15,10 +15,11 @@ from flexctrl.structure.chains import BeamChain
 from flexctrl.structure.drives import Drive, Winch
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import TRANSLATIONS, TRAVEL, check_finite, check_name
+from flexctrl.structure.inputs import Force, Input
 from flexctrl.structure.joints import Joint, Support, Weld
 from flexctrl.structure.nodes import Node
+from flexctrl.structure.outputs import Output, Position, SwayAngle, Velocity
 from flexctrl.structure.relations import Track
-from flexctrl.structure.signals import Force, Input, Output, Position, SwayAngle, Velocity
 
 __all__ = ["Trolley", "check_rails", "check_travels", "tracks_of"]
 

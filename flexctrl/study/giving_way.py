@@ -9,7 +9,7 @@ from flexctrl.linear.growth import growing
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.paths.path import equilibrium_path
-from flexctrl.structure.signals import FollowerForce, FollowerTorque
+from flexctrl.structure.inputs import FollowerForce, FollowerTorque
 from flexctrl.study.amplitudes import Case
 
 __all__ = ["gives_way", "giving_way_between", "loaded"]

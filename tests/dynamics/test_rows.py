@@ -64,8 +64,8 @@ def test_an_interrupted_stream_is_the_file_of_a_run_never_stopped(tmp_path):
     start = model.rest.with_(v=np.array([2.0]))
 
     def ran(name: str, start, progress=None) -> fc.Run:
-        record = fc.CsvStream(tmp_path / name, every=0.1)
-        return fc.simulate(model, until=30.0, start=start, method=method, record=record, progress=progress)
+        record = fc.CsvStream(tmp_path / name, every=1.0)
+        return fc.simulate(model, until=300.0, start=start, method=method, record=record, progress=progress)
 
     ran("once", start)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background

@@ -322,7 +322,7 @@ def test_blade_that_stretches(record):
     record(
         case,
         ours=[lagging(spin, EA=4900.0) for spin in published],
-        reference=[lagging_by_ritz(spin, 70.0, stretched=True) for spin in published],
+        reference=[round(lagging_by_ritz(spin, 70.0, stretched=True), 6) for spin in published],  # known to 1e-8
         source="Ritz series of order 14, about the stretched blade",
         tolerance=1e-4,
     )

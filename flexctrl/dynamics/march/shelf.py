@@ -1,4 +1,4 @@
-"""States that loops have written down, row by row; see `flexctrl.dynamics.march.loops.shelve`."""
+"""States that loops have written down, row by row; see `flexctrl.dynamics.march.books.shelve`."""
 
 from __future__ import annotations
 

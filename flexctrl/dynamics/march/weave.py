@@ -39,7 +39,7 @@ class Weave:
     hinges, hinge_axes, slides, slide_axes : Wholes, Reals
         Turns about a master's axis and slides along it: master and coordinate; that axis in the body.
     first, states : Reals
-        The state before the first step, and those after each, as `flexctrl.dynamics.march.loops.shelve` writes them.
+        The state before the first step, and those after each, as `flexctrl.dynamics.march.books.shelve` writes them.
     steps, times : Wholes, Reals
         In which step each row is, and when.
     ends : Wholes

@@ -18,7 +18,7 @@ from flexctrl.kernels.kernel import Kernel
 from flexctrl.model.laws.families import Family
 from flexctrl.model.laws.kinds import NODE_SLOT, moved
 from flexctrl.model.laws.wind_kinds import WIND, drag
-from flexctrl.structure.signals import WindSpeed
+from flexctrl.structure.inputs import WindSpeed
 from flexctrl.structure.structure import Structure
 
 if TYPE_CHECKING:

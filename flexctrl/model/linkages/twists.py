@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.structure.signals import Rotation
+from flexctrl.structure.outputs import Rotation
 from flexctrl.structure.structure import Structure
 
 __all__ = ["Twists"]

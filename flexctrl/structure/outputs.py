@@ -1,4 +1,4 @@
-"""Inputs and outputs by name: what acts on the machine and what is measured of it."""
+"""Outputs by name: what is measured of the machine."""
 
 from __future__ import annotations
 
@@ -6,208 +6,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from flexctrl.errors import StructureError, shortened
-from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
-from flexctrl.structure.freedoms import ROTATIONS, Vector, check_signal, parse_direction
+from flexctrl.errors import StructureError
+from flexctrl.structure.drives import Drive, Winch
+from flexctrl.structure.freedoms import Vector, check_signal, parse_direction
 from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.nodes import Node, check_node
+from flexctrl.structure.references import DRIVES, name_of, signal_node
 
-_DRIVES = (RotaryDrive, LinearDrive, Winch)
-
-
-def _node(node: Node, owner: str, rotations: bool) -> Node:
-    if rotations and not check_node(node, owner).freedoms >= ROTATIONS:
-        raise StructureError(f"{owner}: {node} has no rotations; take a node of a beam or rigid body")
-    return check_node(node, owner)
-
-
-def _nodes(at: Node | Sequence[Node], owner: str, rotations: bool) -> tuple[Node, ...]:
-    nodes = tuple(at) if isinstance(at, list | tuple) else (at,)
-    if not nodes:
-        raise StructureError(f"{owner}: names no node; give e.g. beam.end")
-    twice = [node for i, node in enumerate(nodes) if node in nodes[:i]]
-    if twice:
-        raise StructureError(f"{owner}: {twice[0]} is given twice; a load acts once on each node")
-    return tuple(_node(node, owner, rotations) for node in nodes)
-
-
-def _name_of(part: object, kinds: tuple[type, ...], owner: str) -> str:
-    if not isinstance(part, (str, *kinds)):
-        names = " or ".join(k.__name__ for k in kinds)
-        raise StructureError(f"{owner} = {shortened(part)}; expected a {names}, or the name of one")
-    return part if isinstance(part, str) else part.name  # type: ignore[attr-defined]
-
-
-@dataclass(frozen=True)
-class Force:
-    """Input: a force in a fixed direction, in N, on one node or on each of several.
-
-    Parameters
-    ----------
-    name : str
-    at : Node or sequence of Node
-        Where it acts, in full on each.
-    direction : str or sequence of 3 floats
-        Global direction of positive values; it does not turn with the node (a dead load).
-
-    Raises
-    ------
-    StructureError
-        For a name that python-control refuses, what is no node, and what is no direction.
-    """
-
-    name: str
-    at: tuple[Node, ...]
-    direction: Vector
-
-    def __init__(self, name: str, at: Node | Sequence[Node], direction: str | Sequence[float]) -> None:
-        owner = f"Force {check_signal(name, 'Force')!r}"
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "at", _nodes(at, owner, rotations=False))
-        object.__setattr__(self, "direction", parse_direction(direction, owner))
-
-
-@dataclass(frozen=True)
-class Torque:
-    """Input: a torque about a fixed global axis, in N m, on one node or on each of several.
-
-    Parameters
-    ----------
-    name : str
-    at : Node or sequence of Node
-        Where it acts, in full on each.
-    axis : str or sequence of 3 floats
-        Global axis; positive values turn right-handed about it.
-
-    Raises
-    ------
-    StructureError
-        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
-    """
-
-    name: str
-    at: tuple[Node, ...]
-    direction: Vector
-
-    def __init__(self, name: str, at: Node | Sequence[Node], axis: str | Sequence[float]) -> None:
-        owner = f"Torque {check_signal(name, 'Torque')!r}"
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "at", _nodes(at, owner, rotations=True))
-        object.__setattr__(self, "direction", parse_direction(axis, owner))
-
-
-@dataclass(frozen=True)
-class FollowerForce:
-    """Input: a force that turns with its node, in N, on one node or on each of several.
-
-    Such a load has no energy: the stiffness of a machine under it is not symmetric, and it may flutter
-    (thrusters, jets, contact forces square to a surface).
-
-    Parameters
-    ----------
-    name : str
-    at : Node or sequence of Node
-        Where it acts, in full on each.
-    direction : str or sequence of 3 floats
-        Direction of positive values in the machine as drawn; it turns with the node.
-
-    Raises
-    ------
-    StructureError
-        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
-    """
-
-    name: str
-    at: tuple[Node, ...]
-    direction: Vector
-
-    def __init__(self, name: str, at: Node | Sequence[Node], direction: str | Sequence[float]) -> None:
-        owner = f"FollowerForce {check_signal(name, 'FollowerForce')!r}"
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "at", _nodes(at, owner, rotations=True))
-        object.__setattr__(self, "direction", parse_direction(direction, owner))
-
-
-@dataclass(frozen=True)
-class FollowerTorque:
-    """Input: a torque about an axis that turns with its node, in N m, on one node or on each of several.
-
-    Parameters
-    ----------
-    name : str
-    at : Node or sequence of Node
-        Where it acts, in full on each.
-    axis : str or sequence of 3 floats
-        Axis in the machine as drawn; it turns with the node. Positive values turn right-handed about it.
-
-    Raises
-    ------
-    StructureError
-        For a name that python-control refuses, what is no node or has no rotations, and what is no direction.
-    """
-
-    name: str
-    at: tuple[Node, ...]
-    direction: Vector
-
-    def __init__(self, name: str, at: Node | Sequence[Node], axis: str | Sequence[float]) -> None:
-        owner = f"FollowerTorque {check_signal(name, 'FollowerTorque')!r}"
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "at", _nodes(at, owner, rotations=True))
-        object.__setattr__(self, "direction", parse_direction(axis, owner))
-
-
-@dataclass(frozen=True)
-class MotorTorque:
-    """Input: the torque M_d of a drive's motor on its source angle θ_d, in N m.
-
-    It acts on the motor's side of the reduction: at rest the joint of a `RotaryDrive` bears R M_d. Positive torque
-    drives θ_d up.
-
-    Parameters
-    ----------
-    name : str
-    drive : RotaryDrive, LinearDrive, Winch or str
-        The drive or its name.
-
-    Raises
-    ------
-    StructureError
-        For a name that python-control refuses, or what is no drive.
-    """
-
-    name: str
-    drive: str
-
-    def __init__(self, name: str, drive: Drive | str) -> None:
-        object.__setattr__(self, "name", check_signal(name, "MotorTorque"))
-        object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"MotorTorque {name!r}: drive"))
-
-
-@dataclass(frozen=True)
-class WindSpeed:
-    """Input: a gust along a fixed direction, in m/s, on top of the mean wind of every `Wind` the model has.
-
-    It blows on all drag areas at once. Where no effect asks for wind it acts on nothing.
-
-    Parameters
-    ----------
-    name : str
-    direction : str or sequence of 3 floats
-        Where the air goes.
-
-    Raises
-    ------
-    StructureError
-        For a name that python-control refuses, and what is no direction.
-    """
-
-    name: str
-    direction: Vector
-
-    def __init__(self, name: str, direction: str | Sequence[float]) -> None:
-        object.__setattr__(self, "name", check_signal(name, "WindSpeed"))
-        object.__setattr__(self, "direction", parse_direction(direction, f"WindSpeed {name!r}"))
+__all__ = [
+    "AngularVelocity",
+    "DriveAngle",
+    "DriveSpeed",
+    "Output",
+    "Position",
+    "Rotation",
+    "SwayAngle",
+    "Tension",
+    "Velocity",
+]
 
 
 def _set_measure(
@@ -219,8 +35,8 @@ def _set_measure(
     rotations: bool,
 ) -> None:
     owner = f"{type(signal).__name__} {check_signal(name, type(signal).__name__)!r}"
-    _node(at, owner, rotations)
-    if minus is not None and _node(minus, owner, rotations) == at:
+    signal_node(at, owner, rotations)
+    if minus is not None and signal_node(minus, owner, rotations) == at:
         raise StructureError(f"{owner}: {at} less itself is always zero; give another node as minus")
     object.__setattr__(signal, "name", name)
     object.__setattr__(signal, "at", at)
@@ -370,7 +186,7 @@ class DriveAngle:
 
     def __init__(self, name: str, drive: Drive | str) -> None:
         object.__setattr__(self, "name", check_signal(name, "DriveAngle"))
-        object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"DriveAngle {name!r}: drive"))
+        object.__setattr__(self, "drive", name_of(drive, DRIVES, f"DriveAngle {name!r}: drive"))
 
 
 @dataclass(frozen=True)
@@ -394,7 +210,7 @@ class DriveSpeed:
 
     def __init__(self, name: str, drive: Drive | str) -> None:
         object.__setattr__(self, "name", check_signal(name, "DriveSpeed"))
-        object.__setattr__(self, "drive", _name_of(drive, _DRIVES, f"DriveSpeed {name!r}: drive"))
+        object.__setattr__(self, "drive", name_of(drive, DRIVES, f"DriveSpeed {name!r}: drive"))
 
 
 @dataclass(frozen=True)
@@ -466,27 +282,7 @@ class Tension:
 
     def __init__(self, name: str, line: Rope | Spring | Winch | str) -> None:
         object.__setattr__(self, "name", check_signal(name, "Tension"))
-        object.__setattr__(self, "line", _name_of(line, (Rope, Spring, Winch), f"Tension {name!r}: line"))
+        object.__setattr__(self, "line", name_of(line, (Rope, Spring, Winch), f"Tension {name!r}: line"))
 
 
-Input: TypeAlias = Force | Torque | FollowerForce | FollowerTorque | MotorTorque | WindSpeed
 Output: TypeAlias = Position | Velocity | Rotation | AngularVelocity | DriveAngle | DriveSpeed | SwayAngle | Tension
-
-__all__ = [
-    "AngularVelocity",
-    "DriveAngle",
-    "DriveSpeed",
-    "FollowerForce",
-    "FollowerTorque",
-    "Force",
-    "Input",
-    "MotorTorque",
-    "Output",
-    "Position",
-    "Rotation",
-    "SwayAngle",
-    "Tension",
-    "Torque",
-    "Velocity",
-    "WindSpeed",
-]

@@ -1,0 +1,171 @@
+"""Generalised alpha in compiled loops: accepted steps, their books and records."""
+
+from __future__ import annotations
+
+from flexctrl.dynamics.march.clock import later
+from flexctrl.dynamics.march.closing import settled
+from flexctrl.dynamics.march.judging import follow, lean, tighten
+from flexctrl.dynamics.march.record import DONE, OFTEN, March
+from flexctrl.dynamics.march.step import blended
+from flexctrl.kernels.eights import eight, larger, largest, put, total
+from flexctrl.kernels.native import Reals, seldom
+from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
+from flexctrl.model.gauges import read
+
+__all__ = ["accept", "copy", "draw", "drawn_now", "reach", "settle", "shelve"]
+
+_TINY = 1e-300
+
+
+def accept(m: March) -> None:
+    """Go on to the end of the step, where the nodes have been placed; enter it in the books and records."""
+    f = m.flat
+    keep(f)
+    zero = 0.0 * eight(m.weight)
+    one = zero + 1.0
+    still = zero
+    onward = zero
+    shared = zero
+    square = zero
+    far = zero
+    steady = zero
+    pull = zero
+    for i in range(0, f.padded, 8):
+        rate = eight(f.rate[i:])
+        change = rate - eight(m.rate[i:])
+        still = still + abs(change) * eight(m.weight[i:])
+        before = eight(m.trend[i:])
+        steady = larger(steady, (abs(change + before) - abs(change - before)) * eight(m.weight[i:]))
+        pull = larger(pull, abs(rate) * eight(m.weight[i:]))
+        onward = onward + abs(change - before) * eight(m.weight[i:])
+        told = eight(m.weight[i:]) * before
+        shared = shared + told * eight(m.weight[i:]) * change
+        square = square + told * told
+        reach = larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:])))
+        way = reach * eight(m.weight[i:])
+        far = larger(far, way + one - larger(way, one))
+        put(m.reach[i:], reach)
+        put(m.trend[i:], change)
+        put(m.algorithmic[i:], blended(m, rate, eight(m.rate[i:]), eight(m.algorithmic[i:])))
+        put(m.rate[i:], rate)
+        put(m.v[i:], eight(f.v[i:]))
+    m.reached = max(m.reached, largest(far))
+    if m.parts > 1:
+        follow(m)
+    lean(m, total(shared), total(square))
+    tighten(m, total(onward) / max(total(still), _TINY), 0.5 * largest(steady), largest(pull))
+    m.t = later(m.t, m.h)
+    enter(m)
+    note(m)
+    m.done += 1
+    if m.swift < 0:
+        m.swift = 1 if m.swift == -1 else m.swift + 1
+
+
+def reach(m: March) -> None:
+    """Put nodes and drives where the step takes them."""
+    if m.swift == 1 or m.whole == 1:
+        arrive(m.flat)
+    else:
+        place(m.flat)
+
+
+def enter(m: March) -> None:
+    """Enter the step in the books: work of the inputs, and what was lost."""
+    f = m.flat
+    work = 0.0 * eight(m.weight)
+    if f.gusting > 0:
+        drive(f)
+    if f.carried > 0 or f.following > 0 or f.gusting > 0:
+        pull(f)
+        for i in range(0, f.padded, 8):
+            work = work + 0.5 * (eight(m.pulled[i:]) + eight(f.force[i:])) * eight(f.step[i:])
+            put(m.pulled[i:], eight(f.force[i:]))
+    else:
+        for i in range(0, f.padded, 8):
+            work = work + eight(f.load[i:]) * eight(f.step[i:])
+    m.gained += total(work)
+    due = drawn_now(m)
+    if m.losing == 1 or due:
+        if m.swift != 1 and m.whole != 1:
+            drive(f)
+        if due:
+            energy(f)
+        elif m.leaping == 0:
+            dissipate(f)
+    if m.leaping == 1:
+        m.lost += m.leap.lost
+    elif m.losing == 1:
+        m.lost += 0.5 * m.h * (m.power + f.books[2])
+        m.power = f.books[2]
+    if due:
+        draw(m)
+
+
+def drawn_now(m: March) -> bool:
+    """Count a step; tell whether the balance is to be drawn after it."""
+    m.entered += 1
+    return m.drawing == 1 and (m.entered < OFTEN or m.entered % OFTEN == 0)
+
+
+@seldom
+def draw(m: March) -> None:
+    """Draw the balance; as `Books.close` does."""
+    kinetic = m.flat.books[0]
+    stored = m.flat.books[1]
+    m.made = kinetic + stored - m.begun - m.gained + m.lost
+    m.gap = max(m.gap, abs(m.made))
+    turned = max(abs(m.gained), max(m.lost, abs(stored + kinetic - m.begun)))
+    swung = max(kinetic, max(abs(kinetic - m.moving), abs(stored - (m.begun - m.moving))))
+    m.turnover = max(m.turnover, max(turned, swung))
+
+
+def note(m: March) -> None:
+    """Write down outputs and, where it is wanted, the state."""
+    f = m.flat
+    row = m.rows[(1 + m.gauges.outputs) * m.done :]
+    row[0] = m.t
+    if m.gauges.moving == 1 and m.losing == 0 and m.swift != 1 and m.whole != 1:
+        drive(f)
+    read(m.gauges, f.z, row[1:])
+    if m.keeping == 1 or m.t >= m.due:
+        shelve(m)
+
+
+def shelve(m: March) -> None:
+    """Keep the state."""
+    f = m.flat
+    nodes = 12 * f.nodes
+    angles = nodes + 2 * f.padded + f.drives
+    width = angles + m.gauges.turning + 1
+    state = m.states[width * m.kept :]
+    copy(nodes, f.pose, state)
+    copy(f.padded, f.q, state[nodes:])
+    copy(f.padded, m.v, state[nodes + f.padded :])
+    copy(f.drives, f.driven, state[nodes + 2 * f.padded :])
+    copy(m.gauges.turning, m.gauges.shown, state[angles:])
+    state[width - 1] = m.t
+    m.kept += 1
+    m.due = m.t + m.spacing
+
+
+def copy(n: int, x: Reals, y: Reals) -> None:
+    """Copy entries."""
+    for i in range(n):
+        y[i] = x[i]
+
+
+@seldom
+def settle(m: March) -> int:
+    """Take up the state that has been entered: loads, and what outputs read."""
+    f = m.flat
+    load(f)
+    pull(f)
+    copy(f.padded, f.force, m.pulled)
+    if m.losing == 1:
+        drive(f)
+        energy(f)
+        m.power = f.books[2]
+    if m.closing.loops > 0:
+        settled(m.closing, f)
+    return DONE
