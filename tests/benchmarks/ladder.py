@@ -30,7 +30,7 @@ steps are fixed, rigid parts and component modes take one for four. Errors are a
 than all of them: the largest $|Δy|$ of any output over its largest magnitude, so that an output that only flexibility
 makes (`bend`) is wrong by 100 % on the rigid rungs. Times are processor time over that of a fixed calculation in the
 same process, the shortest of several runs in turn; all that `simulate` does is in. What of it belongs to steps and
-what to the run, however long, follows from a run of half the length. A scene has no rung that changes nothing of it
+what to the run, however long, follows from a run four times as long. A scene has no rung that changes nothing of it
 (no shafts: no rung of shafts).
 
 ```{{image}} ../_static/fidelity_ladder_3.png
@@ -65,8 +65,8 @@ from the full one to the refined one. It is not between the first three, nor alw
   there. Of the 45 freedoms of the ceiling crane 27 are the chain's, and three of five elements, which stay as they are;
   its girder's long elements bend so far that nearly every step takes a tangent of its own. Its rung is the quicker one
   by its longer steps.
-- The refined rung is what one would take to be sure: four times the elements and half the steps. It takes about three
-  times as long as the full one.
+- The refined rung is what one would take to be sure: four times the elements and half the steps. It takes three to
+  four times as long as the full one.
 - A run has a fixed cost of about two milliseconds (start, books, records, checkpoint), whatever its physics: it is
   a good part of the cheap rungs of short runs, and why these are less apart there than their steps are.
 """
@@ -146,9 +146,9 @@ def shares(scene: fc.Scene, rung: fc.Rung) -> tuple[float, float]:
     """Processor time of a step, and of what a run needs beside its steps [s]."""
     plan = replace(scene.simulation, every=scene.simulation.every or scene.simulation.until / 1000, rigid_twin=False)
     base = scene.with_(controller=scene.law)
-    whole, half = (timed(rung.setting.of(base.with_(simulation=replace(plan, until=f * plan.until)))) for f in (1, 0.5))
-    step = (whole[0] - half[0]) / (whole[1] - half[1])
-    return step, whole[0] - step * whole[1]
+    once, more = (timed(rung.setting.of(base.with_(simulation=replace(plan, until=f * plan.until)))) for f in (1, 4))
+    step = (more[0] - once[0]) / (more[1] - once[1])
+    return step, once[0] - step * once[1]
 
 
 def timed(scene: fc.Scene) -> tuple[float, int]:
