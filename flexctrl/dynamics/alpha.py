@@ -153,12 +153,14 @@ class Stepper:
         """Return the point beyond a corner of a law of force, with the lead that the motion there will have.
 
         The lead is (α_m − α_f) h times the rate of the accelerations, and h and that rate may be others by orders.
+        What the step does not resolve is held by its own tangent: over the mass alone, a trace of speed in a stiff part
+        makes a lead that throws it.
         """
         c, fresh = self.coefficients, self._fresh(point.state, supply, step)
         state, rate = fresh.state, fresh.rate
         change = self.model.slope(state, state.v, rate, (1.0, 0.0, 0.0), supply.u) @ state.v
         change += self.model.slope(state, state.v, rate, (0.0, 1.0, 0.0), supply.u) @ rate
-        lead = (c.alpha_m - c.alpha_f) * step * self._mass(state, supply, step)(change)
+        lead = (c.alpha_m - c.alpha_f) * step * self._held(state, supply, step)(change)
         lead[self.model.motion.flows] = 0.0
         return self._eased(replace(fresh, algorithmic=rate + lead), step)
 
@@ -175,13 +177,17 @@ class Stepper:
 
     def _mass(self, state: State, supply: Supply, step: float) -> Solve:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
-        c, zero = self.coefficients, np.zeros(self.model.n)
-        M = self._massive(-self.model.slope(state, state.v, zero, (0.0, 0.0, 1.0), supply.u))
+        M = self._massive(-self.model.slope(state, state.v, np.zeros(self.model.n), (0.0, 0.0, 1.0), supply.u))
         if (M.diagonal() > self.model.dust).all():
             try:
                 return factorise(M)
             except SingularMatrixError:
                 pass
+        return self._held(state, supply, step)
+
+    def _held(self, state: State, supply: Supply, step: float) -> Solve:
+        """The mass matrix and the forces that answer accelerations over a step."""
+        c, zero = self.coefficients, np.zeros(self.model.n)
         seeds = (c.beta * step**2, c.gamma * step, 1.0)
         return factorise(self._massive(-self.model.slope(state, state.v, zero, seeds, supply.u)))
 

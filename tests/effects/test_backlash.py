@@ -148,6 +148,26 @@ def test_a_rope_goes_slack_and_taut_again_on_time():
     assert run.report.energy_residual < 1e-6
 
 
+@pytest.mark.slow
+def test_long_fixed_steps_follow_play_before_slender_links():
+    """The links' fast waves, which such steps do not resolve, are not thrown by the flanks."""
+    arm = fc.refine(fc.cranes.flexible_arm(), 2)
+    effects = [fc.Gravity(), fc.Flexible(), LARGE, fc.RayleighDamping(0.0, 1e-3), fc.Backlash({"shoulder_drive": 0.02})]
+    model = fc.assemble(arm, effects)
+    torque = {"shoulder_torque": lambda t: 0.3 * np.sin(12.0 * t)}
+    ways = {"near": fc.AdaptiveAlpha(), "long": fc.GeneralizedAlpha(1e-3)}
+    runs = {
+        name: fc.simulate(
+            model, fc.OpenLoop(torque), until=0.6, method=way, tolerance=fc.Tolerance(1e-6, 1e-9), every=0.01
+        )
+        for name, way in ways.items()
+    }
+    assert sum(e.name == "shoulder_drive" for e in runs["near"].events) > 4
+    for output in ("tip_x", "tip_y"):
+        near, long = (runs[name][output] for name in ("near", "long"))
+        assert long == pytest.approx(near, abs=1e-3)
+
+
 def test_a_motor_takes_up_the_play_before_the_load_moves():
     """Half the gap under constant torque takes √(b J/M); until then the load knows nothing."""
     model = fc.assemble(geared(), [LARGE, fc.Flexible(), fc.Backlash({"drive": 0.4})])
