@@ -259,7 +259,7 @@ class Stepper:
 
     def _stale(self, state: State, h: float) -> bool:
         made = self.memory
-        if made is None or abs(h - made.h) > 1e-6 * h:
+        if made is None or abs(h - made.h) > 1e-6 * h or made.state.dry.phase.tolist() != state.dry.phase.tolist():
             return True
         turned = np.abs(state.q - made.state.q)[self.turning]
         return bool(turned.size) and float(turned.max()) > _TURNED

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import settled
+from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import follow, lean, tighten
 from flexctrl.dynamics.march.record import DONE, OFTEN, March
 from flexctrl.dynamics.march.step import blended
@@ -162,6 +163,8 @@ def settle(m: March) -> int:
     load(f)
     pull(f)
     copy(f.padded, f.force, m.pulled)
+    if m.contacts.count > 0 and m.contacts.known == 0:
+        begun(m)
     if m.losing == 1:
         drive(f)
         energy(f)

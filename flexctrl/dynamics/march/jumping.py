@@ -7,7 +7,9 @@ import math
 from flexctrl.dynamics.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.books import copy
+from flexctrl.dynamics.march.contacts import bear_more, feel
 from flexctrl.dynamics.march.flowing import flow_on, pivot, released
+from flexctrl.dynamics.march.holding import follows, held
 from flexctrl.dynamics.march.record import DONE, FAILED, SINGULAR, WANTS_MASS, March
 from flexctrl.dynamics.march.step import sloped
 from flexctrl.kernels.eights import eight, larger, largest, put, total
@@ -55,6 +57,8 @@ def jump(m: March) -> int:
         status = solved_for(m)
         if status != DONE:
             return status
+    if m.contacts.count > 0 and not follows(m):
+        return FAILED
     if m.flows.count > 0:
         run_on(m)
     return changed(m)
@@ -113,12 +117,18 @@ def small(m: March) -> bool:
     The mass is believed to be as good as it was found to be when that was last looked at.
     """
     f = m.flat
+    if m.contacts.count > 0 and m.contacts.stuck > 0:
+        feel(m.contacts, f)
     pull(f)
     for i in range(0, f.padded, 8):
         put(f.force[i:], eight(f.force[i:]) - eight(m.pulled[i:]))
         put(f.rate[i:], eight(m.rate[i:]))
     f.force[f.n] = 0.0
     solved(m.axes, m.mass, m.fronts, f.force)
+    if m.contacts.count > 0 and m.contacts.stuck > 0:
+        if not held(m, m.mass, 0.0):
+            return False
+        bear_more(m.contacts)
     size = m.made_for * m.made_for * m.beta * added(m)
     if m.made_for > 0.0 and size * _LEFT <= m.tolerance:
         return True
@@ -168,10 +178,14 @@ def balanced(m: March) -> bool:
             press_entire(f)
         else:
             drive(f)
+            if m.contacts.count > 0 and m.contacts.stuck > 0:
+                feel(m.contacts, f)
             push(f)
         f.force[f.n] = 0.0
         released(m.flows, f.force)
         solved(m.axes, m.mass, m.fronts, f.force)
+        if m.contacts.count > 0 and m.contacts.stuck > 0 and not held(m, m.mass, 1.0):
+            return False
         change = added(m)
         if k == 0:
             first = change

@@ -133,7 +133,7 @@ class LeapingStepper(MarchingStepper):
     def leave(self, supply: Supply) -> Any:
         """Return where the march stands."""
         m, marcher, first = self.marcher.march, self.marcher, self.plain.equations.first
-        state, w = marcher.flattened.state(m.v, m.t), self.plain.forcing(supply.u)
+        state, w = marcher.flattened.state(m.v, m.t, marcher.dry), self.plain.forcing(supply.u)
         modal, course = marcher.leaps.modal, np.zeros((4, len(w)))
         course[0] = w
         rate = first.C[self.plain.model.n :] @ (first.A @ modal + first.B @ w)

@@ -8,6 +8,7 @@ from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.gliding import back, glide, land, leap, level
+from flexctrl.dynamics.march.holding import lets_go
 from flexctrl.dynamics.march.judging import compared, growth, judge
 from flexctrl.dynamics.march.jumping import jump, weighed
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
@@ -163,6 +164,8 @@ def fixed(m: March) -> int:
             return CORNER
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
             return CORNER
+        if m.contacts.count > 0 and lets_go(m):
+            return CORNER
         accept(m)
     return DONE
 
@@ -189,6 +192,9 @@ def controlled(m: March) -> int:
     again = False
     while m.done < m.wanted and m.kept < m.shelf and m.stop - m.t > 1e-12 * m.until:
         if m.phase == FRESH:
+            if not again:
+                m.tried = m.size
+                m.refused = m.rejected
             m.h = m.size if again else fitted(min(m.size, m.largest), m.stop - m.t)
             if m.t + m.h > m.until * (1.0 + 1e-12):
                 return DONE
@@ -211,9 +217,11 @@ def controlled(m: March) -> int:
         again = False
         reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
-            return CORNER
+            return unmarched(m)
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
-            return CORNER
+            return unmarched(m)
+        if m.contacts.count > 0 and lets_go(m):
+            return unmarched(m)
         factor = 0.9 * growth(error)
         if factor > 1.3 and m.h > 0.5 * m.size:
             m.size = m.h * min(2.5, factor)
@@ -221,6 +229,13 @@ def controlled(m: March) -> int:
             m.size = m.h * factor
         accept(m)
     return DONE
+
+
+def unmarched(m: March) -> int:
+    """Leave a step to be taken by itself, as if it had not been tried."""
+    m.size = m.tried
+    m.rejected = m.refused
+    return CORNER
 
 
 def fitted(h: float, left: float) -> float:

@@ -15,6 +15,7 @@ from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.frames import Later
 from flexctrl.dynamics.march.closing import closing_of
+from flexctrl.dynamics.march.contacts import contacts_of, enter_contacts
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.flowing import flows_of
 from flexctrl.dynamics.march.law import Sampling, no_law
@@ -146,8 +147,9 @@ class Marcher:
     def __init__(self, model: Model, method: Method) -> None:
         self.model, self.method = model, method
         self.flattened = flatten(model)
-        self.march = Packed(_march(self.flattened, method, self.leaping))
-        m = self.march
+        self.contacts: Any = Packed(contacts_of(self.flattened))
+        self.march = Packed(_march(self.flattened, self.contacts, method, self.leaping))
+        m, self.dry = self.march, model.rest.dry
         self._run = m.bound(run, without=("paced",))
         self._task, self._h, self._wanted, self._jumping = (m.cell(n) for n in ("task", "h", "wanted", "jumping"))
         self._inputs: Any = self.flattened.flat.u.data
@@ -236,6 +238,8 @@ class Marcher:
         """Put a point at the start; return the march."""
         m, F = self.march, self.flattened
         F.enter(point.state)
+        self.dry = point.state.dry
+        enter_contacts(self.contacts, F, self.dry)
         m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
         m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
         m.lean, m.phase, m.attempt, m.t = point.lean, FRESH, 0, point.state.t
@@ -281,7 +285,9 @@ class Marcher:
     def point(self, supply: Supply) -> AlphaPoint:
         """Return where the march stands."""
         m, F = self.march, self.flattened
-        return AlphaPoint(F.state(m.v, m.t), F.own(m.rate), supply, F.own(m.algorithmic), F.own(m.trend), m.lean)
+        return AlphaPoint(
+            F.state(m.v, m.t, self.dry), F.own(m.rate), supply, F.own(m.algorithmic), F.own(m.trend), m.lean
+        )
 
     def fixed(self, h: float, count: int) -> int:
         """Take up to ``count`` steps of one length; return how it ended."""
@@ -353,11 +359,18 @@ class Marcher:
         m.keeping, m.due, m.spacing = int(all_states), due, spacing
 
     def watch(self, sides: np.ndarray, state: State) -> None:
-        """End before steps that pass corners of laws of force; ``sides`` are those a state is on (none: do not)."""
+        """End before steps that pass corners of laws of force, or in which contacts may switch.
+
+        ``sides`` are those of the corners that a state is on.
+        """
         m = self.march
         m.corners.arms[:] = self.model.kinks.sheaved(state).ravel()
-        m.corners.sides[:] = sides if sides.size else 0.0
-        m.watching = int(sides.size > 0)
+        m.corners.sides[:] = sides
+        m.watching, self.contacts.watched = int(sides.size > 0), int(self.contacts.count > 0)
+
+    def watch_no_more(self) -> None:
+        """End steps wherever they do."""
+        self.march.watching = self.contacts.watched = 0
 
     def books(self, sums: Sums) -> Sums:
         """Return the books, gone on from some sums."""
@@ -417,7 +430,8 @@ class Marcher:
         """Fill in a matrix that the loops do not make themselves, and factorise it."""
         F, f, m = self.flattened, self.flattened.flat, self.march
         poses = f.z[: self.model.forces.drive_base].reshape(-1, NODE_SLOT)[:, :12]
-        state = F.pose_state(poses.ravel(), f.q + f.step, f.v, f.found, m.t)
+        state = F.pose_state(poses.ravel(), f.q + f.step, f.v, f.found, m.t, self.dry)
+        state = self.model.switches.unheld(state)
         slope = self.model.slope(state, state.v, F.own(f.rate), seeds, f.u).tocoo()
         m.entries[:] = 0.0
         try:
@@ -432,10 +446,10 @@ class Marcher:
         if not count:
             return ()
         table = self.march.states[: count * width].reshape(count, width).copy()
-        return Later(count, float(table[-1, -1]), partial(states_of, self.flattened, table))
+        return Later(count, float(table[-1, -1]), partial(states_of, self.flattened, table, self.dry))
 
 
-def _march(F: Flattened, method: Method, leaping: int) -> March:
+def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
     state, part, probes = width_of(F), components(F.model), probes_of(F, method.weight)
@@ -446,6 +460,7 @@ def _march(F: Flattened, method: Method, leaping: int) -> March:
         corners=corners_of(F.model),
         closing=closing_of(F),
         flows=flows_of(F),
+        contacts=contacts,
         law=no_law(),
         leap=no_leap(),
         fronts=F.plan.fronts,

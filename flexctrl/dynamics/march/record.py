@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.dynamics.march.closing import Closing
+from flexctrl.dynamics.march.contacts import Contacts
 from flexctrl.dynamics.march.corners import Corners
 from flexctrl.dynamics.march.flowing import Flows
 from flexctrl.dynamics.march.law import Law
@@ -168,6 +169,8 @@ class March:
     task : int
     wanted, done, rejected : int
         Steps.
+    tried, refused : float, int
+        Size and count before the step under way was rejected.
     phase, attempt, iteration, last, contraction, strayed : int, float
         Where in a step it is.
     leaping : int
@@ -225,6 +228,7 @@ class March:
     corners: Corners
     closing: Closing
     flows: Flows
+    contacts: Contacts
     law: Law
     leap: Leap
     fronts: Fronts
@@ -277,6 +281,8 @@ class March:
     wanted: int = 0
     done: int = 0
     rejected: int = 0
+    tried: float = 0.0
+    refused: int = 0
     phase: int = FRESH
     attempt: int = 0
     iteration: int = 0

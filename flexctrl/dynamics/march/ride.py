@@ -51,7 +51,7 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
     Between samples only, where some freedom has no mass: the march has no rule for how its place jumps.
     """
     stepper, plan = journey.stepper, journey.plan
-    if not isinstance(stepper, MarchingStepper) or journey.watch.names:
+    if not isinstance(stepper, MarchingStepper):
         return False
     if journey.watch.events and _near_stop(journey):
         return False
@@ -377,16 +377,17 @@ class _Ride:
         """Hand over to the journey; tell whether there were any steps."""
         j, m = self.journey, self.marcher.march
         self.stepper.count()
-        self.marcher.watch(np.zeros(0), j.point.state)
+        self.marcher.watch_no_more()
         j.mark.rejected += m.rejected - self.rejected
         if not self.legs.parts:
             return False
-        j.balked = self.balked
+        j.balked, j.mark.stuck = self.balked, 0
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)
         if not j.watch.idle:
             j.watch.settle(j.point)
         if not self.jumped:
-            j.point = self.stepper.plain.renew(j.point, self.supply, j.mark.size)
+            held = replace(j.point, state=j.plan.model.switches.under(j.point.state, self.supply.u))
+            j.point = self.stepper.plain.renew(held, self.supply, j.mark.size)
         return True

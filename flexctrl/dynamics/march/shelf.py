@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexctrl.model.flat.flattening import Flattened
-from flexctrl.model.state import State
+from flexctrl.model.state import Dry, State
 
 __all__ = ["row_of", "states_of", "width_of"]
 
@@ -16,8 +16,8 @@ def width_of(F: Flattened) -> int:
     return 12 * f.nodes + 2 * f.padded + f.drives + F.gauges.turning + 1
 
 
-def states_of(F: Flattened, table: np.ndarray) -> list[State]:
-    """Return the states of rows."""
+def states_of(F: Flattened, table: np.ndarray, dry: Dry) -> list[State]:
+    """Return the states of rows, with contacts that do the same in all of them."""
     f, count, width = F.flat, *table.shape
     n, nodes = f.n, 12 * f.nodes
     poses = table[:, :nodes].reshape(count, -1, 12)
@@ -26,7 +26,7 @@ def states_of(F: Flattened, table: np.ndarray) -> list[State]:
     q[:, F.plan.order] = table[:, nodes : nodes + n]
     v[:, F.plan.order] = table[:, nodes + f.padded : nodes + f.padded + n]
     driven, shown = np.split(table[:, nodes + 2 * f.padded : width - 1].copy(), [f.drives], axis=1)
-    t, dry = table[:, width - 1].tolist(), F.model.rest.dry
+    t = table[:, width - 1].tolist()
     return [State(x[i], R[i], q[i], v[i], driven[i], t[i], dry, shown[i]) for i in range(count)]
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.contacts import feel, firmness
+from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
@@ -84,6 +86,8 @@ def newton(m: March) -> int:
             else:
                 place(f)
                 drive(f)
+                if m.contacts.count > 0 and m.contacts.stuck > 0:
+                    feel(m.contacts, f)
                 push(f)
             m.phase = CORRECT
             if m.attempt == 1 or m.contraction > _POOR or (m.iteration == 0 and stale(m)):
@@ -212,6 +216,12 @@ def correct(m: March) -> float:
     if m.swift != 1:
         f.force[f.n] = 0.0
         solved(m.axes, m.tangent, m.fronts, f.force)
+        if (
+            m.contacts.count > 0
+            and m.contacts.stuck > 0
+            and not held(m, m.tangent, 1.0 / firmness(to_v(m), to_rate(m)))
+        ):
+            return math.nan
     speed = to_v(m)
     pull = to_rate(m)
     most = 0.0 * eight(m.weight)

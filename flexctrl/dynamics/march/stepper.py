@@ -100,7 +100,10 @@ class MarchingStepper:
         """
         self.enter(point)
         self.marcher.about_to(step)
-        if self.marcher.jump(supply.u) == DONE:
+        self.marcher.march.unsure = int(self.marcher.contacts.count > 0)  # a contact may have switched
+        status = self.marcher.jump(supply.u)
+        self.marcher.march.unsure = 0
+        if status == DONE:
             return self.leave(supply)
         self._here = None
         return self.plain.renew(point, supply, step)

@@ -38,6 +38,7 @@ class Weaver:
         chart = chart_of(model, model.rest) if model.large else None
         self.flattened, spare, places = widened(model, chart)
         self.flattened.enter(model.rest)
+        self.dry = model.rest.dry
         self.width = width_of(self.flattened)
         self.columns = 1 + len(model.outputs)
         self.weave = Packed(_woven(self.flattened, chart, spare, places, kept, self.width))
@@ -45,7 +46,7 @@ class Weaver:
 
     def set_out(self, state: State) -> None:
         """Take up the state that the next steps start from."""
-        self.weave.first[:] = row_of(self.flattened, state)
+        self.weave.first[:], self.dry = row_of(self.flattened, state), state.dry
 
     @property
     def t(self) -> float:
@@ -56,7 +57,7 @@ class Weaver:
     def last(self) -> Later:
         """The state that the next steps start from, to be made when it is looked at."""
         row = self.weave.first.copy()
-        return Later(1, float(row[-1]), partial(states_of, self.flattened, row[None]))
+        return Later(1, float(row[-1]), partial(states_of, self.flattened, row[None], self.dry))
 
     def rows(
         self, steps: np.ndarray, times: np.ndarray, ends: np.ndarray, due: float, spacing: float
@@ -88,7 +89,9 @@ class Weaver:
             found[part] = w.rows[: count * self.columns].reshape(count, -1)
             if w.kept:
                 table = w.drawn[: w.kept * self.width].reshape(w.kept, -1).copy()
-                drawn.append(Later(len(table), float(table[-1, -1]), partial(states_of, self.flattened, table)))
+                drawn.append(
+                    Later(len(table), float(table[-1, -1]), partial(states_of, self.flattened, table, self.dry))
+                )
         return found, drawn
 
     def times(self, times: np.ndarray) -> None:

@@ -12,11 +12,9 @@ __all__ = ["Flattened", "can_be_flat", "flatten", "layout_of"]
 def can_be_flat(model: Model) -> bool:
     """Tell whether `flatten` covers a model.
 
-    No dry contacts; in small motion no loads that turn with their nodes.
+    In small motion no loads that turn with their nodes.
     """
-    if model.n == 0 or model.switches.names:
-        return False
-    return model.large or not model.signals.follows
+    return model.n > 0 and (model.large or not model.signals.follows)
 
 
 def flatten(model: Model) -> Flattened:

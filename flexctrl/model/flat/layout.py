@@ -19,7 +19,7 @@ from flexctrl.model.flat.fronts import Plan, plan_of
 from flexctrl.model.gauges import Gauges, gauges_of
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.model import Model
-from flexctrl.model.state import State
+from flexctrl.model.state import Dry, State
 
 __all__ = ["Flattened", "Layout"]
 
@@ -86,19 +86,21 @@ class Flattened:
         """Whether what never changes in poses is as the kernels of the whole machine take it to be."""
         return bool((abs(self.flat.z[self.entire.cells] - self.entire.values) <= _ROUND_OFF).all())
 
-    def state(self, v: np.ndarray, t: float) -> State:
+    def state(self, v: np.ndarray, t: float, dry: Dry) -> State:
         """Return the state at the start of the step, with rates ``v`` in the order of elimination.
 
         Its outputs have been read.
         """
-        found = self.pose_state(self.flat.pose, self.flat.q, v, self.flat.driven, t)
+        found = self.pose_state(self.flat.pose, self.flat.q, v, self.flat.driven, t, dry)
         return replace(found, shown=self.gauges.shown.copy())
 
-    def pose_state(self, pose: np.ndarray, q: np.ndarray, v: np.ndarray, driven: np.ndarray, t: float) -> State:
+    def pose_state(
+        self, pose: np.ndarray, q: np.ndarray, v: np.ndarray, driven: np.ndarray, t: float, dry: Dry
+    ) -> State:
         """Return the state of a pose (12 a node) and values in the order of elimination."""
         rows = pose.reshape(-1, 12)
         x, R = rows[:, :3].copy(), rows[:, 3:].reshape(-1, 3, 3).copy()
-        return State(x, R, self.own(q), self.own(v), driven.copy(), t, self.model.rest.dry)
+        return State(x, R, self.own(q), self.own(v), driven.copy(), t, dry)
 
 
 class Layout:

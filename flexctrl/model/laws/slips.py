@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
@@ -55,14 +56,14 @@ class Slips:
         motion, still = self.forces.motion, np.zeros(self.forces.motion.n)
         W = np.zeros((self.order.size, motion.n))
         gradients = [row for found in self._found(state, still, still) for row in found[:, 3:]]
-        for row, places, gradient in zip(W, self._cells, gradients, strict=True):
+        for row, places, gradient in zip(W, self.cells, gradients, strict=True):
             raw = np.zeros(motion.raw)
             np.add.at(raw, places, gradient)
             row[:] = motion.collect(state, raw)
         return W
 
     @cached_property
-    def _cells(self) -> tuple[np.ndarray, ...]:
+    def cells(self) -> tuple[np.ndarray, ...]:
         """Raw places that each contact moves."""
         source_base = self.forces.motion.source_base
         return tuple(cells for f in self.families for cells in f.scatter(source_base)[:, :-1])
@@ -75,6 +76,15 @@ class Slips:
             run(z, results)
             found.append(results.reshape(f.count, -1))
         return found
+
+    def each(self, scatter: Sequence[np.ndarray]) -> tuple[Run, ...]:
+        """Return the kernel of each contact (see `at` and `cells`): where it adds speed, rate, place and gradient."""
+        base, backend = self.forces.drive_base, self.forces.backend
+        alone = ((_slip_kernel(f.kernels.kind), f, i) for f in self.families for i in range(f.count))
+        return tuple(
+            backend.bind(kernel, f.gather(base)[[i]], f.parameters[[i]], goal[None])
+            for (kernel, f, i), goal in zip(alone, scatter, strict=True)
+        )
 
     @cached_property
     def _runs(self) -> tuple[Run, ...]:

@@ -26,12 +26,12 @@ from flexctrl.model.state import Dry, State
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
 
-__all__ = ["Switches"]
+__all__ = ["FADING", "Switches"]
 
 Force = TypeVar("Force", np.ndarray, sp.csr_matrix)
 T = TypeVar("T")
 
-_FADING = 1e4
+FADING = 1e4
 _STILL = 1e-10
 _SLACK = 1e-9
 _DEPENDENT = 1e12
@@ -56,21 +56,22 @@ class Switches:
         at = next((i for i, e in enumerate(effects) if isinstance(e, CoulombFriction)), len(effects))
         first = sum(len(e.inner(structure)) for e in effects[:at])
         laws = [where for e in effects[at:] if isinstance(e, CoulombFriction) for where, _ in e.acting]
-        return tuple(laws[int(i) - first] for i in self._slips.order)
+        return tuple(laws[int(i) - first] for i in self.slips.order)
 
     @cached_property
-    def _slips(self) -> Slips:
+    def slips(self) -> Slips:
+        """How the contacts slip."""
         forces = self.model.forces
         return Slips(forces, tuple(f for f in forces.families if f.kernels.kind.name.startswith("dry_")))
 
     @cached_property
-    def _static(self) -> np.ndarray:
+    def static(self) -> np.ndarray:
         """What each contact bears before it breaks loose [N or N m]."""
-        return np.concatenate([f.parameters[:, 4] for f in self._slips.families])
+        return np.concatenate([np.zeros(0), *(f.parameters[:, 4] for f in self.slips.families)])
 
     def phases(self, state: State) -> np.ndarray:
         """Return the phase of each contact."""
-        return state.dry.phase[self._slips.order]
+        return state.dry.phase[self.slips.order]
 
     def sticks(self, state: State) -> bool:
         """Tell whether any contact sticks."""
@@ -93,10 +94,10 @@ class Switches:
         numpy.ndarray, shape (n,)
         """
         W, back = self._hold(state)
-        speeds, rates, places = self._slips.at(state, v, a)
-        astray = places - state.dry.anchor[self._slips.order]
+        speeds, rates, places = self.slips.at(state, v, a)
+        astray = places - state.dry.anchor[self.slips.order]
         astray -= 2.0 * np.pi * np.rint(astray / (2.0 * np.pi))
-        slip = rates + _FADING * speeds + 0.25 * _FADING**2 * astray
+        slip = rates + FADING * speeds + 0.25 * FADING**2 * astray
         return force - back @ (W @ force + self._weight * slip[self.phases(state) == STUCK])
 
     def freed(self, state: State, force: Force) -> Force:
@@ -106,10 +107,15 @@ class Switches:
             return force - back @ (W @ force)
         return sp.csr_matrix(force - sp.csr_matrix(back) @ sp.csr_matrix(W @ force))
 
+    def unheld(self, state: State) -> State:
+        """Return a state in which what sticks is taken to be without friction, and what slides is not."""
+        phase = state.dry.phase
+        return state.with_(dry=Dry(np.where(phase == STUCK, 0.0, phase), state.dry.anchor))
+
     def held_slope(self, state: State, slope: sp.csr_matrix, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return the slope of `held` from that of the balance without."""
         W, back = self._hold(state)
-        hold = seeds[2] + _FADING * seeds[1] + 0.25 * _FADING**2 * seeds[0]
+        hold = seeds[2] + FADING * seeds[1] + 0.25 * FADING**2 * seeds[0]
         rows = W @ slope + hold * self._weight * W
         return sp.csr_matrix(slope - sp.csr_matrix(back) @ sp.csr_matrix(rows))
 
@@ -125,7 +131,7 @@ class Switches:
         return self._once("hold", state, lambda: self._holds(state))
 
     def _holds(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        W = self._slips.rows(state)[self.phases(state) == STUCK]
+        W = self.slips.rows(state)[self.phases(state) == STUCK]
         return W, _inverse(W)
 
     def _once(self, what: str, state: State, make: Callable[[], T]) -> T:
@@ -157,27 +163,27 @@ class Switches:
             loose [N or N m].
         """
         phases = self.phases(state)
-        gaps = np.where(phases == 0.0, 1.0, phases * self._slips.speeds(state))
+        gaps = np.where(phases == 0.0, 1.0, phases * self.slips.speeds(state))
         stuck = phases == STUCK
         if stuck.any():
             held = self._once("gaps", state, lambda: (u, self._holding(state, u)[0]))
             if not np.array_equal(held[0], u):
                 held = (u, self._holding(state, u)[0])
-            gaps[stuck] = self._static[stuck] - np.abs(held[1])
+            gaps[stuck] = self.static[stuck] - np.abs(held[1])
         return gaps
 
     def _holding(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the forces that hold what sticks, and the accelerations of what has mass."""
-        model, dry, a = self.model, state.dry, np.zeros(self.model.n)
+        model, a = self.model, np.zeros(self.model.n)
         stuck = self.phases(state) == STUCK
-        loose = state.with_(dry=Dry(np.where(dry.phase == STUCK, 0.0, dry.phase), dry.anchor))
+        loose = self.unheld(state)
         force = model.balance(loose, state.v, a) + model.loads(loose, u)
         M = -model.slope(loose, state.v, a, (0.0, 0.0, 1.0), u)
         heavy = np.flatnonzero(M.diagonal() > model.dust)
         solve = factorise(M if heavy.size == model.n else M[heavy][:, heavy])
         W = self._hold(state)[0][:, heavy]
         pushed, free = np.array([solve(row) for row in W]).reshape(W.shape).T, solve(force[heavy])
-        _, turning, _ = self._slips.at(state, state.v, a)
+        _, turning, _ = self.slips.at(state, state.v, a)
         held = np.linalg.pinv(W @ pushed) @ -(W @ free + turning[stuck])
         a[heavy] = free + pushed @ held
         return held, a
@@ -202,7 +208,7 @@ class Switches:
         if not self.names:
             return state
         self._check_mass(state, u)
-        speeds = self._slips.speeds(state)
+        speeds = self.slips.speeds(state)
         return self._settled(state, u, np.where(np.abs(speeds) <= _STILL, STUCK, np.sign(speeds)))
 
     def under(self, state: State, u: np.ndarray) -> State:
@@ -253,7 +259,7 @@ class Switches:
             held = self._holding(state, u)[0][np.flatnonzero(phases == STUCK).tolist().index(contact)]
             phases[contact] = -np.sign(held)
         else:
-            speed, W = self._slips.speeds(state), self._slips.rows(state)
+            speed, W = self.slips.speeds(state), self.slips.rows(state)
             state = state.with_(v=state.v - _inverse(W[[contact]]) @ speed[[contact]])
             phases[contact] = STUCK
         return self._settled(state, u, phases)
@@ -282,9 +288,9 @@ class Switches:
             state = self._with(state, phases)
             stuck = np.flatnonzero(phases == STUCK)
             held, a = self._holding(state, u)
-            _, rates, _ = self._slips.at(state, state.v, a)
+            _, rates, _ = self.slips.at(state, state.v, a)
             back = [i for i in loosened if phases[i] != STUCK and phases[i] * rates[i] < 0.0]
-            excess = np.abs(held) - self._static[stuck] * (1.0 - _SLACK)
+            excess = np.abs(held) - self.static[stuck] * (1.0 - _SLACK)
             fresh = [k for k in np.argsort(-excess) if excess[k] > 0.0 and int(stuck[k]) not in loosened]
             if back:
                 phases[back] = STUCK
@@ -297,7 +303,7 @@ class Switches:
 
     def _with(self, state: State, phases: np.ndarray) -> State:
         """Return a state with other phases; what sticks from now on is held where it is."""
-        order, (_, _, places) = self._slips.order, self._slips.at(state, state.v, state.v)
+        order, (_, _, places) = self.slips.order, self.slips.at(state, state.v, state.v)
         phase, anchor = state.dry.phase.copy(), state.dry.anchor.copy()
         fresh = (phases == STUCK) & (phase[order] != STUCK)
         anchor[order] = np.where(fresh, places, anchor[order])
@@ -308,7 +314,7 @@ class Switches:
         still = np.zeros(self.model.n)
         M = -self.model.slope(state.loose, still, still, (0.0, 0.0, 1.0), u)
         light = M.diagonal() <= self.model.dust
-        W = self._slips.rows(state)
+        W = self.slips.rows(state)
         bad = np.flatnonzero(np.abs(W[:, ~light]).max(axis=1, initial=0.0) == 0.0)
         if bad.size:
             raise StructureError(
