@@ -106,8 +106,14 @@ class Model:
 
     @property
     def rest(self) -> State:
-        """The machine as drawn, at rest."""
+        """The machine at rest: as drawn, or in the equilibrium that small motion is about (`GeometricStiffness`)."""
         return self.motion.rest
+
+    @cached_property
+    def drawn(self) -> State:
+        """The machine as drawn, at rest; where small motion is about an equilibrium, displaced from that."""
+        away = self.rest.q
+        return self.advance(self.rest, -away, np.zeros(self.n), self.rest.t) if away.any() else self.rest
 
     @cached_property
     def signals(self) -> Signals:

@@ -277,7 +277,7 @@ class Scene:
     def start(self, model: Model) -> State:
         """Return the state from which a model of this scene (``model`` or ``twin``) is run."""
         if self._simulation.start is Start.DRAWN:
-            return model.rest
+            return model.drawn
         if model is self.model:
             return self.rest.state
         return self.twin_rest.state if model is self.twin else self._equilibrium(model).state

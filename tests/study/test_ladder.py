@@ -149,3 +149,18 @@ def test_a_machine_without_an_equilibrium_has_the_rungs_that_need_none():
     assert found["linear"].failure
     assert all(np.isfinite(r.error) for r in found.rungs if r.name != "linear")
     assert found["full"].error < 0.05
+
+
+def test_small_motion_begins_as_drawn_too():
+    """A mass let go on a spring that hangs straight falls 2 m g / k in every rung that has the spring."""
+    load = fc.PointMass("load", (0, 0, -1), 2.0)
+    spring = fc.Spring("spring", (0, 0, 0), (0, 0, -1), 400.0)
+    joints = [fc.Support(spring.start), fc.Support(load.node, "u v"), fc.Pin(spring.end, load.node)]
+    structure = fc.Structure([load, spring], joints, outputs=[fc.Position("z", load.node, "z")])
+    plan = fc.Simulation(0.5, fc.GeneralizedAlpha(1e-3), every=0.001)
+    scene = fc.Scene(structure, (fc.Gravity(), fc.LargeRotation()), simulation=plan)
+    linear = dict(rungs(scene))["linear"].of(scene).run()
+    fall = 2.0 * 2.0 * 9.81 / 400.0
+    assert linear["z"] == pytest.approx(-1.0 - 0.5 * fall * (1.0 - np.cos(np.sqrt(200.0) * linear.t)), abs=1e-9)
+    entries = {entry.name: entry for entry in fc.ledger(scene, 0.05).entries}
+    assert entries["large_rotation"].change.outputs["z"] < 1e-3
