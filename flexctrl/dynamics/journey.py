@@ -18,7 +18,7 @@ from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
 from flexctrl.dynamics.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
-from flexctrl.dynamics.landing import SMALLEST, Missed, landed
+from flexctrl.dynamics.landing import SHORTEST, SMALLEST, Missed, landed
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.midpoint import ConservingMidpoint
 from flexctrl.dynamics.rows import Rows
@@ -292,7 +292,7 @@ class Journey:
             after = self.stepper.step(self.point, h)
         except StepError as failure:
             self.mark.rejected += 1
-            if h < 2e-3 * self.mark.size or h < SMALLEST:
+            if h < 2e-3 * self.mark.size:
                 why = f"{failure}, nor with any longer one up to {self.mark.size:.3g} s; take AdaptiveAlpha"
                 raise StepError(failure.worst, why) from failure
             return self._halved(h, stop)
@@ -300,7 +300,7 @@ class Journey:
             self._accept(after, stop)
         except Missed:
             self.mark.rejected += 1
-            if h < 2e-3 * self.mark.size or h < SMALLEST:
+            if h < 2e-3 * self.mark.size:
                 raise
             self._halved(h, stop)
 
@@ -328,7 +328,7 @@ class Journey:
         while True:
             if mark.led and h != mark.led:
                 lead(self, h)
-            if h < SMALLEST * max(1.0, t):
+            if h < SMALLEST * max(SHORTEST * self.plan.until, t):
                 raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
             try:
                 after = self.stepper.step(self.point, h)

@@ -12,9 +12,10 @@ from flexctrl.dynamics.steps import Point, StepError
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["SMALLEST", "Missed", "landed"]
+__all__ = ["SHORTEST", "SMALLEST", "Missed", "landed"]
 
 SMALLEST = 1e-12
+SHORTEST = 1e-3  # of a run: before that a step may be shorter than those that the clock resolves later
 _NEAR = 1e-9
 _LANDINGS, _LANDINGS_MOST = 12, 60
 _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)

@@ -122,7 +122,7 @@ class Report:
     worst : str
         The degree of freedom that converged last.
     closure_error : float
-        How far conditions that close rigid loops were violated [m].
+        How far conditions that close rigid loops were violated [rad, or shares of what they span].
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str

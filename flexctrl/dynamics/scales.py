@@ -7,28 +7,19 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.model import units
 from flexctrl.model.model import Model
 
 __all__ = ["components", "farthest", "largest", "output_yardsticks", "turning", "yardsticks"]
 
-_POINT = 1e-12
-_SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
-
 
 def turning(model: Model) -> np.ndarray:
     """Return which degrees of freedom are rotations, shape (n,)."""
-    return once(model, _turning)
-
-
-def _turning(model: Model) -> np.ndarray:
-    other = (*_SHIFTS, *model.motion.scales)
-    return np.array([not name.endswith(other) for name in model.coordinates], dtype=bool)
+    return once(model, units.turning)
 
 
 def yardsticks(model: Model) -> np.ndarray:
     """Return what an error of 1 is in each degree of freedom, shape (n,): a radian, or the size of the machine.
-
-    A machine that is but a point counts as a metre.
 
     A source angle counts as the motion it drives, or a motor's many turns would excuse any error of the machine;
     inner freedoms of effects have scales of their own.
@@ -37,11 +28,7 @@ def yardsticks(model: Model) -> np.ndarray:
 
 
 def _yardsticks(model: Model) -> np.ndarray:
-    size = _size(model)
-    gears = {f"{d.name}_source": abs(d.effective_ratio) * (1.0, size)[d.column == 0] for d in model.structure.drives}
-    known = gears | model.motion.scales
-    pairs = zip(model.coordinates, turning(model), strict=True)
-    return np.array([known.get(name, 1.0 if turns else size) for name, turns in pairs])
+    return units.yardsticks(model, model.structure.size)
 
 
 def output_yardsticks(model: Model, time: float) -> np.ndarray:
@@ -57,17 +44,13 @@ def output_yardsticks(model: Model, time: float) -> np.ndarray:
     -------
     numpy.ndarray, shape (outputs,)
     """
-    size, motion = _size(model), model.motion
+    size, motion = model.structure.size, model.motion
     raw = np.ones(motion.raw)
     raw[: motion.source_base].reshape(-1, 6)[:, :3] = size
-    for k, drive in enumerate(model.structure.drives):
-        raw[motion.source_base + k] = abs(drive.effective_ratio) * (1.0, size)[drive.column == 0]
+    gears = units.geared(model, size)
+    raw[motion.source_base : motion.source_base + gears.size] = gears
     on_place, on_rates = model.signals.slopes(model.rest, np.zeros(motion.raw), motion.raw)
     return abs(on_place) @ raw + abs(on_rates) @ raw / time
-
-
-def _size(model: Model) -> float:
-    return float(model.structure.size) if model.structure.size > _POINT else 1.0
 
 
 def components(model: Model) -> np.ndarray:

@@ -16,7 +16,7 @@ from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track, curves_of
 from flexctrl.dynamics.events import Event, Watch
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.journey import SMALLEST, Journey, Plan
+from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.record import InMemory, Record
 from flexctrl.dynamics.rows import Rows
@@ -30,6 +30,7 @@ from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
+from flexctrl.structure.freedoms import HUGE
 
 _ROWS = 1000
 
@@ -102,8 +103,8 @@ def simulate(
     given = {"start": start, "method": method, "tolerance": tolerance, "record": record, "autosave": autosave}
     check_arguments({"model": model, "progress": progress, **given})
     check_times(until, every, start)
-    if until < SMALLEST:
-        raise StructureError(f"simulate: until = {until} s; no step is shorter than {SMALLEST:g} s: give a longer time")
+    if until < 1.0 / HUGE:
+        raise StructureError(f"simulate: until = {until} s; expected {1.0 / HUGE:g} s at least: give a longer time")
     record = record or InMemory()
     if isinstance(model, LinearModel):
         plant, method = _plant(model, method, every or until / _ROWS)

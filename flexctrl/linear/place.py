@@ -36,12 +36,15 @@ class Place(Generic[Machine, Shape]):
         Displacements of the machine's degrees of freedom for one of each coordinate.
     inputs : numpy.ndarray, shape (inputs,)
         What it is in equilibrium with.
+    pull : float
+        The ω² at which the machine would swing as a whole under the forces at work [(rad/s)²]; 0 for none.
     """
 
     model: Machine
     state: Shape
     basis: sp.csc_matrix
     inputs: np.ndarray
+    pull: float
 
     def strain(self, shapes: np.ndarray) -> np.ndarray:
         """Return ΦᵀKΦ of displacements of the coordinates, from the machine itself.

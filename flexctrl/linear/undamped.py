@@ -18,14 +18,14 @@ from flexctrl.linear.modes import Modes, shares_of
 from flexctrl.linear.parts import energies_by_part
 from flexctrl.structure.freedoms import check_whole
 
-__all__ = ["modes", "modes_of", "refuse_unsymmetric"]
+__all__ = ["modes", "modes_of", "refuse_unsymmetric", "unseen"]
 
 DENSE = 300
 COMPLETE = 1000
 DEFAULT_COUNT = 20
 BLURRED = 1e-13
 ROUND_OFF = 2e-13
-UNSURE, UNSEEN = 1e-7, 1e-2
+UNSURE, UNSEEN, LOST, SLIGHT = 1e-7, 1e-6, 0.05, 1e-12
 STRESS_NOISE = 5.0
 EXTENDED_EPS = float(np.finfo(np.longdouble).eps)
 
@@ -95,7 +95,8 @@ def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
 
 def _recalculated(linear: LinearModel, base: Scaled, pairs: Eigenpairs) -> Eigenpairs:
     """Soft modes whose λ is unsure by the rounding of K, by Rayleigh–Ritz with the stiffness of the machine itself."""
-    faint = np.where(pairs.rigid, RIGID_NOISE * pairs.noise > UNSEEN, pairs.noise > UNSURE * np.abs(pairs.values))
+    hidden = RIGID_NOISE * pairs.noise > unseen(linear, pairs.values)
+    faint = np.where(pairs.rigid, hidden, pairs.noise > UNSURE * np.abs(pairs.values))
     unsure = np.flatnonzero(faint)
     if linear.place is None or not unsure.size:
         return pairs
@@ -110,6 +111,24 @@ def _recalculated(linear: LinearModel, base: Scaled, pairs: Eigenpairs) -> Eigen
     values[rigid], noise[unsure] = 0.0, spread * EXTENDED_EPS / EPS
     order = np.argsort(values, kind="stable")
     return Eigenpairs(values[order], shapes[:, order], rigid[order], noise[order])
+
+
+def unseen(linear: LinearModel, omega_squared: np.ndarray) -> float:
+    """Return the ω² that nobody misses: beside that of what hangs in the machine, or else of its first flexible mode.
+
+    Parameters
+    ----------
+    linear : LinearModel
+    omega_squared : numpy.ndarray, shape (k,)
+        Of its modes.
+
+    Returns
+    -------
+    float
+    """
+    first = float(omega_squared.min(initial=np.inf, where=omega_squared > 0.0))
+    first, pull = first if np.isfinite(first) else 0.0, linear.place.pull if linear.place else 0.0
+    return LOST * pull if pull > SLIGHT * first else UNSEEN * first
 
 
 def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenpairs:

@@ -18,11 +18,11 @@ from flexctrl.model.paths.pivots import holds, negative_pivots
 from flexctrl.model.rounding import force_rounding, slope_terms
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
-from flexctrl.model.tangents import TURNS
+from flexctrl.model.units import geared, turning, units
 
 __all__ = ["Balance"]
 
-_LASTING = ("free", "fixed", "still", "turning", "lever", "unit", "inertia", "heaviest", "_weights")
+_LASTING = ("free", "fixed", "still", "lever", "unit", "inertia", "felt", "heaviest", "_raw_lever", "_weights")
 _STILL, _UNFELT = 1e-12, 1e-7
 
 
@@ -66,33 +66,38 @@ class Balance:
         return self.model.structure.size
 
     @cached_property
-    def turning(self) -> np.ndarray:
-        """Which coordinates are angles."""
-        return np.array([name.endswith(TURNS) for name in self.model.coordinates], dtype=bool)
+    def unit(self) -> np.ndarray:
+        """A displacement of one of each coordinate: a radian, the size of the machine, what a motor turns by it."""
+        return units(self.model, self.size)
 
     @cached_property
     def lever(self) -> np.ndarray:
         """By what a force on each coordinate is divided to count as one in newtons."""
-        return np.where(self.turning, self.size, 1.0)
-
-    @cached_property
-    def unit(self) -> np.ndarray:
-        """A displacement of one of each coordinate: a radian, or the size of the machine."""
-        return np.where(self.turning, 1.0, self.size)
+        return self.size / self.unit
 
     @cached_property
     def inertia(self) -> np.ndarray:
         """Masses of the coordinates, none of them zero."""
         mass = np.asarray(self.model.mass().diagonal())
-        heaviest = mass[~self.turning].max(initial=0.0) or mass.max(initial=0.0) or 1.0
+        felt = mass / self.lever**2
+        heaviest = felt[self.moving].max(initial=0.0) or felt.max(initial=0.0) or 1.0
         return np.maximum(mass, 1e-6 * heaviest * self.lever**2)
 
     @cached_property
+    def felt(self) -> np.ndarray:
+        """What masses at the ends of levers as long as the machine they are as heavy as [kg]."""
+        return self.inertia / self.lever**2
+
+    @cached_property
     def heaviest(self) -> float:
-        """The largest of them [kg]."""
-        if self.turning.all():
-            return float(self.inertia.max(initial=1e-300) / self.size**2)
-        return float(self.inertia[~self.turning].max())
+        """The largest mass that is moved, or felt where nothing is [kg]."""
+        felt = self.felt[self.moving] if self.moving.any() else self.felt
+        return float(felt.max(initial=1e-300))
+
+    @cached_property
+    def moving(self) -> np.ndarray:
+        """Which coordinates are no angles."""
+        return ~turning(self.model)
 
     def force(self, state: State) -> np.ndarray:
         """Return the unbalanced forces on the free coordinates."""
@@ -117,7 +122,7 @@ class Balance:
 
     def scale(self, state: State) -> float:
         """Return the forces at work: all loads and weights together [N]."""
-        loads = np.abs(self.model.signals.loads_at(state) @ self.u).sum()
+        loads = np.abs(self.model.signals.loads_at(state) @ self.u / self._raw_lever).sum()
         weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
         return float(max(loads, weights, np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0), 1e-300))
 
@@ -126,7 +131,7 @@ class Balance:
 
         Weights count whether the machine can give way to them or not.
         """
-        mass = float(self.inertia[~self.turning].sum()) or self.heaviest
+        mass = float(self.felt[self.moving].sum()) or self.heaviest
         return max(self.scale(state), self._weights) / (mass * self.size)
 
     @cached_property
@@ -135,6 +140,15 @@ class Balance:
         model = self.model
         nodes = model.forces.raw(model.rest, self.still, self.still)[: model.motion.source_base].reshape(-1, 2, 3)
         return float(np.abs(nodes[:, 0]).sum() + np.abs(nodes[:, 1]).sum() / self.size)
+
+    @cached_property
+    def _raw_lever(self) -> np.ndarray:
+        """The same as `lever`, of raw forces."""
+        motion, gears = self.model.motion, geared(self.model, self.size)
+        lever = np.ones(motion.raw)
+        lever[: motion.source_base].reshape(-1, 2, 3)[:, 1] = self.size
+        lever[motion.source_base : motion.source_base + gears.size] = self.size / gears
+        return lever
 
     def idle(self, state: State) -> bool:
         """Tell whether nothing is left to do: every force is round-off where it acts, and no load is at work beside.

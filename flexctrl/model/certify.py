@@ -16,14 +16,14 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
 from flexctrl.linear.pattern import symmetric
 from flexctrl.linear.pencil import EPS
-from flexctrl.linear.undamped import EXTENDED_EPS, UNSEEN, UNSURE
+from flexctrl.linear.undamped import EXTENDED_EPS, LOST, UNSURE, unseen
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
 
 _ASYMMETRY = 1e-6
 _SLOPE = 1.9
 _ROUND_OFF = 1e-12
-_LOWEST, _LOST = 20, 0.05
+_LOWEST = 20
 _VANISHING, _CAUTION = (1e-12, 3e-13), 100.0
 
 
@@ -76,9 +76,8 @@ def certify(
     loads: tuple[str, ...],
     motion: Motion,
     state: State,
-    pull: float,
 ) -> Certificate:
-    """Return the certificate of a linear model; ``pull`` is the ω² of what hangs or stands by the loads at work.
+    """Return the certificate of a linear model.
 
     Raises
     ------
@@ -111,18 +110,19 @@ def certify(
         _condition(linear.K),
         loads,
         _skew_share(linear.C),
-        _frequency_error(linear, modes, pull),
+        _frequency_error(linear, modes),
     )
 
 
-def _frequency_error(linear: LinearModel, modes: Modes, pull: float) -> float:
+def _frequency_error(linear: LinearModel, modes: Modes) -> float:
     """The bound of the lowest frequencies' relative error; refuses what the rounding of K has swallowed."""
     noise = stiffness_noise(linear.K, modes.shapes)
     values = np.abs(modes.omega_squared)
     errors = np.divide(noise, 2.0 * values, out=np.zeros_like(noise), where=values > 0.0)
     errors = np.where(errors > UNSURE, errors * EXTENDED_EPS / EPS, errors)
-    hidden = (values == 0.0) & (RIGID_NOISE * noise > max(_LOST * pull, UNSEEN)) & (pull > 0.0)
-    lost = hidden | (errors > _LOST)
+    hangs = linear.place is not None and linear.place.pull > 0.0
+    hidden = (values == 0.0) & (RIGID_NOISE * noise > unseen(linear, values)) & hangs
+    lost = hidden | (errors > LOST)
     if lost.any():
         i = int(np.argmax(lost))
         raise LinearizationError(

@@ -192,8 +192,8 @@ def _linked(motion: Motion, state: State, labels: list[str], size: float) -> Ite
     """Followers against where their masters carry them, and loops."""
     pose = motion.pose(state)
     linkage, names = motion.linkage, [labels[n] for n in motion.nodes]
-    gap = np.abs(linkage.gaps(pose)).max(initial=0.0) / size if linkage.loops else 0.0
-    yield Breach(gap, f"loops of rigid parts are open by {gap * size:.3g}")
+    gap = np.abs(linkage.gaps(pose)).max(initial=0.0) if linkage.loops else 0.0
+    yield Breach(gap, f"loops of rigid parts are open by {gap:.3g} rad, or of what they span")
     off = np.abs(linkage.place(pose, np.zeros(linkage.free)) - pose.ravel()).reshape(-1, 12)
     off = np.nan_to_num(off, nan=0.0)
     off[:, :3] /= size

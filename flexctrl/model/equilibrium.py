@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 
 from flexctrl.errors import EquilibriumError, StructureError, shortened
 from flexctrl.model.balance import Balance
@@ -214,16 +215,18 @@ def _complaint(balance: Balance, found: Found) -> str:
 
 def _pushed_freely(balance: Balance, state: State) -> list[str]:
     """The motions of the whole machine that nothing resists but a load drives."""
-    model, force, scale = balance.model, balance.force(state), balance.scale(state)
-    K = balance.among_free(balance.slope(state))
+    model, scale, unit = balance.model, balance.scale(state), balance.unit[balance.free]
+    force = unit * balance.force(state)
+    K = sp.diags(unit) @ balance.among_free(balance.slope(state)) @ sp.diags(unit)
     stiff = float(np.abs(K.data).max()) if K.nnz else 1.0
     names = tuple(model.coordinates[i] for i in balance.free)
     pushed = []
     from flexctrl.model.certify import whole_body  # brings all that modes need
 
     for name, motion in whole_body(names, model.motion, state):
-        size = float(np.abs(motion / balance.unit[balance.free]).max())
-        resisted = np.abs(K @ motion).max(initial=0.0) > 1e-6 * stiff * size
-        if not resisted and abs(float(force @ motion)) > 1e-6 * scale * size * balance.size:
+        way = motion / unit
+        size = float(np.abs(way).max())
+        resisted = np.abs(K @ way).max(initial=0.0) > 1e-6 * stiff * size
+        if not resisted and abs(float(force @ way)) > 1e-6 * scale * size * balance.size:
             pushed.append(name)
     return pushed

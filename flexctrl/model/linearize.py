@@ -18,7 +18,8 @@ from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.stability import without_energy
 from flexctrl.model.state import State
-from flexctrl.model.tangents import TURNS, tangents
+from flexctrl.model.tangents import tangents
+from flexctrl.model.units import TURNS
 from flexctrl.structure.beams import Beam
 
 _BALANCED, _ROUND_OFF = 1e-6, 1e-12
@@ -80,10 +81,9 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     residual = _check_balance(balance, state)
     _refuse_corners(model, state, free)
     loads = without_energy(model, u)
-    linear, asymmetry = _derivative(model, state, u, free, bool(loads))
+    linear, asymmetry = _derivative(balance, state, free, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
-    pull = 0.0 if balance.idle(model.rest) else balance.pull(state)
-    return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state, pull))
+    return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state))
 
 
 def all_free(linear: LinearModel, rest: Rest) -> LinearModel:
@@ -104,7 +104,7 @@ def all_free(linear: LinearModel, rest: Rest) -> LinearModel:
     model, state = rest.model, rest.state.loose
     if len(linear.coordinates) == model.n:
         return linear
-    return _derivative(model, state, rest.inputs, np.arange(model.n), bool(without_energy(model, rest.inputs)))[0]
+    return _derivative(Balance(model, rest.inputs), state, np.arange(model.n), _unsymmetric(rest))[0]
 
 
 def released(rest: Rest) -> LinearModel:
@@ -132,8 +132,12 @@ def released(rest: Rest) -> LinearModel:
     try:
         return linearize(model, at=rest.state, inputs=inputs)
     except LinearizationError:  # it takes a force to hold it
-        free = _free(model, rest.state)
-        return _derivative(model, rest.state.loose, rest.inputs, free, bool(without_energy(model, rest.inputs)))[0]
+        balance = Balance(model, rest.inputs)
+        return _derivative(balance, rest.state.loose, _free(model, rest.state), _unsymmetric(rest))[0]
+
+
+def _unsymmetric(rest: Rest) -> bool:
+    return bool(without_energy(rest.model, rest.inputs))
 
 
 def _refuse_spins(model: Model, held: Sequence[str]) -> None:
@@ -154,12 +158,12 @@ def _refuse_spins(model: Model, held: Sequence[str]) -> None:
         )
 
 
-def _derivative(
-    model: Model, state: State, u: np.ndarray, free: np.ndarray, unsymmetric: bool
-) -> tuple[LinearModel, float]:
+def _derivative(balance: Balance, state: State, free: np.ndarray, unsymmetric: bool) -> tuple[LinearModel, float]:
+    model, u, unit = balance.model, balance.u, sp.diags(balance.unit[free])
     M, C, K = (A[free][:, free] for A in tangents(model, state, u))
-    largest = float(abs(K).max()) if K.nnz else 0.0
-    asymmetry = float(abs(K - K.T).max()) / max(largest, 1e-300) if K.nnz else 0.0
+    largest = float(abs(unit @ K @ unit).max()) if K.nnz else 0.0
+    asymmetry = float(abs(unit @ (K - K.T) @ unit).max()) / max(largest, 1e-300) if K.nnz else 0.0
+    pull = 0.0 if balance.idle(model.rest) else balance.pull(state)
     T = model.motion.jacobian(model.place(state))[:, free]
     on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=np.zeros(model.n))), model.motion.raw)
     linear = LinearModel(
@@ -175,7 +179,7 @@ def _derivative(
         outputs=model.outputs,
         name=model.structure.name,
         parts=model.forces.parts(model.place(state), T),
-        place=Place(model, state, sp.identity(model.n, format="csc")[:, free], u),
+        place=Place(model, state, sp.identity(model.n, format="csc")[:, free], u, pull),
     )
     return linear, asymmetry
 

@@ -395,7 +395,7 @@ class Motion:
         return bool((back & (change > most) & (change > explained)).any())
 
     def closure_error(self, state: State) -> float:
-        """Return how far the conditions that close rigid loops are violated [m or rad]."""
+        """Return how far the conditions that close rigid loops are violated [rad, or shares of what they span]."""
         if not self.linkage.loops:
             return 0.0
         return float(np.abs(self.linkage.gaps(self._pose(state.x, state.R))).max())

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
-from flexctrl.model.tangents import TURNS
+from flexctrl.model.units import units
 
 __all__ = ["DIGITS", "force_rounding", "slope_terms"]
 
@@ -79,9 +79,8 @@ def _reach(model: Model, state: State) -> float:
 
 
 def _unit(model: Model, state: State) -> np.ndarray:
-    """A radian, or the reach, for each coordinate."""
-    turning = np.array([name.endswith(TURNS) for name in model.coordinates], dtype=bool)
-    return np.where(turning, 1.0, _reach(model, state))
+    """A radian, or the reach, for each coordinate; of a source angle, what makes that of what it drives."""
+    return units(model, _reach(model, state))
 
 
 def _places(model: Model, state: State) -> np.ndarray:

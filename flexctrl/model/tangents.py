@@ -11,10 +11,10 @@ from flexctrl.linear.dust import clean_mass, clean_stiffness
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
+from flexctrl.model.units import units
 
-__all__ = ["TURNS", "tangents"]
+__all__ = ["tangents"]
 
-TURNS = ("_rx", "_ry", "_rz", "_turn")
 _LAST_DIGITS, _CAUTION = 1e-14, 30.0
 _DUST = 4.0 * float(np.finfo(float).eps)
 
@@ -55,11 +55,10 @@ def _without_dust(model: Model, place: State, C: sp.csc_matrix) -> sp.csc_matrix
 def _unsure(model: Model, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.ndarray:
     """By how much entries in each row of K change with the last digits of the places, with some caution."""
     reach = max(model.structure.size, float(np.abs(state.x).max(initial=0.0)))
-    still, largest = np.zeros(model.n), np.zeros(model.n)
-    turning = np.array([name.endswith(TURNS) for name in model.coordinates], dtype=bool)
+    still, largest, unit = np.zeros(model.n), np.zeros(model.n), units(model, reach)
     for seed in range(2):
         signs = np.random.default_rng(seed).choice((-1.0, 1.0), model.n)
-        near = model.advance(state, _LAST_DIGITS * signs * np.where(turning, 1.0, reach), still, 0.0)
+        near = model.advance(state, _LAST_DIGITS * signs * unit, still, 0.0)
         if not model.motion.plain:
             near = _shaken(near, reach, seed)
         change = abs(K + model.slope(near, still, still, (1.0, 0.0, 0.0), u))

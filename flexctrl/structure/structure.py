@@ -187,9 +187,10 @@ class Structure:
 
     @cached_property
     def size(self) -> float:
-        """Largest extent of the structure [m], the yardstick for coincidence."""
+        """Largest extent of the structure [m], the yardstick for coincidence; a metre for what is but a point."""
         lows, highs = zip(*((min(c), max(c)) for c in zip(*(n.position for n in self.nodes), strict=True)), strict=True)
-        return max(*(b - a for a, b in zip(lows, highs, strict=True)), 1e-12)
+        extent = max(b - a for a, b in zip(lows, highs, strict=True))
+        return extent if extent > 1e-12 * max(map(abs, (*lows, *highs))) else 1.0
 
     @cached_property
     def _places(self) -> dict[tuple[str, int], int]:

@@ -82,10 +82,10 @@ def test_a_controller_that_raises_at_once_is_told_with_its_cause():
     assert isinstance(told.value.__cause__, KeyError)
 
 
-@pytest.mark.parametrize("until", [1e-300, 5e-324, 1e-13])
+@pytest.mark.parametrize("until", [1e-300, 5e-324, 9e-51])
 @pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(1e-3), fc.ExplicitRungeKutta()], ids=str)
-def test_an_end_before_the_shortest_step_is_refused(until, method):
-    with pytest.raises(StructureError, match="no step is shorter than 1e-12"):
+def test_an_end_at_once_is_refused(until, method):
+    with pytest.raises(StructureError, match="expected 1e-50 s at least"):
         fc.simulate(swing(), until=until, method=method)
 
 

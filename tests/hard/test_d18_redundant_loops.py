@@ -61,7 +61,7 @@ def test_ten_seconds(record, count):
         tolerance=Absolute(1e-5),
     )
     record(
-        f"D18 {count}-four-bar over 10 s: loops open by [m]",
+        f"D18 {count}-four-bar over 10 s: loops open by [rad, or shares of what they span]",
         ours=run.report.closure_error,
         reference=0,
         source="conditions of the loops",

@@ -121,7 +121,7 @@ def test_angles(record):
         tolerance=Absolute(1e-8),
     )
     record(
-        "B10 Andrews' squeezer: loops open by [m]",
+        "B10 Andrews' squeezer: loops open by [rad, or shares of what they span]",
         ours=run.report.closure_error,
         reference=0,
         source="conditions of the loops",

@@ -41,7 +41,7 @@ class Closing:
     speeds : Reals
         Their values at the start of the step.
     most : float
-        How far a loop may be open [m or rad].
+        How far a loop may be open [rad, or shares of what it spans].
     open : float
         How far any has been.
     """
@@ -71,9 +71,8 @@ def closing_of(F: Flattened) -> Closing:
     found = np.zeros(loops * (1 + free + loops))
     look = F.model.backend.bind(base.gauge, pose[None], np.zeros((1, 0)), np.arange(found.size)[None])
     cells = (NODE_SLOT * motion.nodes[:, None] + 12 + np.arange(6)).ravel()
-    most = _OPEN * max(1.0, float(np.abs(base.rest).max(initial=0.0)))
     work = np.zeros(loops * (free + loops))
-    return Closing(loops, free, cells.size, (look,), found, work, cells, np.zeros(cells.size), most)
+    return Closing(loops, free, cells.size, (look,), found, work, cells, np.zeros(cells.size), _OPEN)
 
 
 @seldom

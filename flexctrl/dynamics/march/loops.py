@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.landing import SHORTEST, SMALLEST
 from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle, shelve
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
@@ -36,8 +37,6 @@ from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import energy
 
 __all__ = ["run"]
-
-_SMALLEST = 1e-12
 
 
 @seldom
@@ -198,7 +197,7 @@ def controlled(m: March) -> int:
             m.h = m.size if again else fitted(min(m.size, m.largest), m.stop - m.t)
             if m.t + m.h > m.until * (1.0 + 1e-12):
                 return DONE
-        if m.h < _SMALLEST * max(1.0, m.t):
+        if m.h < SMALLEST * max(SHORTEST * m.until, m.t):
             return SHORT
         status = step(m)
         if status == WANTS_TANGENT:

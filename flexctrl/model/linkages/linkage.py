@@ -26,6 +26,7 @@ _LOST = 1e-6
 """Reciprocal condition of a loop that may move on in several ways."""
 
 _PAST = 2e-6
+_ROUND_OFF = 1e-14
 """How far past such a position a step goes [rad or m]."""
 
 _CLOSING = 4
@@ -175,7 +176,7 @@ class Linkage(OpenLinkage):
 
     @cached_property
     def gaps(self) -> Callable[..., np.ndarray]:
-        """Pose → how far loops are open [m or rad]."""
+        """Pose → how far loops are open [rad, or shares of the span]."""
         return _callable("gaps", [self._pose], self._gaps(self._pose))
 
     @cached_property
@@ -207,8 +208,7 @@ class Linkage(OpenLinkage):
 
     def _closed(self, pose: np.ndarray, step: np.ndarray) -> np.ndarray:
         new, gap = self.place(pose, step), np.inf
-        floor = 1e-14 * max(1.0, np.abs(self.rest).max(initial=0.0))
-        while self.loops and floor < (now := np.abs(self.gaps(new)).max()) < 0.5 * gap:
+        while self.loops and _ROUND_OFF < (now := np.abs(self.gaps(new)).max()) < 0.5 * gap:
             new, gap = self.place(new, np.zeros(self.free)), now
         return new
 

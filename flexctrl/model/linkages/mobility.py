@@ -12,16 +12,19 @@ from flexctrl.errors import StructureError
 from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.linkages.linkage import Linkage
-from flexctrl.model.linkages.open_linkage import Link, Loop, renumbered
+from flexctrl.model.linkages.open_linkage import Link, Loop, renumbered, span_of
 from flexctrl.model.linkages.twists import Twists
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import Dry, State
+from flexctrl.model.units import TURNS
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, TRAVEL, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import main_axis
 from flexctrl.structure.relations import Closure, Fit, Follow, Group, Ride, Ties, Track, Turn
 from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import tie
+
+_INDEPENDENT = 1e-9
 
 
 def motion_of(
@@ -203,13 +206,13 @@ def _names(structure: Structure, ties: Ties) -> list[str]:
 
 def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
     """Choose which closures are independent, and which degrees of freedom shall follow from the others."""
-    rows = _openings(motion, motion.rest, ties.closures)
-    moved = motion.advance(motion.rest, 0.1 * np.cos(np.arange(motion.n)), motion.rest.v, 0.0)
+    unit = np.where([name.endswith(TURNS) for name in motion.names], 1.0, span_of(motion.rest.x))
+    rows = _openings(motion, motion.rest, ties.closures) * unit
+    moved = motion.advance(motion.rest, 0.1 * unit * np.cos(np.arange(motion.n)), motion.rest.v, 0.0)
     turned = _openings(motion, moved, ties.closures)
     kept = np.abs(rows).max(axis=1, initial=0.0) + np.abs(turned).max(axis=1, initial=0.0) > 0.0
-    tolerance = 1e-9 * max(1.0, structure.size)
-    chosen = _independent(rows.T, tolerance)
-    dependent = _independent(rows[chosen], tolerance)
+    chosen = _independent(rows.T, _INDEPENDENT)
+    dependent = _independent(rows[chosen], _INDEPENDENT)
     labels = [_label(structure, c) for c in ties.closures]
     notes = [
         f"{label} is held by rigid parts already; it is left free to second order"
@@ -223,9 +226,10 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
 
 
 def _openings(motion: Motion, state: State, closures: tuple[Closure | Fit, ...]) -> np.ndarray:
-    """Return how fast each loop opens with each degree of freedom."""
-    T = motion.jacobian(state)
-    return np.array([_opening(T, state, c) for c in closures])
+    """Return how fast each loop opens with each degree of freedom, in radians or shares of the machine."""
+    T, span = motion.jacobian(state), span_of(motion.rest.x)
+    turns = [c.freedom >= 3 if isinstance(c, Closure) else c.axis is not None for c in closures]
+    return np.array([_opening(T, state, c) for c in closures]) / np.where(turns, 1.0, span)[:, None]
 
 
 def _opening(T: sp.csr_matrix, state: State, c: Closure | Fit) -> np.ndarray:

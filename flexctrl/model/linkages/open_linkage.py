@@ -5,8 +5,10 @@ Only places and rates are written down; all else follows by differentiation (`fl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +23,23 @@ from flexctrl.structure.relations import Copy, Fit, Follow, Ride, Track, Turn
 
 if TYPE_CHECKING:
     import casadi as ca
+
+
+def span_of(places: np.ndarray) -> float:
+    """Return about how far some places reach, a power of two; 1 for the origin.
+
+    Parameters
+    ----------
+    places : numpy.ndarray
+        [m].
+
+    Returns
+    -------
+    float
+        [m].
+    """
+    reach = float(np.abs(places).max(initial=0.0))
+    return 2.0 ** round(math.log2(reach)) if reach else 1.0
 
 
 @dataclass(frozen=True)
@@ -79,13 +98,18 @@ class OpenLinkage:
         """Number of nodes."""
         return len(self.cells)
 
+    @cached_property
+    def span(self) -> float:
+        """About how long the linkage is: a power of two, so that what is divided by it keeps its digits [m]."""
+        return span_of(self.rest)
+
     def _loop_slopes(self, pose: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Return how fast loops open with the independent and with the dependent freedoms."""
+        """Return how fast loops open, as in `gaps`, with the independent and with the dependent freedoms."""
         import casadi as ca
 
         every = ca.SX.sym("every", self.free + len(self.loops))
         motion = self._open_rates(pose, every)
-        opening = [_opening(loop, pose, motion) for loop in self.loops]
+        opening = [_opening(loop, pose, motion) / self._yardstick(loop) for loop in self.loops]
         G = ca.jacobian(ca.vertcat(*opening), every)
         return G[:, : self.free], G[:, self.free :]
 
@@ -164,11 +188,15 @@ class OpenLinkage:
         return ca.vertcat(*[mv[k] if k == f.freedom else v[k] for k in range(3)]), w
 
     def _gaps(self, pose: ca.SX) -> ca.SX:
-        """Return how far loops are open [m or rad]."""
+        """Return how far loops are open [rad, or shares of the span]."""
         import casadi as ca
 
         shaped = ca.reshape(pose, 12, self.count)
-        return ca.vertcat(*[self._gap(loop, shaped) for loop in self.loops])
+        return ca.vertcat(*[self._gap(loop, shaped) / self._yardstick(loop) for loop in self.loops])
+
+    def _yardstick(self, loop: Loop | Fit) -> float:
+        turns = loop.axis is not None if isinstance(loop, Fit) else loop.freedom >= 3
+        return 1.0 if turns else self.span
 
     def _gap(self, loop: Loop | Fit, pose: ca.SX) -> ca.SX:
         import casadi as ca
