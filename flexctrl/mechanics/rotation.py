@@ -20,22 +20,36 @@ _ETA = (
 """(1 − (x/2) cot(x/2)) (4π² − x²)/x² as a polynomial in x², by Chebyshev's points of 0 ≤ x² ≤ 17."""
 
 
+_TURN = (
+    *(1.0, 0.33333333333334036, 0.13333333333219086, 0.057142857215233975, 0.02539682303408617, 0.011544056909281333),
+    *(0.005327455445300316, 0.0024907644081634196, 0.0011471969717270361, 0.0006322710850999908),
+    *(0.0001001955206144391, 0.0003088008987001317),
+)
+"""φ/sin φ as a polynomial in 1 − cos φ, by Chebyshev's points of 0 ≤ φ ≤ π/4."""
+
+
 def rotation_vector(R: ca.SX) -> ca.SX:
     """Return θ with R = exp(θ×), |θ| < π (casadi).
 
-    θ = (|s|/sin|s|) s with 2 s the axial vector of R − Rᵀ; near zero the factor tends to 1 smoothly,
-    and its derivatives stay finite.
+    θ = (|θ|/sin|θ|) s with 2 s the axial vector of R − Rᵀ. The quotient comes from the cosines of the half and the
+    quarter of the angle, a polynomial of the latter: smooth through zero, and no arctangent.
     """
     import casadi as ca
 
     s = 0.5 * ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
     c = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
-    square = ca.dot(s, s)
-    small = ca.logic_and(square < 1e-6, c > 0.0)
-    safe = ca.if_else(small, 1.0, square)
-    sine = ca.sqrt(safe)
-    series = 1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0)))
-    return ca.if_else(small, series, ca.atan2(sine, c) / sine) * s
+    # near half a turn, what 1 + c is, is in the sine alone
+    half = ca.sqrt(0.5 * ca.if_else(c > 0.0, 1.0 + c, ca.dot(s, s) / (1.0 + ca.fabs(c))))
+    quarter = ca.sqrt(0.5 + 0.5 * half)
+    return _polynomial(1.0 - quarter, _TURN) / (half * quarter) * s
+
+
+def _polynomial(x: ca.SX, coefficients: tuple[float, ...]) -> ca.SX:
+    """Return a polynomial, coefficients from the lowest power up; even and odd powers apart: half the waiting."""
+    square, before, last = x * x, coefficients[-1], coefficients[-2]
+    for coefficient in coefficients[-3::-1]:
+        before, last = last, before * square + coefficient
+    return last + x * before
 
 
 def rotation_of(theta: ca.SX) -> ca.SX:
@@ -63,10 +77,7 @@ def inverse_tangent(theta: ca.SX, v: ca.SX) -> ca.SX:
     import casadi as ca
 
     square = ca.dot(theta, theta)
-    eta = ca.SX(_ETA[-1])
-    for coefficient in _ETA[-2::-1]:
-        eta = eta * square + coefficient
-    eta = eta / (4.0 * ca.pi**2 - square)
+    eta = _polynomial(square, _ETA) / (4.0 * ca.pi**2 - square)
     turned = ca.cross(theta, v)
     return v + 0.5 * turned + eta * ca.cross(theta, turned)
 
