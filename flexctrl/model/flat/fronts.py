@@ -24,7 +24,7 @@ from flexctrl.kernels.native import Reals, Wholes, seldom
 __all__ = ["Fronts", "Plan", "factor", "plan_of", "solve"]
 
 _VANISHING = 1e-13
-_MERGED = 8
+_MERGED = 12
 
 
 @dataclass(frozen=True, eq=False)
