@@ -87,11 +87,12 @@ def test_a_vanishing_pivot_is_reported(compiled):
     assert plan.order[where] in (6, 7, 8)
 
 
-def test_elimination_of_a_chain_fills_nothing():
+def test_elimination_of_a_chain_fills_but_what_two_nodes_taken_together_have():
+    """12 pivots and 6 others: 12 (2 · 18 − 12) entries where node by node there are 2 · 6 (2 · 12 − 6)."""
     A = MATRICES["beams"]
     plan, _ = problem(A, np.ones(A.shape[0]))
     f = plan.fronts
-    assert (f.pivots * (2 * f.size - f.pivots)).sum() == A.nnz
+    assert A.nnz <= (f.pivots * (2 * f.size - f.pivots)).sum() <= 4 / 3 * A.nnz
 
 
 def test_no_unknowns_are_no_trouble():

@@ -99,11 +99,13 @@ class Kernels:
 
         symbols, parameters, shares = self._rest
         velocities = self._velocities(symbols)
-        still = ca.substitute(shares.force, velocities, ca.SX.zeros(velocities.numel()))
-        power = ca.dot(still - shares.force, self._raw_rates(symbols)) if shares.lost is None else shares.lost
-        return _kernel(
-            f"{self.kind.name}_energy", symbols, parameters, ca.vertcat(shares.kinetic, shares.stored, power), True
-        )
+        if ca.is_linear(shares.force, velocities):  # what is damped in proportion: the rest is not worked out
+            drag = -ca.jtimes(shares.force, velocities, velocities)
+        else:
+            drag = ca.substitute(shares.force, velocities, ca.SX.zeros(velocities.numel())) - shares.force
+        power = ca.dot(drag, self._raw_rates(symbols)) if shares.lost is None else shares.lost
+        found = ca.vertcat(shares.kinetic, shares.stored, power)
+        return _kernel(f"{self.kind.name}_energy", symbols, parameters, found, bool(power.is_zero()))  # losses: each step
 
     @cached_property
     def tangent(self) -> Kernel:
