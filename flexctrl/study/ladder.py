@@ -120,9 +120,10 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     """Return the rungs that a scene has, by name, from the least physics to the most.
 
     Rungs are run as the scene is, but for the linear one, which is integrated exactly (of a scene that begins as drawn,
-    from there too, to first order about the equilibrium), and the refined one: four times the elements and half the steps. Where steps are controlled, these follow from an eighth of the tolerance, and none
-    is longer than half a sample of the controller. Where they are not, rigid parts and component modes, which leave out
-    what moves fast, take one step for four, none longer than a sample.
+    from there too, to first order about the equilibrium), and the refined one: four times the elements and half the
+    steps. Where steps are controlled, these follow from an eighth of the tolerance, and none is longer than half a
+    sample of the controller. Where they are not, rigid parts and component modes, which leave out what moves fast, take
+    one step for four, none longer than a sample.
 
     Parameters
     ----------
