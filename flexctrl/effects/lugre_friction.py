@@ -25,7 +25,7 @@ class LuGre:
     stiffness : float
         σ₀ > 0 of the bristles [N/m, or N m/rad].
     kinetic : float
-        F_k > 0 [N, or N m].
+        F_k > 0 [N, or N m]; 0 with F_s = 0: no bristles, the viscous part alone.
     static : float, optional
         F_s ≥ F_k; default: F_k.
     stribeck : float
@@ -57,12 +57,18 @@ class LuGre:
         damping: float = 0.0,
         viscous: float = 0.0,
     ) -> None:
-        for name, value in (("stiffness", stiffness), ("kinetic", kinetic)):
-            object.__setattr__(self, name, check_finite(value, name, "LuGre", above=0.0))
-        for name, value in (("stribeck", stribeck), ("damping", damping), ("viscous", viscous)):
+        object.__setattr__(self, "stiffness", check_finite(stiffness, "stiffness", "LuGre", above=0.0))
+        others = {"kinetic": kinetic, "stribeck": stribeck, "damping": damping, "viscous": viscous}
+        for name, value in others.items():
             object.__setattr__(self, name, check_finite(value, name, "LuGre", least=0.0))
-        stick = self.kinetic if static is None else check_finite(static, "static", "LuGre", above=0.0)
+        stick = self.kinetic if static is None else check_finite(static, "static", "LuGre", least=0.0)
         check_static(stick, self.kinetic, "LuGre")
+        if stick and not self.kinetic:
+            raise StructureError(
+                f"LuGre: kinetic = 0 below static = {stick:g}: bristles that bend by g(v)/σ₀ would have to follow "
+                f"infinitely fast where g(v) falls to nothing; give a small kinetic > 0, as {1e-3 * stick:g}, or take "
+                "Coulomb, which slides freely"
+            )
         object.__setattr__(self, "static", stick)
 
 
@@ -101,11 +107,16 @@ class LuGreFriction(Effect):
 
     def inner(self, structure: Structure) -> tuple[Inner, ...]:
         """A bristle each."""
-        return tuple(Inner(f"{identifier(w)}_bristle", law.static / law.stiffness, True) for w, law in self.laws)
+        return tuple(Inner(f"{identifier(w)}_bristle", law.static / law.stiffness, True) for w, law in self.acting)
+
+    @property
+    def acting(self) -> tuple[tuple[str, LuGre], ...]:
+        """The laws that have bristles."""
+        return tuple((where, law) for where, law in self.laws if law.static)
 
     def left_out(self, structure: Structure, beside: Sequence[Effect]) -> tuple[str, ...]:
         """What linear models leave out."""
-        places = ", ".join(where for where, _ in self.laws)
+        places = ", ".join(where for where, _ in self.acting)
         note = f"of the friction at {places}, equilibria and linear models hold the viscous part only"
         return (note,) if places else ()
 

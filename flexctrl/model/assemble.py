@@ -58,12 +58,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     """
     if not isinstance(structure, Structure):
         raise StructureError(f"assemble: {shortened(structure)} is no Structure; give Structure(elements=…, joints=…)")
-    parts = _flat(effects)
-    for effect in parts:
-        effect.check_beside(parts)
-        _check_names(structure, effect)
-        effect.check_on(structure)
-    check_gusts(structure, parts)
+    parts = checked_effects(structure, effects)
     structure, parts = _heavy(structure, parts)
     _check_trolleys(structure, parts)
     if any(isinstance(e, GeometricStiffness) for e in parts):
@@ -91,6 +86,32 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping) and np.any(p.ratios)]
     return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
+
+
+def checked_effects(structure: Structure, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the parts of some effects, if they make sense together and on a structure.
+
+    Parameters
+    ----------
+    structure : Structure
+    effects : sequence of Effect
+
+    Returns
+    -------
+    tuple of Effect
+
+    Raises
+    ------
+    StructureError
+        As `assemble`.
+    """
+    parts = _flat(effects)
+    for effect in parts:
+        effect.check_beside(parts)
+        _check_names(structure, effect)
+        effect.check_on(structure)
+    check_gusts(structure, parts)
+    return parts
 
 
 def _check_trolleys(structure: Structure, parts: tuple[Effect, ...]) -> None:

@@ -13,7 +13,21 @@ from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.errors import FlexctrlError, SceneError, check_kind
 from flexctrl.scene import laws, parts, physics
-from flexctrl.scene.reading import Kind, Place, checked, flag, keys, mapping, number, one_of, positive, several, text
+from flexctrl.scene.reading import (
+    Kind,
+    Place,
+    by_name,
+    checked,
+    flag,
+    keys,
+    known,
+    mapping,
+    number,
+    one_of,
+    positive,
+    several,
+    text,
+)
 from flexctrl.scene.scene import Channel, Scene, Simulation, Start
 
 _PLAIN = ("name", "notes", "machine", "effects", "moves", "controllers", "hardware", "loads", "equilibrium", "loop")
@@ -96,26 +110,28 @@ def scene_from(content: Mapping[str, Any], place: Place, name: str) -> Scene:
     title = text(content.get("name", _legal(name)), place.at("name"))
     base = parts.machine(content["machine"], place.at("machine")) if "machine" in content else None
     structure = parts.structure(content, place, title, base)
-    rest = keys(content.get("equilibrium", {}), place.at("equilibrium"), _REST)
+    inputs, outputs = ([signal.name for signal in side] for side in (structure.inputs, structure.outputs))
+    driven = known("input", inputs)
+    rests = {"hold": mapping(number), "inputs": by_name(driven, number)}
+    rest = keys(content.get("equilibrium", {}), place.at("equilibrium"), rests)
+    channel = Kind(Channel, {"input": driven, "output": known("output", outputs)})
     notes = several(text)(content.get("notes", []), place.at("notes"))
     return checked(
         lambda: Scene(
             structure=structure,
-            effects=physics.effects(content.get("effects", {}), place.at("effects")),
-            controller=laws.controller(content, place),
-            loads=mapping(_load)(content.get("loads", {}), place.at("loads")),
+            effects=physics.effects(content.get("effects", {}), place.at("effects"), structure),
+            controller=laws.controller(content, place, structure),
+            loads=by_name(driven, _load)(content.get("loads", {}), place.at("loads")),
             simulation=_simulation(content["simulation"], place.at("simulation")) if "simulation" in content else None,
             hold=rest.get("hold", {}),
             rest_inputs=rest.get("inputs", {}),
-            channel=_CHANNEL.read(content.get("loop", {}), place.at("loop")),
+            channel=channel.read(content.get("loop", {}), place.at("loop")),
             notes=notes,
         ),
         place,
     )
 
 
-_REST = {"hold": mapping(number), "inputs": mapping(number)}
-_CHANNEL = Kind(Channel, {"input": text, "output": text})
 _TOLERANCE = Kind(Tolerance, {"relative": number, "absolute": positive})
 _SIMULATION = {
     "until": positive,

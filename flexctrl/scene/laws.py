@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from flexctrl.design.feedback import FilteredRate
@@ -23,7 +23,9 @@ from flexctrl.scene.reading import (
     Kind,
     Place,
     Reader,
+    by_name,
     flag,
+    known,
     mapping,
     number,
     of_kind,
@@ -31,9 +33,9 @@ from flexctrl.scene.reading import (
     positive,
     several,
     table,
-    text,
     whole,
 )
+from flexctrl.structure.structure import Structure
 
 _MODE = {"omega": positive, "zeta": number}
 SHAPERS = {
@@ -92,7 +94,7 @@ def _shaper(value: Any, place: Place) -> Shaper:
     return of_kind(value, place, SHAPERS)
 
 
-def controller(content: Mapping[str, Any], place: Place) -> Controlled | None:
+def controller(content: Mapping[str, Any], place: Place, machine: Structure) -> Controlled | None:
     """Read the tables ``moves``, ``controllers`` and ``hardware``.
 
     Parameters
@@ -101,6 +103,8 @@ def controller(content: Mapping[str, Any], place: Place) -> Controlled | None:
         Of the file.
     place : Place
         The file.
+    machine : Structure
+        Whose signals and drives may be named.
 
     Returns
     -------
@@ -113,57 +117,68 @@ def controller(content: Mapping[str, Any], place: Place) -> Controlled | None:
         Naming table, key and what was expected.
     """
     moves = mapping(move)(content.get("moves", {}), place.at("moves"))
-    kinds = _law_kinds(moves)
+    kinds = _law_kinds(moves, machine)
     read = several(lambda item, where: of_kind(item, where, kinds))
     laws = read(content.get("controllers", []), place.at("controllers"))
     if not laws:
         if "hardware" in content:
             raise place.at("hardware").refuse("there are no [[controllers]] to put it round")
         return None
-    return Controlled(laws, HARDWARE.read(table(content.get("hardware", {}), place), place.at("hardware")))
+    return Controlled(laws, _hardware(machine).read(table(content.get("hardware", {}), place), place.at("hardware")))
 
 
-HARDWARE = Kind(
-    Hardware,
-    {
-        "sample_time": positive,
-        "noise": mapping(number),
-        "seed": whole,
-        "steps": mapping(positive),
-        "rate_limits": mapping(positive),
-        "limits": mapping(positive),
-        "delay": whole,
-    },
-)
+def _hardware(machine: Structure) -> Kind:
+    inputs, _ = _signals(machine)
+    either = known("input or output", (*(i.name for i in machine.inputs), *(o.name for o in machine.outputs)))
+    return Kind(
+        Hardware,
+        {
+            "sample_time": positive,
+            "noise": by_name(either, number),
+            "seed": whole,
+            "steps": by_name(either, positive),
+            "rate_limits": by_name(inputs, positive),
+            "limits": by_name(inputs, positive),
+            "delay": whole,
+        },
+    )
 
 
-def _law_kinds(moves: Mapping[str, Move]) -> dict[str, Kind]:
-    reference = _reference(moves)
-    loop: dict[str, Reader] = {"measured": text, "command": text, "reference": reference}
+def _signals(machine: Structure) -> tuple[Callable[[Any, Place], str], Callable[[Any, Place], str]]:
+    """Readers of the names of inputs, and of outputs."""
+    return known("input", (i.name for i in machine.inputs)), known("output", (o.name for o in machine.outputs))
+
+
+def _law_kinds(moves: Mapping[str, Move], machine: Structure) -> dict[str, Kind]:
+    reference = _reference(moves, known("drive", (d.name for d in machine.drives)))
+    inputs, outputs = _signals(machine)
+    loop: dict[str, Reader] = {"measured": outputs, "command": inputs, "reference": reference}
     gains = {"kp": number, "ki": number, "kd": number}
-    references = mapping(reference)
+    references = by_name(outputs, reference)
     return {
-        "pid": Kind(PID, {**loop, **gains, "rate": _rate, "limit": positive}),
+        "pid": Kind(PID, {**loop, **gains, "rate": _rate(outputs), "limit": positive}),
         "lqr": Kind(
             StateFeedback,
             {
-                "largest": mapping(positive),
-                "effort": mapping(positive),
-                "reads": several(text),
+                "largest": by_name(outputs, positive),
+                "effort": by_name(inputs, positive),
+                "reads": several(outputs),
                 "references": references,
             },
         ),
-        "gains": Kind(Gains, {"gains": mapping(mapping(number)), "references": references}),
+        "gains": Kind(Gains, {"gains": by_name(inputs, by_name(outputs, number)), "references": references}),
         "transfer_function": Kind(Transfer, {**loop, "num": several(number), "den": several(number)}),
     }
 
 
-def _rate(value: Any, place: Place) -> str | FilteredRate:
-    """Read the name of a rate signal, or the time constant of a filter."""
-    return value if isinstance(value, str) else FilteredRate(positive(value, place))
+def _rate(outputs: Callable[[Any, Place], str]) -> Reader:
+    """Return the reader of the name of a rate signal, or of the time constant of a filter."""
+    return lambda value, place: (
+        outputs(value, place) if isinstance(value, str) else FilteredRate(positive(value, place))
+    )
 
 
-def _reference(moves: Mapping[str, Move]) -> Reader:
+def _reference(moves: Mapping[str, Move], drives: Reader) -> Reader:
     def chosen(value: Any, place: Place) -> Move:
         return moves[one_of(moves)(value, place)]
 
@@ -171,10 +186,10 @@ def _reference(moves: Mapping[str, Move]) -> Reader:
         if isinstance(value, str):
             return Reference(chosen(value, place))
         if isinstance(value, Mapping):
-            return Kind(Reference, {"move": chosen, "through": text, "rate": flag}).read(value, place)
+            return Kind(Reference, {"move": chosen, "through": drives, "rate": flag}).read(value, place)
         return Reference(Move(Constant(number(value, place))))
 
     return read
 
 
-__all__ = ["HARDWARE", "MOVES", "SHAPERS", "controller", "move"]
+__all__ = ["MOVES", "SHAPERS", "controller", "move"]

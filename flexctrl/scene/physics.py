@@ -23,6 +23,7 @@ from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.viscous_friction import ViscousFriction
 from flexctrl.effects.wind import Wind
 from flexctrl.errors import did_you_mean
+from flexctrl.model.assemble import checked_effects
 from flexctrl.scene.reading import (
     Kind,
     Place,
@@ -37,6 +38,7 @@ from flexctrl.scene.reading import (
     vector,
     whole,
 )
+from flexctrl.structure.structure import Structure
 
 
 @dataclass(frozen=True)
@@ -90,13 +92,15 @@ _WITHIN = Kind(Automatic.within, dict.fromkeys(_ANSWERS, positive))
 _THROUGH = Kind(RayleighDamping.through, dict.fromkeys(("zeta", "omega1", "omega2"), positive))
 
 
-def effects(value: Any, place: Place) -> tuple[Effect, ...]:
+def effects(value: Any, place: Place, machine: Structure) -> tuple[Effect, ...]:
     """Read the table of effects: ``gravity = true``, or a table of an effect's parameters.
 
     Parameters
     ----------
     value : object
     place : Place
+    machine : Structure
+        What they are to act on.
 
     Returns
     -------
@@ -110,7 +114,9 @@ def effects(value: Any, place: Place) -> tuple[Effect, ...]:
     for name in table(value, place):
         if name not in EFFECTS:
             raise place.refuse(f"there is no effect {name!r}{did_you_mean(name, EFFECTS)}")
-    return tuple(_effect(name, item, place.at(name)) for name, item in value.items() if item is not False)
+    found = tuple(_effect(name, item, place.at(name)) for name, item in value.items() if item is not False)
+    checked(lambda: checked_effects(machine, found), place)
+    return found
 
 
 def _effect(name: str, value: Any, place: Place) -> Effect:

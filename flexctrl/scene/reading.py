@@ -124,6 +124,25 @@ def one_of(known: Iterable[str]) -> Callable[[Any, Place], str]:
     return read
 
 
+def known(what: str, names: Iterable[str]) -> Callable[[Any, Place], str]:
+    """Return the reader of the name of something that the machine has; ``what`` it is, for the message."""
+    there = tuple(names)
+
+    def read(value: Any, place: Place) -> str:
+        if text(value, place) not in there:
+            raise place.refuse(f"the machine has no {what} {value!r}{did_you_mean(value, there)}")
+        return value
+
+    return read
+
+
+def by_name(
+    name: Callable[[Any, Place], str], reader: Callable[[Any, Place], T]
+) -> Callable[[Any, Place], dict[str, T]]:
+    """Return the reader of a table whose keys ``name`` reads and whose values ``reader`` reads."""
+    return lambda value, place: {name(k, place): reader(v, place.at(k)) for k, v in table(value, place).items()}
+
+
 def vector(value: Any, place: Place) -> tuple[float, float, float]:
     """Read three numbers."""
     if not isinstance(value, list) or len(value) != 3:

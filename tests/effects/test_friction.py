@@ -320,6 +320,17 @@ def test_dry_friction_is_not_in_equilibria_and_linear_models_and_that_is_said():
         assert linear.K.nnz == 0 or abs(linear.K).max() == 0.0
 
 
+@pytest.mark.parametrize(("viscous", "same"), [(0.7, [fc.ViscousFriction({"block.u": 0.7})]), (0.0, [])])
+def test_lugre_without_bristles_is_viscous_friction_or_none(viscous, same):
+    law = fc.LuGre(1e4, 0.0, damping=200.0, viscous=viscous)
+    effects = ([fc.LuGreFriction({"block.u": law})], same)
+    models = [fc.assemble(pulled(2.0), [LARGE, *more]) for more in effects]
+    ours, theirs = (([f.kernels for f in m.forces.families], m.coordinates, m.notes) for m in models)
+    assert ours == theirs
+    ours, theirs = (fc.simulate(m, until=1.0, inputs={"pull": 2.0}, method=fc.GeneralizedAlpha(1e-2)) for m in models)
+    np.testing.assert_array_equal(ours.y, theirs.y)
+
+
 def test_lugre_sticks_elastically_and_slides_at_its_level():
     """Pulled below F_s the bristles bend by F/σ₀; above, it accelerates by (F − F_k)/m."""
     law = fc.LuGre(1e4, kinetic=3.0, static=5.0, stribeck=1e-3, damping=200.0)
@@ -372,6 +383,8 @@ def test_the_rigid_twin_rubs_as_the_machine_does():
         (lambda: fc.CoulombFriction({"motor": "much"}), "CoulombFriction: friction of 'motor' = 'much'"),
         (lambda: fc.LuGre(0.0, 1.0), "LuGre: stiffness = 0.0"),
         (lambda: fc.LuGre(1.0, 2.0, static=1.0), "static = 1 below kinetic = 2"),
+        (lambda: fc.LuGre(1e4, 0.0, static=5.0), "kinetic = 0 below static = 5: .* give a small kinetic > 0, as 0.005"),
+        (lambda: fc.LuGre(1e4, -1.0), "LuGre: kinetic = -1"),
         (lambda: fc.LuGreFriction({"motor": 2.0}), "LuGreFriction: law of 'motor' = 2.0; expected a flexctrl.LuGre"),
     ],
 )

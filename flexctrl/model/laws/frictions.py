@@ -48,7 +48,9 @@ def friction_families(structure: Structure, effects: Sequence[Effect]) -> tuple[
         elif isinstance(effect, CoulombFriction):
             found += _rubbing(structure, "dry", [(w, _dry(law)) for w, law in effect.acting], inner)
         elif isinstance(effect, LuGreFriction):
-            found += _rubbing(structure, "lugre", [(w, _lugre(law)) for w, law in effect.laws], inner)
+            smooth = [(w, [law.viscous]) for w, law in effect.laws if law.viscous and not law.static]
+            found += _rubbing(structure, "viscous", smooth, None)
+            found += _rubbing(structure, "lugre", [(w, _lugre(law)) for w, law in effect.acting], inner)
         elif isinstance(effect, MotorLag):
             found.append(_lags(structure, effect, inner))
         inner += len(effect.inner(structure))
