@@ -239,6 +239,10 @@ class Watch:
         switches = self.switches(state, u) if self.names else np.zeros(0)
         return np.concatenate([found, switches, self.corners(state, before or state)])
 
+    def left(self, after: Point, before: Point, gauge: int) -> float:
+        """Return how far a gauge is from zero after a step, on the side where it was: below zero it has passed it."""
+        return float(self.sides[gauge] * self.values(after.state, after.supply.u, before.state)[gauge])
+
     def begin(self, point: Point) -> None:
         """Note the side that each gauge is on at the start."""
         values = self.values(point.state, point.supply.u)
@@ -304,7 +308,12 @@ class Watch:
             rising = fb > 0.0
             if side != 0.0 and direction is not (Direction.FALLING if rising else Direction.RISING):
                 own = partial(_one_of, value, gauge)
-                at = _root(own, (a, fa), (b, fb)) if fa * fb < 0.0 else _return(own, a, b, fb, dust)
+                if not fa * fb < 0.0:
+                    at = _return(own, a, b, fb, dust)
+                elif self.stops(gauge):  # where exactly, is found by steps
+                    at = _nearly(corners, a)
+                else:
+                    at = _root(own, (a, fa), (b, fb))
                 found.append(Crossing(at, gauge, rising))
             side = np.sign(fb)
         return found
@@ -375,6 +384,19 @@ class _Along:
 
 def _one_of(value: Callable[[float], np.ndarray], gauge: int, t: float) -> float:
     return float(value(t)[gauge])
+
+
+def _nearly(points: Sequence[tuple[float, float]], first: float) -> float:
+    """Return where the parabola through three points is zero: two between which values change sign, and one beside."""
+    i = [t for t, _ in points].index(first)
+    (a, fa), (b, fb) = points[i : i + 2]
+    c, fc = points[i + 2] if i + 2 < len(points) else points[i - 1]
+    s = (c - a) / (b - a)
+    bend = (fc - fa - (fb - fa) * s) / (s * (s - 1.0))
+    slope = fb - fa - bend
+    q = -0.5 * (slope + math.copysign(math.sqrt(max(slope * slope - 4.0 * bend * fa, 0.0)), slope))
+    roots = [root for root in (fa / q if q else 0.5, q / bend if bend else 0.5) if 0.0 <= root <= 1.0]
+    return a + (b - a) * (roots[0] if roots else 0.5)
 
 
 def _return(f: Callable[[float], float], a: float, b: float, fb: float, dust: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from flexctrl.dynamics.events import Crossing
@@ -17,7 +17,7 @@ __all__ = ["SHORTEST", "SMALLEST", "Missed", "landed"]
 SMALLEST = 1e-12
 SHORTEST = 1e-3  # of a run: before that a step may be shorter than those that the clock resolves later
 _NEAR = 1e-9
-_LANDINGS, _LANDINGS_MOST = 12, 60
+_LANDINGS, _LANDINGS_MOST, _QUICK = 12, 60, 8
 _SHORT = (0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.05, 0.2, 0.5)
 _LEAD, _LEAD_MOST, _LEAD_FAR = 1e-8, 1e-7, 1e-4
 
@@ -51,8 +51,8 @@ def _land(journey: Journey, before: Point, after: Point, crossing: Crossing) -> 
     corner = crossing.gauge >= len(journey.watch.events) + len(journey.watch.names)
     if corner and not journey.watch.last_word(crossing.gauge):
         return _short_of(journey, before, after, crossing)
-    t, h, gauge, at = before.state.t, after.state.t - before.state.t, crossing.gauge, crossing.t
-    low, high = t, t + h
+    t, h, gauge, watch = before.state.t, after.state.t - before.state.t, crossing.gauge, journey.watch
+    bracket, at, last = _Bracket(t, t + h), crossing.t, None
     for _ in range(_LANDINGS):
         if at - t <= SMALLEST * h:
             return before, replace(crossing, t=t)
@@ -60,13 +60,50 @@ def _land(journey: Journey, before: Point, after: Point, crossing: Crossing) -> 
             after = journey.stepper.step(before, at - t)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
-        off = journey.watch.offset(journey.track.curve(before, after), before, after, gauge)
+        left = watch.left(after, before, gauge)
+        if last is None:
+            off = watch.offset(journey.track.curve(before, after), before, after, gauge)
+        else:
+            off = _to_zero(last, (at, left)) if abs(left) > watch.dusts[gauge] else 0.0
         if abs(off) <= _NEAR * h:
             break
-        left = journey.watch.sides[gauge] * journey.watch.values(after.state, after.supply.u, before.state)[gauge]
-        low, high = (at, high) if left > 0.0 else (low, at)
-        at = after.state.t + off if low < after.state.t + off < high else 0.5 * (low + high)
+        bracket.narrow(at, left)
+        last = at, left
+        at = bracket.within(at + off)
     return after, replace(crossing, t=after.state.t)
+
+
+def _to_zero(last: tuple[float, float], now: tuple[float, float]) -> float:
+    """Return how much later than now a value is zero that has changed as it has since another time; NaN for never."""
+    (a, fa), (b, fb) = last, now
+    return -fb * (b - a) / (fb - fa) if fb != fa else math.nan
+
+
+@dataclass
+class _Bracket:
+    """Two times between which a value falls through zero, and what it is there where that is known."""
+
+    low: float
+    high: float
+    ahead: float = 0.0
+    behind: float = 0.0
+    count: int = 0
+
+    def narrow(self, at: float, left: float) -> None:
+        """Take a time for one of the two."""
+        self.count += 1
+        if left > 0.0:
+            self.low, self.ahead = at, left
+        else:
+            self.high, self.behind = at, left
+
+    def within(self, at: float) -> float:
+        """Return a time if it is between the two; else where a straight line is zero, or the middle."""
+        if self.count >= _QUICK:
+            return 0.5 * (self.low + self.high)
+        if not self.low < at < self.high and self.ahead > 0.0 > self.behind:
+            at = self.low + (self.high - self.low) * self.ahead / (self.ahead - self.behind)
+        return at if self.low < at < self.high else 0.5 * (self.low + self.high)
 
 
 def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing) -> tuple[Point, Crossing]:
@@ -76,31 +113,30 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
     an end on the side of the start tells when the corner is.
     """
     t, h, gauge, watch = before.state.t, after.state.t - before.state.t, crossing.gauge, journey.watch
-    lead, side, dust = max(_LEAD * h, 8.0 * math.ulp(t + h)), watch.sides[gauge], watch.dusts[gauge]
-    low, high, at, back = t, t + h, crossing.t - lead, lead
-    found, when, ahead, misses = before, t, 0.0, 0
+    lead, dust = max(_LEAD * h, 8.0 * math.ulp(t + h)), watch.dusts[gauge]
+    bracket, at = _Bracket(t, t + h), crossing.t - lead
+    found, when, last, back = before, t, None, lead
     for _ in range(_LANDINGS_MOST):
-        if at - t <= SMALLEST * h or high - low <= max(_LEAD_MOST * h, lead):
+        if at - t <= SMALLEST * h or bracket.high - bracket.low <= max(_LEAD_MOST * h, lead):
             break
         try:
             after = _towards(journey, before, at - t)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
-        left = side * float(watch.values(after.state, after.supply.u, before.state)[gauge])
-        if left <= dust:
-            high, back, misses = at, 8.0 * back, misses + 1
-            at = max(high - back, 0.5 * (low + high))
-            if ahead > 0.0 and misses == 1:
-                at = low + (high - low) * ahead / (ahead - left) - lead
-                at = at if low < at < high else 0.5 * (low + high)
+        curve, end = journey.track.curve(before, after), after.state.t
+        left, off = watch.left(after, before, gauge), watch.offset(curve, before, after, gauge)
+        above, on = left - dust, _to_zero(last, (end, left - dust)) if last else off
+        missed = above > 0.0 and end < at - lead  # no step ends there
+        bracket.narrow(end if above > 0.0 else at, above)
+        if above <= 0.0:
+            last, back = (at, above), 4.0 * back
+            at = bracket.within(at + on - back)
             continue
-        off = watch.offset(journey.track.curve(before, after), before, after, gauge)
-        found, low, when = after, after.state.t, after.state.t + max(off, 0.0)
-        ahead, misses, missed = left, 0, low < at - lead  # missed: no step ends there
-        high = at if missed else high
-        if 0.0 <= off <= max((_LEAD_FAR if missed else _LEAD_MOST) * h, lead):
+        bracket.high = at if missed else bracket.high
+        found, when, last, back = after, end + max(off, 0.0), (end, above), lead
+        if 0.0 <= off * above / left <= max((_LEAD_FAR if missed else _LEAD_MOST) * h, lead):
             break
-        at = when - lead if low < when - lead < high else 0.5 * (low + high)
+        at = bracket.within(end + on - lead)
     return found, replace(crossing, t=when)
 
 

@@ -60,8 +60,6 @@ def follows(m: March) -> bool:
     feel(c, f)
     for k in range(c.count):
         c.changes[k] = c.found[c.width * k + 1]
-    if c.stuck > 0:
-        settled_lead(m)
     return True
 
 
@@ -84,7 +82,7 @@ def begun(m: March) -> None:
 
 @seldom
 def settled_lead(m: March) -> None:
-    """Let no lead of the method's own accelerations on those before the jump be left along what sticks."""
+    """Let no lead of the method's own accelerations on the true ones be left along what sticks."""
     f = m.flat
     for i in range(0, f.padded, 8):
         put(f.force[i:], eight(m.algorithmic[i:]) - eight(m.rate[i:]))

@@ -9,7 +9,7 @@ from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.books import copy
 from flexctrl.dynamics.march.contacts import bear_more, feel
 from flexctrl.dynamics.march.flowing import flow_on, pivot, released
-from flexctrl.dynamics.march.holding import follows, held
+from flexctrl.dynamics.march.holding import follows, held, settled_lead
 from flexctrl.dynamics.march.record import DONE, FAILED, SINGULAR, WANTS_MASS, March
 from flexctrl.dynamics.march.step import sloped
 from flexctrl.kernels.eights import eight, larger, largest, put, total
@@ -61,7 +61,10 @@ def jump(m: March) -> int:
         return FAILED
     if m.flows.count > 0:
         run_on(m)
-    return changed(m)
+    changed(m)
+    if m.contacts.count > 0 and m.contacts.stuck > 0:
+        settled_lead(m)
+    return DONE
 
 
 def answered(m: March) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -98,9 +98,10 @@ class MarchingStepper:
 
         The point's rates are those of its state under its inputs: what changes them beside the inputs starts anew.
         """
-        self.enter(point)
+        may_switch = self.marcher.contacts.count > 0
+        self.enter(replace(point, trend=np.zeros_like(point.trend), lean=1.0) if may_switch else point)
         self.marcher.about_to(step)
-        self.marcher.march.unsure = int(self.marcher.contacts.count > 0)  # a contact may have switched
+        self.marcher.march.unsure = int(may_switch)
         status = self.marcher.jump(supply.u)
         self.marcher.march.unsure = 0
         if status == DONE:
