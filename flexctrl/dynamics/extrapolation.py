@@ -124,21 +124,25 @@ class _Stepper:
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs; the runs stay apart."""
         coarse, fine = (self._switched(run, point.state) for run in (point.coarse, point.fine))
-        coarse = self.coarse.renew(coarse, replace(supply, x=coarse.supply.x), step)
-        fine = self.fine.renew(fine, replace(supply, x=fine.supply.x), 0.5 * step)
+        coarse = self.coarse.renew(coarse, self._own(coarse, supply), step)
+        fine = self.fine.renew(fine, self._own(fine, supply), 0.5 * step)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
         point = replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
         if not quasistatic(self.model).size:
             return point
         gap = self.between(coarse.state, fine.state)
         state = self.moved_on(coarse.state, fine.state, gap)
-        return replace(point, state=state, supply=self._supply(state, coarse, fine), gap=gap)
+        return replace(point, state=state, supply=self._supply(supply, state, coarse, fine), gap=gap)
 
     def join(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point with both runs in its state: apart, they would meet a corner of a law of force apart."""
-        coarse = _from(self.coarse, point.coarse, (point.state, replace(supply, x=point.coarse.supply.x), step))
-        fine = _from(self.fine, point.fine, (point.state, replace(supply, x=point.fine.supply.x), 0.5 * step))
+        coarse = _from(self.coarse, point.coarse, (point.state, self._own(point.coarse, supply), step))
+        fine = _from(self.fine, point.fine, (point.state, self._own(point.fine, supply), 0.5 * step))
         return replace(point, rate=fine.rate, supply=supply, coarse=coarse, fine=fine, gap=np.zeros(self.model.n))
+
+    def _own(self, run: Point, supply: Supply) -> Supply:
+        """What a run is supplied with: the states of a continuous law are integrated, by each run its own."""
+        return replace(supply, x=run.supply.x) if self.feed.continuous else supply
 
     def _switched(self, run: Any, state: State) -> Any:
         """A run whose dry contacts stick or slide as those of a state do."""
@@ -156,7 +160,7 @@ class _Stepper:
         gap = self.between(coarse.state, fine.state)
         state = self.moved_on(coarse.state, fine.state, gap)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
-        return _Point(state, rate, self._supply(state, coarse, fine), coarse, fine, gap)
+        return _Point(state, rate, self._supply(point.supply, state, coarse, fine), coarse, fine, gap)
 
     def _spent(self) -> tuple[int, int]:
         a, b = self.coarse.counts, self.fine.counts
@@ -167,9 +171,9 @@ class _Stepper:
         v = fine.v + self.weight * (fine.v - coarse.v)
         return self.model.advance(fine, self.weight * gap, v, fine.t)
 
-    def _supply(self, state: State, coarse: Point, fine: Point) -> Supply:
+    def _supply(self, held: Supply, state: State, coarse: Point, fine: Point) -> Supply:
         if not self.feed.continuous:
-            return fine.supply
+            return held
         return self.feed.evaluate(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
 
     def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
