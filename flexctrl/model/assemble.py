@@ -17,9 +17,8 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.rope_mass import RopeMass
 from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.kernels.kernel import Backend, best_backend
+from flexctrl.model.braked import rest_held
 from flexctrl.model.equations import Small
-from flexctrl.model.equilibrium import equilibrium
-from flexctrl.model.holding import held_at
 from flexctrl.model.laws.frictions import inner_freedoms
 from flexctrl.model.laws.gusts import check_gusts, idle_gusts
 from flexctrl.model.linkages.mobility import motion_of
@@ -166,7 +165,7 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
     large = assemble(structure, [*(e for e in parts if e is not small), LargeRotation()], backend)
     from flexctrl.model.linearize import all_free, linearize  # brings all that modes need
 
-    found = equilibrium(large, hold=held_at(large, dict(small.hold)), inputs=dict(small.inputs))
+    found = rest_held(large, dict(small.hold), dict(small.inputs))
     linear = all_free(linearize(large, at=found), found)
     about = Small(np.zeros(large.n), linear.K, linear.C.tocsr(), linear.M, found.inputs)
     motion = replace(large.motion, rest=found.state)

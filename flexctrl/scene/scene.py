@@ -23,8 +23,8 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import SceneError, StructureError, check_kind, did_you_mean, shortened
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
-from flexctrl.model.equilibrium import Rest, equilibrium
-from flexctrl.model.holding import held_at
+from flexctrl.model.braked import rest_held
+from flexctrl.model.equilibrium import Rest
 from flexctrl.model.linearize import released
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
@@ -250,10 +250,9 @@ class Scene:
 
     def _equilibrium(self, model: Model) -> Rest:
         try:
-            places = held_at(model, self.hold)
+            return rest_held(model, self.hold, self.rest_inputs)
         except StructureError as error:
             raise SceneError(f"{self.name}: {error}") from None
-        return equilibrium(model, hold=places, inputs=dict(self.rest_inputs))
 
     # -- runs
 

@@ -71,3 +71,31 @@ def test_two_motors_on_a_rigid_girder_hold_its_travel_and_its_turn():
     assert len(held(left=0.0, right=0.0).twin_rest.held) == twin.n == 2
     with pytest.raises(fc.errors.EquilibriumError):
         _ = held(right=0.0).twin_rest
+
+
+@pytest.mark.parametrize("turned", [0.0, 20.0, -20.0])
+@pytest.mark.parametrize("speed", [0.0, 20.0, 40.0])
+def test_a_held_winch_leans_its_load_into_a_side_wind(speed, turned):
+    """tan φ = k w²/(m g), at the length ℓ + r θ/R that is paid out; an elastic rope is longer by the share T/EA."""
+    mass, length, EA, out = 1000.0, 10.0, 1e7, 0.2 * turned / 4.0
+    crab, load = fc.PointMass("crab", (0, 0, length), 50.0), fc.PointMass("load", (0, 0, 0), mass)
+    winch = fc.Winch("winch", load.node, crab.node, EA=EA, radius=0.2, ratio=4.0, inertia=0.05)
+    structure = fc.Structure(
+        [crab, load],
+        [fc.Support(crab.node)],
+        [winch],
+        [fc.MotorTorque("torque", winch)],
+        [fc.Position(axis, load.node, axis) for axis in "xyz"],
+    )
+    wind = fc.Wind({"load": 8.0}, (speed, 0.0, 0.0))
+    plan = fc.Simulation(0.1, fc.GeneralizedAlpha(1e-2), start=fc.Start.EQUILIBRIUM)
+    effects = (fc.Gravity(), fc.Flexible(), fc.LargeRotation(), wind)
+    scene = fc.Scene(structure, effects, hold={"winch_source": turned}, simulation=plan)
+    push, weight = 0.5 * 1.25 * 8.0 * speed**2, mass * 9.81
+    lean, pull = math.atan2(push, weight), math.hypot(push, weight)
+    for rest, rope in ((scene.twin_rest, length + out), (scene.rest, (length + out) * (1.0 + pull / EA))):
+        assert rest.outputs["x"] == pytest.approx(rope * math.sin(lean), rel=1e-9, abs=1e-9)
+        assert rest.outputs["z"] == pytest.approx(length - rope * math.cos(lean), abs=1e-9)
+        assert rest.outputs["y"] == pytest.approx(0.0, abs=1e-9)
+    start = scene.run(scene.twin)
+    assert (start["x"][0], start["z"][0]) == pytest.approx((scene.twin_rest.outputs["x"], scene.twin_rest.outputs["z"]))
