@@ -46,7 +46,10 @@ def rotation_vector(R: ca.SX) -> ca.SX:
 
 def _polynomial(x: ca.SX, coefficients: tuple[float, ...]) -> ca.SX:
     """Return a polynomial, coefficients from the lowest power up; even and odd powers apart: half the waiting."""
-    square, before, last = x * x, coefficients[-1], coefficients[-2]
+    import casadi as ca
+
+    square = x * x
+    before, last = ca.SX(coefficients[-1]), ca.SX(coefficients[-2])
     for coefficient in coefficients[-3::-1]:
         before, last = last, before * square + coefficient
     return last + x * before

@@ -105,7 +105,9 @@ class Kernels:
             drag = ca.substitute(shares.force, velocities, ca.SX.zeros(velocities.numel())) - shares.force
         power = ca.dot(drag, self._raw_rates(symbols)) if shares.lost is None else shares.lost
         found = ca.vertcat(shares.kinetic, shares.stored, power)
-        return _kernel(f"{self.kind.name}_energy", symbols, parameters, found, bool(power.is_zero()))  # losses: each step
+        return _kernel(
+            f"{self.kind.name}_energy", symbols, parameters, found, bool(power.is_zero())
+        )  # losses: each step
 
     @cached_property
     def tangent(self) -> Kernel:
