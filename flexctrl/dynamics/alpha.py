@@ -180,7 +180,7 @@ class Stepper:
         M = self._massive(-self.model.slope(state, state.v, np.zeros(self.model.n), (0.0, 0.0, 1.0), supply.u))
         if (M.diagonal() > self.model.dust).all():
             try:
-                return factorise(M)
+                return self._factorised(M)
             except SingularMatrixError:
                 pass
         return self._held(state, supply, step)
@@ -189,7 +189,7 @@ class Stepper:
         """The mass matrix and the forces that answer accelerations over a step."""
         c, zero = self.coefficients, np.zeros(self.model.n)
         seeds = (c.beta * step**2, c.gamma * step, 1.0)
-        return factorise(self._massive(-self.model.slope(state, state.v, zero, seeds, supply.u)))
+        return self._factorised(self._massive(-self.model.slope(state, state.v, zero, seeds, supply.u)))
 
     def _massive(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
         return without_flows(self.model, matrix) if self.model.motion.flows.size else matrix
@@ -268,15 +268,18 @@ class Stepper:
         slope = self.model.slope(at.state, at.v, at.rate, at.seeds, at.supply.u)
         if self.feed.continuous:
             slope = slope + self.feed.slope(at.state, at.supply, at.h, at.seeds)
-        if self._plan is None or not self._plan.fits(slope):
-            self._plan = plan(slope)
         try:
-            solve = factorise(slope, self._plan)
+            solve = self._factorised(slope)
             self._solve = lambda force: solve(-force)
         except SingularMatrixError as error:
             raise StepError(error.where, "the tangent is singular") from error
         self.counts.factorisations += 1
         self.memory = at
+
+    def _factorised(self, matrix: sp.csr_matrix) -> Solve:
+        if self._plan is None or not self._plan.fits(matrix):
+            self._plan = plan(matrix)
+        return factorise(matrix, self._plan)
 
     def error(self, before: AlphaPoint, after: AlphaPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error of a step over what is allowed: |β − 1/6| h² |Δa| (Zienkiewicz & Xie 1991)."""

@@ -241,7 +241,14 @@ class Watch:
 
     def left(self, after: Point, before: Point, gauge: int) -> float:
         """Return how far a gauge is from zero after a step, on the side where it was: below zero it has passed it."""
-        return float(self.sides[gauge] * self.values(after.state, after.supply.u, before.state)[gauge])
+        return float(self.sides[gauge]) * self.value(after.state, after.supply.u, before.state, gauge)
+
+    def value(self, state: State, u: np.ndarray, before: State, gauge: int) -> float:
+        """Return one gauge's value, of a state that came from one before."""
+        switch = gauge - len(self.events)
+        if 0 <= switch < len(self.names):
+            return self.feed.model.switches.gap(state, u, switch)
+        return float(self.values(state, u, before)[gauge])
 
     def begin(self, point: Point) -> None:
         """Note the side that each gauge is on at the start."""
@@ -307,7 +314,7 @@ class Watch:
                 continue
             rising = fb > 0.0
             if side != 0.0 and direction is not (Direction.FALLING if rising else Direction.RISING):
-                own = partial(_one_of, value, gauge)
+                own = partial(value.one, gauge)
                 if not fa * fb < 0.0:
                     at = _return(own, a, b, fb, dust)
                 elif self.stops(gauge):  # where exactly, is found by steps
@@ -337,8 +344,8 @@ class Watch:
     def offset(self, curve: Curve, before: Point, after: Point, gauge: int) -> float:
         """Return how much later than at the end of a step a gauge is zero, by its slope there."""
         t, h = after.state.t, after.state.t - before.state.t
-        now = self.values(after.state, after.supply.u, before.state)[gauge]
-        slope = (now - _Along(self, curve, before, after)(t - _SLOPE * h)[gauge]) / (_SLOPE * h)
+        now = self.value(after.state, after.supply.u, before.state, gauge)
+        slope = (now - _Along(self, curve, before, after).one(gauge, t - _SLOPE * h)) / (_SLOPE * h)
         return float(-now / slope) if abs(now) > _DUST * self.sizes[gauge] and slope != 0.0 else 0.0
 
     def settle(self, after: Point) -> None:
@@ -381,9 +388,10 @@ class _Along:
         state = self.curve.at(t)
         return self.watch.values(state, self.supply(state).u, self.before.state)
 
-
-def _one_of(value: Callable[[float], np.ndarray], gauge: int, t: float) -> float:
-    return float(value(t)[gauge])
+    def one(self, gauge: int, t: float) -> float:
+        """One of them."""
+        state = self.curve.at(t)
+        return self.watch.value(state, self.supply(state).u, self.before.state, gauge)
 
 
 def _nearly(points: Sequence[tuple[float, float]], first: float) -> float:

@@ -124,8 +124,10 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
         curve, end = journey.track.curve(before, after), after.state.t
-        left, off = watch.left(after, before, gauge), watch.offset(curve, before, after, gauge)
-        above, on = left - dust, _to_zero(last, (end, left - dust)) if last else off
+        left = watch.left(after, before, gauge)
+        above = left - dust
+        off = watch.offset(curve, before, after, gauge) if above > 0.0 or last is None else 0.0
+        on = _to_zero(last, (end, above)) if last else off
         missed = above > 0.0 and end < at - lead  # no step ends there
         bracket.narrow(end if above > 0.0 else at, above)
         if above <= 0.0:

@@ -172,6 +172,24 @@ class Switches:
             gaps[stuck] = self.static[stuck] - np.abs(held[1])
         return gaps
 
+    def gap(self, state: State, u: np.ndarray, contact: int) -> float:
+        """Return one of the `gaps`.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+        contact : int
+
+        Returns
+        -------
+        float
+        """
+        phase = float(self.phases(state)[contact])
+        if phase in (0.0, STUCK):
+            return float(self.gaps(state, u)[contact])
+        return phase * float(self.slips.speeds(state)[contact])
+
     def _holding(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the forces that hold what sticks, and the accelerations of what has mass."""
         model, a = self.model, np.zeros(self.model.n)
