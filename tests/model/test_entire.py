@@ -37,7 +37,7 @@ def cantilever() -> fc.Structure:
     return fc.Structure([bar, tip], [held, pinned], inputs=[fc.Force("push", bar.node(1), "y")])
 
 
-MODAL = {"levers": fc.coarsen(fc.cranes.flexible_arm()), "plain": cantilever()}
+MODAL = {"levers": fc.coarsen(fc.cranes.flexible_arm())}
 
 
 def moved(model: fc.Model, seed: int = 0) -> tuple[Flattened, fc.State]:
@@ -62,7 +62,11 @@ def assembled(name: str) -> fc.Model:
 @cache
 def modal(name: str) -> fc.Model:
     """Machines of beams in a few modes."""
-    return fc.assemble(MODAL[name], [*EFFECTS, fc.ComponentModes(1), fc.ShaftElasticity()])
+    return bending(MODAL[name])
+
+
+def bending(structure: fc.Structure) -> fc.Model:
+    return fc.assemble(structure, [*EFFECTS, fc.ComponentModes(1), fc.ShaftElasticity()])
 
 
 def made(name: str) -> fc.Model:
@@ -112,6 +116,10 @@ def test_forces_on_beams_in_modes_are_those_of_the_pieces(name):
     assert np.allclose(found, f.force[: f.n], rtol=0.0, atol=1e-11 * np.abs(found).max())
 
 
+def test_elements_that_no_node_follows_are_computed_side_by_side():
+    assert not flatten(bending(cantilever())).flat.quick
+
+
 @pytest.mark.parametrize("name", [*MACHINES, *MODAL])
 def test_nodes_and_drives_arrive_where_they_are_placed(name):
     small, _ = moved(made(name))
@@ -141,7 +149,7 @@ def test_forces_of_inputs_and_energies_are_those_of_the_pieces(name):
     f.books[2] = 0.0
     dissipate(f)
     assert f.books[2] == pytest.approx(mine[1][2], rel=1e-12)
-    state = small.state(f.v, 0.0)
+    state = small.state(f.v, 0.0, small.model.rest.dry)
     model = small.model
     found = model.advance(state, small.own(f.step), small.own(f.v), 0.0)
     loads = model.loads(found, f.u)

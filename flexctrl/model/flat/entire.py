@@ -1,6 +1,7 @@
 """Machines of few freedoms as a few kernels: accelerations of all of it at once, and where all of it ends up.
 
-Beams in a few modes are stiff for most steps, so of machines with such the forces are drawn up, not the accelerations.
+Beams in a few modes are stiff for most steps, so of machines with such the forces are drawn up, not the accelerations;
+and only where nodes follow others, which is done one after the other, while pieces are computed side by side.
 
 The kernels are drawn up by running the flat model once more on symbols: on the workspace as casadi expressions, with
 pieces and levers that write down what they compute. What is 0 or ±1 in every pose (a girder that only yaws tilts no
@@ -82,7 +83,7 @@ def entire_of(layout: Layout) -> Entire:
     modal = bool(motion.inner.size) and all(i.order == 2 for i in motion.effects)
     if not model.large or not 0 < motion.n <= (_BENDING if modal else _FREEDOMS):
         return _NONE
-    apt = not motion.linkage.loops if modal else not (motion.plain or motion.inner.size or motion.flows.size)
+    apt = not motion.plain and not (motion.linkage.loops if modal else motion.inner.size or motion.flows.size)
     if not apt:
         return _NONE
     pieces = sum(f.count * f.kernels.force.instructions for f in model.forces.families)
