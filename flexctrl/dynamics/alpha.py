@@ -17,19 +17,21 @@ from flexctrl.dynamics import steps
 from flexctrl.dynamics.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
+from flexctrl.dynamics.massless import Massless, massless
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
 from flexctrl.errors import SingularMatrixError, StructureError
-from flexctrl.model.flows import flow_rates, flowing, without_flows
+from flexctrl.model.flows import flow_rates, flowing, without
 from flexctrl.model.model import Model
 from flexctrl.model.solve import Plan, Solve, factorise, plan
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_number, check_seconds
 
 _TURNED = 0.02
+_SHARE = 1e-3
 _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
@@ -131,14 +133,34 @@ class Stepper:
         return self._eased(self._fresh(state, supply, step), step)
 
     def _fresh(self, state: State, supply: Supply, step: float) -> AlphaPoint:
-        zero, flows = np.zeros(self.model.n), self.model.motion.flows
         state, supply = settled(self.model, state, self.feed, supply)
-        state = flowing(self.model, state, supply.u)
-        force = self.model.balance(state, state.v, zero) + self.model.loads(state, supply.u)
+        light = self._light(state, supply, step)
+        state, rate = self._set_out(state, supply, step, light)
+        if light.loose.size:
+            later, _ = self._set_out(self._later(state, rate, step), supply, step, light)
+            rate[light.loose] = (later.v - state.v)[light.loose] / (_SHARE * step)
+        return AlphaPoint(state, rate, supply, rate, np.zeros(self.model.n))
+
+    def _light(self, state: State, supply: Supply, step: float) -> Massless:
+        """What moves no mass and sets out as its forces say: nothing, where a step would not see how it begins."""
+        light = massless(self.model)
+        if self.feed.continuous or not light.all.size:
+            return light.none
+        return light if light.seen(state, supply.u, step) else light.none
+
+    def _later(self, state: State, rate: np.ndarray, step: float) -> State:
+        t = _SHARE * step
+        return self.model.advance(state, t * state.v, state.v + t * rate, state.t + t)
+
+    def _set_out(self, state: State, supply: Supply, step: float, light: Massless) -> tuple[State, np.ndarray]:
+        """Return a state with the rates of what has no mass, and the accelerations of all others."""
+        flows = self.model.motion.flows
+        state = light.pushed(flowing(self.model, state, supply.u), supply.u)
+        force = self.model.balance(state, state.v, np.zeros(self.model.n)) + self.model.loads(state, supply.u)
         if flows.size:
             force[flows] = flow_rates(self.model, state, supply.u, step)
-        rate = self._mass(state, supply, step)(force)
-        return AlphaPoint(state, rate, supply, rate, zero)
+        rate = self._mass(state, supply, step, light)(force)
+        return light.moving(state, rate, supply.u) if light.all.size else (state, rate)
 
     def renew(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
         """Return a point under other inputs: the true accelerations jump; the method's own keep their lead on them.
@@ -166,18 +188,31 @@ class Stepper:
 
     def _eased(self, point: AlphaPoint, step: float) -> AlphaPoint:
         """Return a point whose freedoms of first order set out so that a step that sees nothing of them ends well."""
-        c, flows = self.coefficients, self.model.motion.settling
-        v, rate, own = point.state.v.copy(), point.rate.copy(), point.algorithmic.copy()
-        eased = [i for i in flows if unresolved(v[i], rate[i], step)]
-        for i in eased:
-            begun = float(v[i]), float(rate[i]), step, c.beta, c.gamma
-            v[i] = eased_rate(*begun)
-            rate[i] = own[i] = eased_change(*begun)
+        c, v, rate, own = self.coefficients, point.state.v.copy(), point.rate.copy(), point.algorithmic.copy()
+        eased = [(i, x, w) for i, x, w in self._hurrying(point, step) if unresolved(x, w, step)]
+        for i, x, w in eased:
+            v[i] += eased_rate(x, w, step, c.beta, c.gamma) - x
+            rate[i] += eased_change(x, w, step, c.beta, c.gamma) - w
+            own[i] = rate[i]
         return replace(point, state=point.state.with_(v=v), rate=rate, algorithmic=own) if eased else point
 
-    def _mass(self, state: State, supply: Supply, step: float) -> Solve:
+    def _hurrying(self, point: AlphaPoint, step: float) -> list[tuple[int, float, float]]:
+        """What may be over within a step: freedoms of first order, those that follow them; their rates and changes."""
+        (state, rate), inner = (point.state, point.rate), self.model.motion.settling
+        found = [(int(i), float(state.v[i]), float(rate[i])) for i in inner]
+        light = self._light(state, point.supply, step) if found else massless(self.model).none
+        if not light.loose.size:
+            return found
+        later, after = self._set_out(self._later(state, rate, step), point.supply, step, light)
+        now, then = (light.hurried(*at, point.supply.u) for at in ((state, rate), (later, after)))
+        rates = zip(light.loose.tolist(), now.tolist(), ((then - now) / (_SHARE * step)).tolist(), strict=True)
+        return [*found, *rates]
+
+    def _mass(self, state: State, supply: Supply, step: float, light: Massless) -> Solve:
         """The mass matrix; where it is singular, the forces that hold massless freedoms over a step stand in."""
         M = self._massive(-self.model.slope(state, state.v, np.zeros(self.model.n), (0.0, 0.0, 1.0), supply.u))
+        if light.all.size:
+            M = without(M, light.all)
         if (M.diagonal() > self.model.dust).all():
             try:
                 return self._factorised(M)
@@ -192,7 +227,8 @@ class Stepper:
         return self._factorised(self._massive(-self.model.slope(state, state.v, zero, seeds, supply.u)))
 
     def _massive(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
-        return without_flows(self.model, matrix) if self.model.motion.flows.size else matrix
+        flows = self.model.motion.flows
+        return without(matrix, flows) if flows.size else matrix
 
     def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later.

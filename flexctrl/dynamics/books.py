@@ -10,6 +10,7 @@ import numpy as np
 from flexctrl.dynamics.dense import Booked, Curve
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.march.record import OFTEN
+from flexctrl.dynamics.massless import massless
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Point
@@ -100,7 +101,7 @@ class Books:
 
         Places of what has no mass have jumped too: what the inputs did on the way and springs do not store is lost.
         """
-        if self.model.motion.flows.size:
+        if self.model.motion.flows.size or massless(self.model).damped.size:
             self.turn(after)
         if quasistatic(self.model).size:
             (k0, v0, _), (k1, v1, _) = (self.model.energy(point.state) for point in (before, after))

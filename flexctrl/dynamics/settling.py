@@ -12,6 +12,7 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.scales import once, yardsticks
 from flexctrl.errors import SingularMatrixError
+from flexctrl.model.flows import flowing
 from flexctrl.model.model import Model
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
@@ -61,6 +62,7 @@ def settled(model: Model, state: State, feed: Feed, supply: Supply) -> tuple[Sta
         return state, supply
     zero, weight, first = np.zeros(model.n), 1.0 / yardsticks(model)[light], (state, supply)
     for iteration in range(_ITERATIONS):
+        state = flowing(model, state, supply.u)
         force = (model.balance(state, state.v, zero) + model.loads(state, supply.u))[light]
         slope = model.slope(state, state.v, zero, (1.0, 0.0, 0.0), supply.u)
         if feed.continuous:

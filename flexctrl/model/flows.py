@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
-__all__ = ["flow_rates", "flowing", "without_flows"]
+__all__ = ["flow_rates", "flowing", "without"]
 
 _SHARE = 1e-3
 
@@ -59,9 +59,9 @@ def flow_rates(model: Model, state: State, u: np.ndarray, step: float) -> np.nda
     return (later.v[inner] - state.v[inner]) / t
 
 
-def without_flows(model: Model, matrix: sp.csr_matrix) -> sp.csr_matrix:
-    """Return a matrix of all degrees of freedom with the identity in place of the inner ones of first order."""
-    inner = np.zeros(model.n)
-    inner[model.motion.flows] = 1.0
-    kept = sp.diags(1.0 - inner)
-    return sp.csr_matrix(kept @ matrix @ kept + sp.diags(inner))
+def without(matrix: sp.csr_matrix, places: np.ndarray) -> sp.csr_matrix:
+    """Return a matrix of all degrees of freedom with the identity in place of some."""
+    left_out = np.zeros(matrix.shape[0])
+    left_out[places] = 1.0
+    kept = sp.diags(1.0 - left_out)
+    return sp.csr_matrix(kept @ matrix @ kept + sp.diags(left_out))

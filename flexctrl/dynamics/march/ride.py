@@ -23,7 +23,7 @@ from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.march.weaving import Weaver
-from flexctrl.dynamics.settling import quasistatic
+from flexctrl.dynamics.massless import massless
 from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.native import Packed
@@ -55,7 +55,7 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
         return False
     if journey.watch.events and _near_stop(journey):
         return False
-    if plan.feed.sample_time and quasistatic(plan.model).size:
+    if plan.feed.sample_time and massless(plan.model).all.size:
         return False
     return _Ride(journey, stepper, until, most).go()
 

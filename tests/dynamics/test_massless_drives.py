@@ -1,0 +1,96 @@
+"""A motor's angle without inertia, behind torque that builds up or with friction: what its rates are after a jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import flexctrl as fc
+
+SHAFT, RATIO, SAMPLE, UNTIL = 50.0, 3.0, 0.02, 1.0
+
+
+class Swell:
+    """A torque sampled from a sine."""
+
+    inputs, outputs, sample_time = ("angle",), ("torque",), SAMPLE
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([np.sin(4.0 * t)])
+
+
+def machine(effect: fc.effects.effect.Effect) -> fc.Model:
+    body = fc.RigidBody("body", (0, 0, 0), 1.0, (1, 1, 1.0))
+    drive = fc.RotaryDrive("drive", body.node, axis="z", stiffness=SHAFT, ratio=RATIO, inertia=0)
+    outputs = [fc.DriveAngle("angle", drive), fc.DriveSpeed("speed", drive), fc.Rotation("turn", body.node, "z")]
+    held = [fc.Support(body.node, "u v w rx ry")]
+    structure = fc.Structure([body], held, [drive], [fc.MotorTorque("torque", drive)], outputs)
+    return fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity(), effect])
+
+
+def integrated(slope, first: list[float]) -> np.ndarray:
+    """Another integrator's end, sample by sample."""
+    z = np.array(first)
+    for k in range(round(UNTIL / SAMPLE)):
+        torque = float(np.sin(4.0 * k * SAMPLE))
+        z = solve_ivp(slope, (0, SAMPLE), z, args=(torque,), method="Radau", rtol=1e-11, atol=1e-13).y[:, -1]
+    return z
+
+
+def lagging(T: float) -> np.ndarray:
+    """J r'' = 3τ, T τ' + τ = u, a = 3 r + τ / k."""
+    r, w, torque = integrated(lambda t, z, u: [z[1], RATIO * z[2], (u - z[2]) / T], [0.0, 0.0, 0.0])
+    u = np.sin(4.0 * (UNTIL - SAMPLE))
+    return np.array([RATIO * r + torque / SHAFT, RATIO * w + (u - torque) / T / SHAFT, r])
+
+
+def rubbing(c: float) -> np.ndarray:
+    """c a' = u + k (3 r − a), J r'' = −3 k (3 r − a)."""
+
+    def slope(t: float, z: np.ndarray, u: float) -> list[float]:
+        shaft = SHAFT * (RATIO * z[1] - z[0])
+        return [(u + shaft) / c, z[2], -RATIO * shaft]
+
+    a, r, w = integrated(slope, [0.0, 0.0, 0.0])
+    return np.array([a, slope(0.0, np.array([a, r, w]), np.sin(4.0 * (UNTIL - SAMPLE)))[0], r])
+
+
+CASES = {
+    "lag": (fc.MotorLag({"drive": 0.02}), lagging(0.02)),
+    "friction": (fc.ViscousFriction({"drive": 0.1}), rubbing(0.1)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_its_angle_and_speed_are_of_second_order_after_jumps_of_the_torque(case):
+    effect, exact = CASES[case]
+    runs = [fc.simulate(machine(effect), Swell(), until=UNTIL, method=fc.GeneralizedAlpha(h)) for h in (2e-3, 1e-3)]
+    errors = [np.abs(run.y[-1] - exact) for run in runs]
+    assert (errors[0] <= [2e-5, 2e-4, 1e-5]).all()
+    assert (errors[1] <= errors[0] / 3.0 + 1e-9).all()
+    assert runs[0].report.energy_residual > 3.0 * runs[1].report.energy_residual
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_controlled_steps_come_near_it_too(case):
+    effect, exact = CASES[case]
+    run = fc.simulate(machine(effect), Swell(), until=UNTIL, tolerance=fc.Tolerance(1e-6, 1e-8))
+    assert run.status is fc.Status.FINISHED
+    assert np.abs(run.y[-1] - exact)[[0, 2]].max() <= 1e-3
+
+
+@pytest.mark.parametrize("T", [1e-3, 1e-5])
+def test_a_lag_that_steps_do_not_see_leaves_speeds_as_they_are(T):
+    """The angle is late by half a step at most, the speed no other than that of the body it turns, but for as much."""
+    run = fc.simulate(machine(fc.MotorLag({"drive": T})), Swell(), until=UNTIL, method=fc.GeneralizedAlpha(4e-3))
+    assert np.abs(run.y[-1] - lagging(T)).max() <= 0.03
+
+
+def test_the_start_is_where_torque_that_is_yet_to_build_up_leaves_it():
+    run = fc.simulate(machine(fc.MotorLag({"drive": 0.02})), until=1.0, inputs={"torque": 1.0})
+    assert run.status is fc.Status.FINISHED
+    assert np.allclose(run.y[0], [0.0, 1.0 / (0.02 * SHAFT), 0.0], atol=1e-9)
