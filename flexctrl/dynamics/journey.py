@@ -27,6 +27,7 @@ from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark,
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.switching import anew, beyond, is_brief, lead, withheld
 from flexctrl.errors import ControllerError
+from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
@@ -252,12 +253,21 @@ class Journey:
         if np.array_equal(fresh.u, before.u):
             self.point = replace(self.point, supply=fresh)
         else:
-            held = replace(self.point, state=self.plan.model.switches.under(state, fresh.u))
+            held = replace(self.point, state=self.under(fresh.u))
             self.point = self.stepper.renew(held, fresh, self.mark.size)
             self.books.jump(held, self.point)
         if not self.watch.idle:
             self._leapt()
         self.rows.here(self.point, 1e-6 * self.mark.size)
+
+    def under(self, u: np.ndarray) -> State:
+        """Return the state under inputs that have jumped; note what breaks loose with them."""
+        switches, state = self.plan.model.switches, self.point.state
+        torn = switches.under(state, u)
+        loose = (switches.phases(state) == STUCK) & (switches.phases(torn) != STUCK)
+        for switch in np.flatnonzero(loose):
+            self._tell(Crossing(state.t, len(self.watch.events) + int(switch), True), state, u)
+        return torn
 
     def _leapt(self) -> None:
         """Note the events that a jump of the inputs has brought about; one of them may end the run."""

@@ -76,3 +76,32 @@ def test_it_comes_to_rest_near_its_target(kd, filtered, method):
     assert run["angle"][-1] == pytest.approx(angle, abs=1e-4)
     assert run["turn"][-1] == pytest.approx(turn, abs=3e-3)
     assert len(run.events) == switches
+
+
+class Swelling:
+    """2 N sin 2t, sampled."""
+
+    inputs, outputs, sample_time = ("x",), ("push",), 0.01
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([2.0 * np.sin(2.0 * t)])
+
+
+@pytest.mark.parametrize(
+    "method",
+    [fc.GeneralizedAlpha(1e-3), fc.AdaptiveAlpha(), fc.ExplicitRungeKutta(), fc.Richardson(fc.GeneralizedAlpha(1e-3))],
+    ids=str,
+)
+def test_what_a_sample_tears_loose_is_told(method):
+    """It bears 1.5 N: loose at the first sample at which more is asked for, and stuck again between samples."""
+    mass = fc.PointMass("mass", (0, 0, 0), 1.0)
+    outputs, inputs = [fc.Position("x", mass.node, "x")], [fc.Force("push", mass.node, "x")]
+    structure = fc.Structure([mass], [fc.Support(mass.node, "v w")], inputs=inputs, outputs=outputs)
+    dry = fc.CoulombFriction({"mass.u": fc.Coulomb(1.0, static=1.5)})
+    run = fc.simulate(fc.assemble(structure, [fc.LargeRotation(), dry]), Swelling(), until=7.0, method=method)
+    assert [e.rising for e in run.events] == [True, False] * 4 + [True]
+    swelled = 0.5 * (np.arange(5) * np.pi + np.arcsin(0.75))
+    assert np.allclose([e.t for e in run.events[::2]], np.ceil(swelled / 0.01) * 0.01, atol=1e-9)

@@ -388,6 +388,6 @@ class _Ride:
         if not j.watch.idle:
             j.watch.settle(j.point)
         if not self.jumped:
-            held = replace(j.point, state=j.plan.model.switches.under(j.point.state, self.supply.u))
+            held = replace(j.point, state=j.under(self.supply.u))
             j.point = self.stepper.plain.renew(held, self.supply, j.mark.size)
         return True
