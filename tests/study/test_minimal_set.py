@@ -111,9 +111,9 @@ def test_what_went_with_others_is_not_called_kept():
 
 def test_tolerances_are_values():
     assert fc.Within.of(0.01, "ledger") == fc.Within(outputs=0.01, poles=0.01, margins=0.01)
-    read = effects({"automatic": {"outputs": 0.01, "margins": 0.1}}, Place("scene.toml"))
+    read = effects({"automatic": {"outputs": 0.01, "margins": 0.1}}, Place("scene.toml"), rotor().structure)
     assert read == (fc.Automatic(fc.Within(outputs=0.01, margins=0.1)),)
-    assert effects({"automatic": {"tolerance": 0.02}}, Place("scene.toml")) == (fc.Automatic(0.02),)
+    assert effects({"automatic": {"tolerance": 0.02}}, Place("scene.toml"), rotor().structure) == (fc.Automatic(0.02),)
     with pytest.raises(StructureError, match="asks for nothing"):
         fc.Within()
     with pytest.raises(StructureError, match="Within: margins"):
@@ -121,4 +121,4 @@ def test_tolerances_are_values():
     with pytest.raises(StructureError, match="expected a number > 0"):
         fc.Automatic("0.01")
     with pytest.raises(SceneError, match="tolerance"):
-        effects({"automatic": {"tolerances": 0.02}}, Place("scene.toml"))
+        effects({"automatic": {"tolerances": 0.02}}, Place("scene.toml"), rotor().structure)
