@@ -18,8 +18,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.dynamics.scales import once
-from flexctrl.dynamics.settling import quasistatic
+from flexctrl.dynamics.settling import dragged, quasistatic
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.model import Model
 from flexctrl.model.solve import factorise
@@ -34,18 +33,7 @@ _SEEN = 2.1
 
 def massless(model: Model) -> Massless:
     """Return the freedoms of a model that move no mass."""
-    return Massless(model, quasistatic(model), once(model, _damped))
-
-
-def _damped(model: Model) -> np.ndarray:
-    if not isinstance(model, Model) or model.switches.names:
-        return np.zeros(0, dtype=int)
-    zero, u = np.zeros(model.n), np.zeros(len(model.inputs))
-    seeds = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    damping, mass = (np.abs(model.slope(model.rest, zero, zero, seed, u).diagonal()) for seed in seeds)
-    damped = (mass <= model.dust) & (damping > model.forces.rounding((0.0, 1.0, 0.0)))
-    damped[np.setdiff1d(model.motion.inner, model.n)] = False
-    return np.flatnonzero(damped)
+    return Massless(model, quasistatic(model), dragged(model))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +95,8 @@ class Massless:
     def moving(self, state: State, rate: np.ndarray, u: np.ndarray) -> tuple[State, np.ndarray]:
         """Return a state with the rates of freedoms with stiffness alone, and with the accelerations of damped ones.
 
+        Where nothing holds them (a slack rope, a shaft within its play) they keep the rates they had.
+
         Parameters
         ----------
         state : State
@@ -116,7 +106,10 @@ class Massless:
         """
         v, rate = state.v.copy(), rate.copy()
         v[self.loose], rate[self.all] = 0.0, 0.0
-        found = self._balanced(state, v, rate, u)
+        try:
+            found = self._balanced(state, v, rate, u)
+        except SingularMatrixError:
+            return state, rate
         v[self.loose], rate[self.damped] = found[: self.loose.size], found[self.loose.size :]
         return state.with_(v=v), rate
 
@@ -124,15 +117,17 @@ class Massless:
         """Return the rates of freedoms with stiffness alone that come of inner freedoms of first order."""
         inner, none = np.zeros_like(rate), np.zeros_like(rate)
         inner[self.model.motion.flows] = rate[self.model.motion.flows]
-        return self._balanced(state, none, inner, u)[: self.loose.size]
+        try:
+            return self._balanced(state, none, inner, u)[: self.loose.size]
+        except SingularMatrixError:
+            return none[: self.loose.size]
 
     def _balanced(self, state: State, v: np.ndarray, rate: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Rates of the loose and accelerations of the damped that balance those of others; none where nothing can."""
+        """Rates of the loose and accelerations of the damped that balance those of all others."""
         K = self.model.slope(state, state.v, rate, (1.0, 0.0, 0.0), u).tocsr()
         C = self.model.slope(state, state.v, rate, (0.0, 1.0, 0.0), u).tocsr()
         matrix = sp.hstack([K[self.all][:, self.loose], C[self.all][:, self.damped]]).tocsr()
-        try:
-            found = factorise(matrix)(-(K @ v + C @ rate)[self.all])
-        except SingularMatrixError:
-            return np.zeros(self.all.size)
-        return found if np.isfinite(found).all() else np.zeros(self.all.size)
+        found = np.asarray(factorise(matrix)(-(K @ v + C @ rate)[self.all]))
+        if not np.isfinite(found).all():
+            raise SingularMatrixError(int(self.all[np.argmin(np.isfinite(found))]))
+        return found

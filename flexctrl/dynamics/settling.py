@@ -17,7 +17,7 @@ from flexctrl.model.model import Model
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 
-__all__ = ["quasistatic", "settled"]
+__all__ = ["dragged", "quasistatic", "settled"]
 
 _EXACT = 1e-12
 _ITERATIONS = 25
@@ -28,15 +28,32 @@ def quasistatic(model: Model) -> np.ndarray:
     return once(model, _quasistatic)
 
 
+def dragged(model: Model) -> np.ndarray:
+    """Return the degrees of freedom with damping but no mass, shape (k,)."""
+    return once(model, _dragged)
+
+
 def _quasistatic(model: Model) -> np.ndarray:
+    stiffness, damping, light = once(model, _light)
+    return np.flatnonzero((light > 0.0) & (damping == 0.0) & (stiffness > 0.0))
+
+
+def _dragged(model: Model) -> np.ndarray:
+    _, damping, light = once(model, _light)
+    return np.flatnonzero((light > 0.0) & (damping > 0.0))
+
+
+def _light(model: Model) -> np.ndarray:
+    """Stiffness and damping of each degree of freedom, these zero where they are rounding, and whether it is light."""
     if not isinstance(model, Model) or model.switches.names:
-        return np.zeros(0, dtype=int)
+        return np.zeros((3, 0))
     zero, u = np.zeros(model.n), np.zeros(len(model.inputs))
     seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     stiffness, damping, mass = (np.abs(model.slope(model.rest, zero, zero, seed, u).diagonal()) for seed in seeds)
-    light = (mass <= model.dust) & (damping <= model.forces.rounding((0.0, 1.0, 0.0)))
+    damping[damping <= model.forces.rounding((0.0, 1.0, 0.0))] = 0.0
+    light = mass <= model.dust
     light[np.setdiff1d(model.motion.inner, model.n)] = False
-    return np.flatnonzero(light & (stiffness > 0.0))
+    return np.array([stiffness, damping, light])
 
 
 def settled(model: Model, state: State, feed: Feed, supply: Supply) -> tuple[State, Supply]:
