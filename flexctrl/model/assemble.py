@@ -215,8 +215,11 @@ def _flat(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     for effect in given:
         if not isinstance(effect, Effect):
             raise StructureError(f"assemble: {effect!r} is no effect; give e.g. flexctrl.Gravity()")
-    parts = tuple(p for e in given for p in e.parts())
-    twice = [type(p).__name__ for i, p in enumerate(parts) if type(p) in map(type, parts[:i])]
-    if twice:
-        raise StructureError(f"assemble: the effect {twice[0]} is given twice; keep one")
+    whole = [(p, e) for e in given for p in e.parts()]
+    parts = tuple(p for p, _ in whole)
+    for i, part in enumerate(parts):
+        if type(part) in map(type, parts[:i]):
+            others = [type(e).__name__ for p, e in whole if type(p) is type(part) and p is not e]
+            within = f" (it is a part of {others[0]})" if others else ""
+            raise StructureError(f"assemble: the effect {type(part).__name__} is given twice{within}; keep one")
     return parts
