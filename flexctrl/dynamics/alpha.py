@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics import steps
+from flexctrl.dynamics.coning import coning_of
 from flexctrl.dynamics.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
@@ -115,6 +116,7 @@ class Stepper:
     def __post_init__(self) -> None:
         self.turning = turning(self.model)
         self.weight = 1.0 / yardsticks(self.model)
+        self.coning = coning_of(self.model)
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
@@ -251,6 +253,7 @@ class Stepper:
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
         step = h * now.v + h * h * ((0.5 - c.beta) * point.algorithmic + c.beta * algorithmic)
         v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
+        step = step + self.coning(h, now.v, v)
         foreseen, last, contraction, end = step, np.inf, 0.0, later(now.t, h)
         for iteration in range(_ITERATIONS):
             state = self.model.advance(now, step, v, end)
@@ -263,7 +266,8 @@ class Stepper:
             correction = self._solve(force)
             size, worst = largest(correction * self.weight)
             self.counts.newton += 1
-            step, v, rate = step + correction, v + to_v * correction, rate + to_rate * correction
+            step = step + correction + self.coning(h, now.v, to_v * correction)
+            v, rate = v + to_v * correction, rate + to_rate * correction
             contraction = size / last if np.isfinite(last) else 0.0
             if not np.isfinite(size) or (contraction > 2.0 and iteration > 3) or self._astray(step - foreseen):
                 break

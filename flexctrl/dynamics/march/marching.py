@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
 from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.coning import coning_of
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.frames import Later
 from flexctrl.dynamics.march.closing import closing_of
@@ -453,6 +454,7 @@ def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
     state, part, probes = width_of(F), components(F.model), probes_of(F, method.weight)
+    cones = F.plan.position[coning_of(F.model).triples]
     shelf = int(min(_SHELF, max(1, _BYTES // (8 * state))))
     return March(
         flat=flat,
@@ -477,6 +479,7 @@ def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
         weight=F.ordered(method.weight),
         turns=F.ordered(method.turning.astype(float)),
         dust=F.ordered(F.model.dust),
+        cones=cones.ravel(),
         reach=reach,
         first=first,
         rows=np.zeros((1 + F.gauges.outputs) * _CAPACITY),
@@ -484,6 +487,7 @@ def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
         parts=int(part.max(initial=0)) + 1,
         part=part[F.plan.order],
         farthest=np.zeros(int(part.max(initial=0)) + 1),
+        coning=len(cones),
         shelf=shelf,
         alpha_m=c.alpha_m,
         alpha_f=c.alpha_f,

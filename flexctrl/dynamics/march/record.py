@@ -213,6 +213,10 @@ class March:
         The inputs' forces at its start.
     weight, turns, dust : Reals
         One over the yardsticks; 1 for what turns; mass that is but rounding.
+    coning, cones : int, Wholes
+        Rotations that turn all ways, and their degrees of freedom, three each; see `flexctrl.dynamics.coning`.
+    fastest : float
+        The largest rate of what turns at the start of the step.
     reach, first : Reals
         Largest distance of each degree of freedom from where it was first.
     rows : Reals
@@ -245,6 +249,7 @@ class March:
     weight: Reals
     turns: Reals
     dust: Reals
+    cones: Wholes
     reach: Reals
     first: Reals
     rows: Reals
@@ -261,6 +266,7 @@ class March:
     share: float
     price: float
     asking: int
+    coning: int
     shelf: int
     leaping: int
     paced: int = 1
@@ -289,6 +295,7 @@ class March:
     last: float = math.inf
     contraction: float = 0.0
     strayed: float = 0.0
+    fastest: float = 0.0
     habit: float = 0.0
     trusted: int = 0
     spent: float = 0.0

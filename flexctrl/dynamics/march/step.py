@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.coning import LARGEST, eta
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.contacts import feel, firmness
 from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
-from flexctrl.kernels.native import seldom
+from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
 from flexctrl.model.flat.fronts import factor
 
@@ -28,6 +29,8 @@ _TRUSTED = 8
 _PATIENCE = 500
 """Steps until the mass is tried again for the tangent."""
 _HABIT = 0.002
+_MOST = 2.0
+"""Coning by a correction is left out where it cannot come to more than a tenth of Newton's tolerance: 10 · 2 η."""
 _ROUND_OFF = 1e-13
 """Corrections below this that do not shrink any more are round-off."""
 
@@ -62,11 +65,44 @@ def predict(m: March) -> None:
         put(f.rate[i:], rate)
         put(f.step[i:], h * eight(m.v[i:]) + h * h * ((0.5 - m.beta) * own + m.beta * lead))
         put(f.v[i:], eight(m.v[i:]) + h * ((1.0 - m.gamma) * own + m.gamma * lead))
+    if m.coning > 0:
+        m.fastest = fastest(m)
+        cone(m, f.v, -1.0)
     m.phase = EVALUATE
     m.iteration = 0
     m.last = math.inf
     m.contraction = 0.0
     m.strayed = 0.0
+
+
+def fastest(m: March) -> float:
+    """Return the largest rate of what turns at the start of the step."""
+    most = 0.0 * eight(m.turns)
+    for i in range(0, m.flat.padded, 8):
+        most = larger(most, abs(eight(m.v[i:])) * eight(m.turns[i:]))
+    return largest(most)
+
+
+def cone(m: March, spins: Reals, share: float) -> None:
+    """Add to the step what it has beside the integral of the spins, for a share of others at its end; see `coning`."""
+    h = m.h
+    cells = m.cones[0:]
+    v = m.v[0:]
+    step = m.flat.step[0:]
+    for k in range(m.coning):
+        x = cells[3 * k]
+        y = cells[3 * k + 1]
+        z = cells[3 * k + 2]
+        p = h * v[x]
+        q = h * v[y]
+        r = h * v[z]
+        a = spins[x]
+        b = spins[y]
+        c = spins[z]
+        weight = share * h * eta(min(p * p + q * q + r * r, LARGEST))
+        step[x] += weight * (q * c - r * b)
+        step[y] += weight * (r * a - p * c)
+        step[z] += weight * (p * b - q * a)
 
 
 def blended(m: March, rate: Eight, before: Eight, own: Eight) -> Eight:
@@ -237,5 +273,8 @@ def correct(m: March) -> float:
         sums = sums + sizes
         turn = larger(turn, abs(change) * eight(m.turns[i:]))
     m.newton += 1
-    m.strayed += largest(turn)
+    turned = largest(turn)
+    m.strayed += turned
+    if _MOST * m.h * m.h * m.fastest * speed * turned > m.tolerance:
+        cone(m, f.force, speed)
     return largest(most) if math.isfinite(total(sums)) else math.nan
