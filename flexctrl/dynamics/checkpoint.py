@@ -25,7 +25,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
 
-_FORMAT = 4
+_FORMAT = 5
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
@@ -56,6 +56,8 @@ class Checkpoint:
         Step length, and what is left to the next stop.
     rows : int
         Rows written.
+    every : float or None
+        Their spacing [s]; None: every step.
     sums : Sums
         The energy books.
     first : numpy.ndarray, shape (n,)
@@ -80,6 +82,7 @@ class Checkpoint:
     passed: int
     mark: Mark
     rows: int
+    every: float | None
     sums: Sums
     first: np.ndarray
     sides: np.ndarray

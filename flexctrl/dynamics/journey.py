@@ -232,6 +232,7 @@ class Journey:
             self.stops.passed,
             replace(self.mark),
             self.rows.count,
+            self.rows.every,
             replace(self.books.sums, moved=self.books.sums.moved.copy()),
             self.books.first,
             self.watch.sides.copy(),

@@ -218,6 +218,7 @@ def _resumed(
         ("tolerance", plan.tolerance, start.tolerance),
         ("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x)),
         ("number of events", watch.count, len(start.sides)),
+        ("spacing of rows (every)", rows.every, start.every),
     ):
         if now != before:
             raise StructureError(

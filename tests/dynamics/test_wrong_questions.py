@@ -122,6 +122,8 @@ def test_a_run_goes_on_as_it_was_asked_for_and_not_backwards(model):
         fc.simulate(model, until=0.5 * stopped.t, start=stopped)
     with pytest.raises(StructureError, match="the checkpoint is of another tolerance"):
         fc.simulate(model, until=0.2, start=stopped, tolerance=fc.Tolerance(1e-6))
+    with pytest.raises(StructureError, match=r"another spacing of rows \(every\) \(None there, 0.05 here\)"):
+        fc.simulate(model, until=0.2, start=stopped, every=0.05)
     assert fc.simulate(model, until=0.2, start=stopped).status is fc.Status.FINISHED
 
 
