@@ -119,3 +119,15 @@ def test_a_command_beyond_all_numbers_fails_the_run(method):
     run = fc.simulate(swing(), Odd(0.1, np.array([1e300])), until=1.0, method=method)
     assert run.status is fc.Status.FAILED
     assert run.t[-1] >= 0.45
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-3)], ids=["adaptive", "fixed"])
+def test_a_run_that_an_event_ended_goes_on_past_it_to_the_next(method):
+    """From rest at 1 under a push the mass swings by 0.1 cos 10 t about 1.1: through 1.1 at π/20, 3π/20, …"""
+    how = {"inputs": {"push": 10.0}, "method": method, "events": [fc.Event("middle", "x", at=1.1, terminal=True)]}
+    run = fc.simulate(swing(), until=1.0, **how)
+    for count in range(3):
+        assert run.status is fc.Status.STOPPED
+        assert [event.t for event in run.events] == [pytest.approx((2 * count + 1) * np.pi / 20, rel=2e-3)]
+        run = fc.simulate(swing(), until=1.0, start=run.checkpoint, method=method, events=how["events"])
+    assert run.status is fc.Status.FINISHED
