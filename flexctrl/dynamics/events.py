@@ -64,7 +64,8 @@ class Event:
     Notes
     -----
     Each step is looked at in its middle and at its end. What crosses and comes back within half a step goes unseen
-    unless its parabola through those points shows it.
+    unless its parabola through those points shows it. What only touches the value counts where it does so just as an
+    input jumps (a speed that comes to zero at the end of a braking torque).
     """
 
     name: str
@@ -331,15 +332,22 @@ class Watch:
         return (*(event.direction for event in self.events), *switches, *corners)
 
     def leaps(self, point: Point) -> list[Crossing]:
-        """Return the events that the inputs' jump to those of a point has brought about; sides stay as they are."""
+        """Return the events that a jump of the inputs to those of a point has brought about; sides stay as they are.
+
+        What comes to zero just where inputs jump has reached it, though they may turn it back.
+        """
         values, dusts, found = self.values(point.state, point.supply.u), self.dusts, []
         for gauge, event in enumerate(self.events):
             value, side = values[gauge], self.sides[gauge]
-            rising = bool(value > 0.0)
-            missed = Direction.FALLING if rising else Direction.RISING
-            if abs(value) > dusts[gauge] and np.sign(value) == -side and event.direction is not missed:
-                found.append(Crossing(point.state.t, gauge, rising))
+            missed = Direction.FALLING if side < 0.0 else Direction.RISING
+            there = abs(value) <= dusts[gauge] or np.sign(value) == -side
+            if side != 0.0 and there and event.direction is not missed:
+                found.append(Crossing(point.state.t, gauge, bool(side < 0.0)))
         return found
+
+    def reach(self, crossing: Crossing) -> None:
+        """Note that a gauge has come to zero: what leaves it from there does not cross it again."""
+        self.sides[crossing.gauge] = 0.0
 
     def offset(self, curve: Curve, before: Point, after: Point, gauge: int) -> float:
         """Return how much later than at the end of a step a gauge is zero, by its slope there."""

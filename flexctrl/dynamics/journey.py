@@ -257,7 +257,7 @@ class Journey:
             held = replace(self.point, state=self.under(fresh.u))
             self.point = self.stepper.renew(held, fresh, self.mark.size)
             self.books.jump(held, self.point)
-        if not self.watch.idle:
+        if not self.watch.idle and not np.array_equal(fresh.u, before.u):
             self._leapt()
         self.rows.here(self.point, 1e-6 * self.mark.size)
 
@@ -274,6 +274,9 @@ class Journey:
         """Note the events that a jump of the inputs has brought about; one of them may end the run."""
         watch, point = self.watch, self.point
         for crossing in watch.leaps(point):
+            watch.reach(crossing)
+            if self.is_over(crossing):
+                continue
             self._tell(crossing, point.state, point.supply.u)
             if watch.stops(crossing.gauge):
                 name = watch.last_word(crossing.gauge)

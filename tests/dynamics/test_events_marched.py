@@ -165,3 +165,25 @@ def test_every_touch_of_zero_is_in_doubt():
         touch = int(at / h)
         first = fc.dynamics.steps.Point(start, np.zeros(model.n), None)
         assert calm_steps(Held(y[0]), first, table, np.zeros(1)) <= touch
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-2)], ids=["adaptive", "fixed"])
+@pytest.mark.parametrize("after", [1.0, 0.0, -1.0], ids=["turns back", "stays", "goes on"])
+def test_what_comes_to_zero_just_where_an_input_jumps_is_found_once(after, method):
+    """A mass at 0.5 m/s is braked by 1 m/s² for half a second."""
+    mass = fc.PointMass("mass", (0, 0, 0), 1.0)
+    inputs, outputs = [fc.Force("push", mass.node, "x")], [fc.Velocity("speed", mass.node, "x")]
+    model = fc.assemble(fc.Structure([mass], [fc.Support(mass.node, "v w")], inputs=inputs, outputs=outputs), [])
+    law = fc.OpenLoop({"push": lambda t: -1.0 if t < 0.5 else after}, sample_time=0.5)
+    directions = {d.name: fc.Event(d.name, "speed", direction=d) for d in fc.Direction}
+    start = model.rest.with_(v=np.array([0.5]))
+    run = fc.simulate(model, law, until=0.9, start=start, method=method, events=list(directions.values()))
+    assert sorted(e.name for e in run.events) == ["EITHER", "FALLING"]
+    assert all(e.t == pytest.approx(0.5, abs=1e-12) and not e.rising for e in run.events)
+    end = fc.Event("stands", "speed", terminal=True)
+    run = fc.simulate(model, law, until=0.9, start=start, method=method, events=[end])
+    assert run.status is fc.Status.STOPPED
+    assert run.t[-1] == pytest.approx(0.5, abs=1e-12)
+    rest = fc.simulate(model, law, until=0.9, start=run.checkpoint, method=method, events=[end])
+    assert rest.status is fc.Status.FINISHED
+    assert not rest.events
