@@ -15,7 +15,6 @@ from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.steps import Point
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite
 
@@ -123,7 +122,8 @@ class Occurrence:
     t : float
         When [s].
     rising : bool
-        Which way the value went. Of dry friction: True where a contact breaks loose, False where it sticks.
+        Which way the value went. Of dry friction: True where a contact slides from then on (it breaks loose, or its
+        slip turns back at once), False where it sticks.
     signals : mapping of str to float
         Outputs and inputs at that instant.
     """
@@ -370,10 +370,7 @@ class Watch:
     def occurrence(self, crossing: Crossing, state: State, u: np.ndarray) -> Occurrence:
         """Return what is told of a crossing."""
         named = [*(e.name for e in self.events), *self.names, *self.corner_names]
-        switch, rising = crossing.gauge - len(self.events), crossing.rising
-        if 0 <= switch < len(self.names):
-            rising = bool(self.feed.model.switches.phases(state)[switch] == STUCK)
-        return Occurrence(named[crossing.gauge], crossing.t, rising, self.signals(state, u))
+        return Occurrence(named[crossing.gauge], crossing.t, crossing.rising, self.signals(state, u))
 
 
 @dataclass(frozen=True)

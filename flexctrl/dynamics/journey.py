@@ -407,7 +407,8 @@ class Journey:
         self._note(earlier, curve, before)
         watch.settle(after)
         watch.cross(landing)
-        self._tell(landing, after.state, after.supply.u)
+        if not 0 <= switch < len(watch.names):
+            self._tell(landing, after.state, after.supply.u)
         if end := watch.last_word(landing.gauge):
             self.status, self.message = Status.STOPPED, f"{end} at t = {landing.t:.6g} s"
             return after, None
@@ -415,7 +416,14 @@ class Journey:
         self.mark.stuck = self.mark.stuck + 1 if short else 0
         if switch >= len(watch.names):
             return after, landing
-        return withheld(self, after, switch) if brief else anew(self, after, switch), None
+        return self._switched(after, landing, switch, brief), None
+
+    def _switched(self, at: Point, landing: Crossing, switch: int, brief: bool) -> Point:
+        """Go on under the law of force that holds from now on; note whether the contact slides under it."""
+        fresh = at if brief else anew(self, at, switch)
+        slides = not brief and self.plan.model.switches.phases(fresh.state)[switch] != STUCK
+        self._tell(replace(landing, rising=bool(slides)), at.state, at.supply.u)
+        return withheld(self, at, switch) if brief else fresh
 
     def is_over(self, crossing: Crossing) -> bool:
         """Tell whether an event asked for has been told, or is beyond the end."""

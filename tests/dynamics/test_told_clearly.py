@@ -63,3 +63,19 @@ def test_breaking_loose_and_sticking_are_told_apart():
         if not event.rising:
             between = (run.t > event.t) & (run.t < following.t)
             assert np.abs(run["speed"][between]).max(initial=0.0) < 1e-6
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-2)], ids=["adaptive", "fixed"])
+@pytest.mark.parametrize(("pull", "stands", "slides"), [(-5.0, 1 / 3, True), (-0.5, 4 / 3, False)])
+def test_a_slip_that_turns_back_is_not_told_to_stick(pull, stands, slides, method):
+    """A block at 2 m/s under dry friction of 1 N stands still after 2/(1 − pull) s; 5 N pull it back, 0.5 N do not."""
+    block = fc.PointMass("block", (0, 0, 0), 1.0)
+    structure = fc.Structure(
+        [block], [fc.Support(block.node, "v w")], inputs=[fc.Force("pull", block.node, "x")], outputs=[]
+    )
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.CoulombFriction({"block.u": 1.0})])
+    start = model.rest.with_(v=np.array([2.0]))
+    run = fc.simulate(model, until=2.0, start=start, inputs={"pull": pull}, method=method)
+    assert [(event.name, event.rising) for event in run.events] == [("block.u", slides)]
+    assert run.events[0].t == pytest.approx(stands, rel=1e-9)
+    assert run.final.v[0] == pytest.approx((pull + 1.0) * (2.0 - stands) if slides else 0.0, rel=1e-6)
