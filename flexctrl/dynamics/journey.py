@@ -307,7 +307,7 @@ class Journey:
         except StepError as failure:
             self.mark.rejected += 1
             if h < 2e-3 * self.mark.size:
-                why = f"{failure}, nor with any longer one up to {self.mark.size:.3g} s; take AdaptiveAlpha"
+                why = f"{failure}; steps up to {self.mark.size:.3g} s have failed too; take AdaptiveAlpha"
                 raise StepError(failure.worst, why) from failure
             return self._halved(h, stop)
         try:

@@ -19,6 +19,7 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.masses import Masses
+from flexctrl.dynamics.massless import massless
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
@@ -128,6 +129,7 @@ class _Stepper:
         self.turning = turning(self.model)
         self.masses = Masses(self.model, self.counts)
         self.massless = False
+        self.light = massless(self.model)
 
     @property
     def memory(self) -> _Memory:
@@ -146,18 +148,34 @@ class _Stepper:
             self._factor(memory.tangent)
 
     def start(self, state: State, supply: Supply, step: float) -> _Point:
-        """Return the point of a state; where a freedom has no mass, its rates follow from the steps alone."""
+        """Return the point of a state; what has no mass but damping moves as fast as its forces push it.
+
+        Raises
+        ------
+        SingularMatrixError
+            If a freedom has neither mass nor stiffness.
+        """
         still = np.zeros(self.model.n)
         state, supply = settled(self.model, state, self.feed, supply)
         try:
             rate = self.masses.accelerations(state, supply.u, still)
         except SingularMatrixError:
             self.massless, rate = True, still
+            state = self.light.pushed(state, supply.u)
+            self._check_held(state, supply, step)
         return _Point(state, rate, supply, self.momenta.at(state, supply.u)[0])
+
+    def _check_held(self, state: State, supply: Supply, step: float) -> None:
+        """Raise SingularMatrixError where nothing holds a freedom over a step, neither mass nor stiffness."""
+        try:
+            self._factor(_Tangent(state, np.zeros(self.model.n), supply, step))
+        except StepError as error:
+            raise SingularMatrixError(error.worst) from error
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs: momenta do not jump."""
         state, supply = settled(self.model, point.state, self.feed, supply)
+        state = self.light.pushed(state, supply.u) if self.massless else state
         rate = point.rate if self.massless else self.masses.accelerations(state, supply.u, point.rate)
         return _Point(state, rate, supply, point.momenta)
 
@@ -209,7 +227,9 @@ class _Stepper:
             raise StepError(
                 self.counts.worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part bend"
             )
-        if not self.massless:
+        if self.massless:
+            state = self.light.pushed(state, self.feed.at(state, point.supply, h).u)
+        else:
             state = state.with_(v=self.masses.solve(lambda v: self.momenta.of(state, v) - momenta, state, state.v))
         return _Point(state, 2.0 * (state.v - mean) / h, self.feed.at(state, point.supply, h), momenta)
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flexctrl as fc
+from flexctrl.errors import MechanismError
 
 SHAFT, RATIO, SAMPLE, UNTIL = 50.0, 3.0, 0.02, 1.0
 
@@ -73,6 +74,31 @@ def test_its_angle_and_speed_are_of_second_order_after_jumps_of_the_torque(case)
     assert (errors[0] <= [2e-5, 2e-4, 1e-5]).all()
     assert (errors[1] <= errors[0] / 3.0 + 1e-9).all()
     assert runs[0].report.energy_residual > 3.0 * runs[1].report.energy_residual
+
+
+def test_the_midpoint_rule_takes_it_with_friction_at_any_step():
+    """Its rates are those that forces push it with; a step of four time constants still comes near the angle."""
+    effect, exact = CASES["friction"]
+    methods = (fc.ConservingMidpoint(h) for h in (8e-3, 4e-3, 2e-3))
+    runs = [fc.simulate(machine(effect), Swell(), until=UNTIL, method=method) for method in methods]
+    assert all(run.status is fc.Status.FINISHED for run in runs)
+    errors = [np.abs(run.y[-1] - exact) for run in runs]
+    assert (errors[0] <= [1e-4, 2e-2, 1e-5]).all()
+    assert (errors[1] <= [2e-6, 1e-4, 1e-6]).all()
+    assert errors[2][2] == pytest.approx(errors[1][2] / 4.0, rel=0.1)
+    assert runs[1].report.energy_residual > 3.0 * runs[2].report.energy_residual
+
+
+def test_a_junction_that_nothing_holds_is_named_by_every_method():
+    """Two ropes in line, not taut, and nothing where they meet."""
+    ropes = fc.Rope("one", (0, 0, 0), (1, 0, 0), EA=1e3), fc.Rope("two", (1, 0, 0), (2, 0, 0), EA=1e3)
+    mass = fc.PointMass("mass", ropes[1].end, 1.0)
+    pins = [fc.Pin(ropes[0].end, ropes[1].start), fc.Pin(ropes[1].end, mass.node)]
+    structure = fc.Structure([*ropes, mass], [fc.Support(ropes[0].start, "u v w"), *pins])
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()])
+    for method in (fc.ConservingMidpoint(1e-3), fc.GeneralizedAlpha(1e-3), fc.AdaptiveAlpha()):
+        with pytest.raises(MechanismError, match=r"one_1_v has neither mass nor stiffness; hold it with a Support"):
+            fc.simulate(model, until=0.5, method=method)
 
 
 @pytest.mark.parametrize("case", CASES)
