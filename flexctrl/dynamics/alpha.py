@@ -24,6 +24,7 @@ from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
+from flexctrl.dynamics.stiff_lines import SHORT, STIFF, SURE, TURNING, firmest
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.flows import flow_rates, flowing, without
 from flexctrl.model.model import Model
@@ -117,6 +118,7 @@ class Stepper:
         self.turning = turning(self.model)
         self.weight = 1.0 / yardsticks(self.model)
         self.coning = coning_of(self.model)
+        self.firmest = firmest(self.model)
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
@@ -255,25 +257,32 @@ class Stepper:
         v = now.v + h * ((1.0 - c.gamma) * point.algorithmic + c.gamma * algorithmic)
         step = step + self.coning(h, now.v, v)
         foreseen, last, contraction, end = step, np.inf, 0.0, later(now.t, h)
+        wary = h * self.firmest > STIFF
+        tolerance, short = (min(self.tolerance, SURE) if wary else self.tolerance), 0.0
         for iteration in range(_ITERATIONS):
             state = self.model.advance(now, step, v, end)
             supply = self.feed.at(state, point.supply, h)
             force = self.model.balance(state, v, rate) + self.model.loads(state, supply.u)
-            if fresh or contraction > _POOR or (iteration == 0 and self._stale(state, h)):
+            if fresh or wary or contraction > _POOR or (iteration == 0 and self._stale(state, h)):
                 self._factor(Tangent(state, v, rate, (1.0, to_v, to_rate), supply, h))
-                last = np.inf
+                last = last if wary else np.inf
             assert self._solve is not None
-            correction = self._solve(force)
+            correction = (1.0 - short) * self._solve(force)
             size, worst = largest(correction * self.weight)
             self.counts.newton += 1
             step = step + correction + self.coning(h, now.v, to_v * correction)
             v, rate = v + to_v * correction, rate + to_rate * correction
             contraction = size / last if np.isfinite(last) else 0.0
-            if not np.isfinite(size) or (contraction > 2.0 and iteration > 3) or self._astray(step - foreseen):
+            worse = contraction > 2.0 and iteration > 3 and not wary
+            if not np.isfinite(size) or worse or self._astray(step - foreseen):
                 break
-            foretold = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * self.tolerance
-            if size <= self.tolerance or foretold or (contraction > _POOR and size <= _ROUND_OFF):
-                return self._finish(point, h, step, v, rate, worst)
+            foretold = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * tolerance and not wary
+            if size <= tolerance or foretold or (contraction > _POOR and size <= _ROUND_OFF):
+                if not short:
+                    return self._finish(point, h, step, v, rate, worst)
+                short = 0.0
+            elif wary and contraction > TURNING and iteration > 1:
+                short = SHORT
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
 

@@ -11,9 +11,11 @@ from flexctrl.dynamics.dense import Booked, Curve
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.march.record import OFTEN
 from flexctrl.dynamics.massless import massless
+from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Point
+from flexctrl.dynamics.stiff_lines import noise, stiffest
 from flexctrl.model.state import State
 
 __all__ = ["Books", "Sums"]
@@ -21,6 +23,8 @@ __all__ = ["Books", "Sums"]
 _ABSURD, _UNRESOLVED, _DOUBTFUL = 0.5, 0.2, 0.05
 _MOSTLY = 0.9
 _VISIBLE = 1e-3
+_FELT = 3e-3
+_SLIGHT = 10.0
 _ROUND_OFF = 1e-6
 _LOBATTO = ((0.5 * (1.0 - (3.0 / 7.0) ** 0.5), 49.0 / 180.0), (0.5, 64.0 / 180.0))
 _ENDS = 1.0 / 20.0
@@ -70,11 +74,12 @@ class Sums:
 class Books:
     """What a run has turned over, drawn up every few steps."""
 
-    def __init__(self, feed: Feed, state: State, order: int) -> None:
+    def __init__(self, feed: Feed, state: State, order: int, tolerance: Tolerance) -> None:
         self.feed, self.model, self.order = feed, feed.model, order
         self.first = state.q
         self.lawful = self.model.large
         self.reach = yardsticks(self.model)
+        self.slight = _SLIGHT * tolerance.absolute * self.reach
         probe = np.linspace(1.0, 2.0, self.model.n)
         changing = bool(self.model.switches.names or self.model.kinks.names)  # what is loose now may damp later
         self.dissipates = changing or self.model.energy(state.with_(v=probe))[2] != 0.0
@@ -192,16 +197,49 @@ class Books:
         """What the books say against a motion that goes on: they miss a visible share of what was turned over."""
         s = self.sums
         if not self._doubtful(_DOUBTFUL):
-            return ()
+            return (*self._stiff, *self._made)
         return (
+            *self._stiff,
             f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is "
             f"{'not' if self.residual > _UNRESOLVED else 'poorly'} resolved; take smaller steps or a smaller Tolerance",
         )
 
+    @property
+    def _stiff(self) -> tuple[str, ...]:
+        """What is to be said of lines so stiff that the last digits of places are felt in a motion that is seen."""
+        if not self.lawful:
+            return ()
+        unsure, size = noise(self.model), self.model.structure.size
+        if unsure * size <= _FELT * self.sums.turnover or not self._seen:
+            return ()
+        name, stiffness = stiffest(self.model)
+        return (
+            f"{name} is so stiff ({stiffness:.3g} N/m) that the last digits of places make forces of {unsure:.2g} N in "
+            f"it, beside about {self.sums.turnover / size:.2g} N that move the machine: its tension is no better than "
+            "that, nor whether it is slack; make it softer, or rigid",
+        )
+
+    @property
+    def _made(self) -> tuple[str, ...]:
+        """What is to be said of motion too small to be seen, yet beyond the tolerance, that the method itself makes."""
+        s = self.sums
+        beyond = (s.moved >= self.slight).any() and s.made >= _ROUND_OFF * abs(s.start)
+        if not (self.lawful and beyond and s.made > _ABSURD * s.turnover):
+            return ()
+        return (
+            f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: it would be nearer to rest "
+            "than it seems; take smaller steps, a smaller Tolerance, or an implicit method",
+        )
+
+    @property
+    def _seen(self) -> bool:
+        """Whether the motion is large enough to be seen."""
+        return bool((self.sums.moved >= _VISIBLE * self.reach).any())
+
     def _doubtful(self, share: float) -> bool:
         """Whether the books miss more than a share, in a motion large enough to be seen."""
         s = self.sums
-        visible = (s.moved >= _VISIBLE * self.reach).any() and s.gap >= _ROUND_OFF * abs(s.start)
+        visible = self._seen and s.gap >= _ROUND_OFF * abs(s.start)
         return bool(self.lawful and self.residual > share and visible)
 
     @property

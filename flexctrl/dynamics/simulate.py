@@ -200,7 +200,7 @@ def _begun(
     stops, watch = Stops(plan.feed.sample_time, plan.feed.breaks), _watch(plan, events)
     stops.skip(0.0)
     watch.begin(point)
-    books = Books(plan.feed, point.state, plan.method.order)
+    books = Books(plan.feed, point.state, plan.method.order, plan.tolerance)
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
         journey.notes = (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
@@ -228,7 +228,7 @@ def _resumed(
     stepper.recall(start.memory)
     stepper.counts.take(start.counts)
     watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span
-    books = Books(plan.feed, start.point.state, plan.method.order)
+    books = Books(plan.feed, start.point.state, plan.method.order, plan.tolerance)
     books.sums, books.first = replace(start.sums), start.first
     stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed)
     rows.count = start.rows

@@ -23,7 +23,8 @@ def chain(count: int = 12, stiffness: float = 1e8) -> fc.Model:
     masses = [fc.PointMass(f"m{i}", spring.end, 1.0) for i, spring in enumerate(springs)]
     joints = [fc.Support(springs[0].start), *(fc.Pin(a.end, b.start) for a, b in pairwise(springs))]
     joints += [fc.Pin(spring.end, mass.node) for spring, mass in zip(springs, masses, strict=True)]
-    structure = fc.planar(fc.Structure([*springs, *masses], joints), "y")
+    outputs = [fc.Position("z", masses[-1].node, "z")]
+    structure = fc.planar(fc.Structure([*springs, *masses], joints, outputs=outputs), "y")
     return fc.assemble(structure, [fc.LargeRotation(), fc.Gravity()])
 
 
@@ -37,11 +38,10 @@ def test_steps_that_make_energy_from_nothing_end_the_run():
     assert len(run.t) > 10
 
 
-@pytest.mark.parametrize("step", [0.04, 0.1])
-@pytest.mark.parametrize("rho", [0.5, 0.9])
-def test_energy_that_was_made_and_lost_again_on_the_way_is_not_forgotten(rho, step):
-    """Three springs of 1e7 N/m in steps of ten periods and more: a spike of energy, most of which is damped again."""
-    run = fc.simulate(chain(3, 1e7), until=5.0, method=fc.GeneralizedAlpha(step, rho))
+@pytest.mark.parametrize(("stiffness", "step", "rho"), [(1e4, 0.15, 0.9), (1e4, 0.2, 0.9), (1e5, 0.2, 0.5)])
+def test_energy_that_was_made_and_lost_again_on_the_way_is_not_forgotten(stiffness, step, rho):
+    """Three springs in steps in which they turn by a radian: a spike of energy, most of which is damped again."""
+    run = fc.simulate(chain(3, stiffness), until=5.0, method=fc.GeneralizedAlpha(step, rho))
     assert run.report.energy_residual > 0.5
     assert run.status is Status.FAILED
     assert "the motion is not resolved" in run.report.message
@@ -49,14 +49,9 @@ def test_energy_that_was_made_and_lost_again_on_the_way_is_not_forgotten(rho, st
 
 
 def test_an_event_that_ends_a_run_vouches_for_nothing():
-    """A pendulum on a rope of 10¹⁴ N in steps that make energy on it, ended by an event on its way."""
-    rope = fc.Rope("rope", (0, 0, 0), (1, 0, 0), EA=1e14)
-    bob = fc.PointMass("bob", rope.end, 1.0)
-    joints = [fc.Support(rope.start), fc.Pin(rope.end, bob.node)]
-    structure = fc.Structure([rope, bob], joints, outputs=[fc.Position("z", bob.node, "z")])
-    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()])
-    event = fc.Event("through", "z", at=-0.4, terminal=True)
-    run = fc.simulate(model, until=0.3, method=fc.GeneralizedAlpha(5e-3), events=[event])
+    """A chain in steps that make energy in it, ended by an event on its way."""
+    event = fc.Event("through", "z", at=0.5, direction=fc.Direction.RISING, terminal=True)
+    run = fc.simulate(chain(3, 1e4), until=5.0, method=fc.GeneralizedAlpha(0.15), events=[event])
     assert run.report.energy_residual > 0.5
     assert run.status is Status.FAILED
     assert "the motion is not resolved" in run.report.message
@@ -71,8 +66,8 @@ def test_an_interrupted_run_says_what_its_books_miss():
             raise KeyboardInterrupt
         return 1.0
 
-    method = fc.GeneralizedAlpha(0.1)
-    run = fc.simulate(chain(3, 1e7), until=50.0, method=method, events=[fc.Event("never", interrupting)])
+    method = fc.GeneralizedAlpha(0.15)
+    run = fc.simulate(chain(3, 1e4), until=50.0, method=method, events=[fc.Event("never", interrupting)])
     assert run.status is Status.INTERRUPTED
     assert run.report.energy_residual > 0.05
     assert "resolved" in run.report.notes[-1]

@@ -44,6 +44,7 @@ from flexctrl.dynamics.march.record import (
 from flexctrl.dynamics.march.shelf import states_of, width_of
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.scales import components, farthest
+from flexctrl.dynamics.stiff_lines import firmest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
@@ -498,6 +499,7 @@ def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
         share=_SHARE if c.damping else _KEEPING,
         price=_MADE + probes.groups if flat.tangents or probes.groups else _ASKED,
         leaping=leaping,
+        firmest=firmest(F.model),
         asking=int(not flat.tangents and not probes.groups),
         swift=int(flat.quick > 0 and not flat.pressing),
         whole=flat.pressing,

@@ -177,6 +177,8 @@ class March:
         Whether steps are exact ones on modal states.
     paced : int
         Whether steps of controlled error, or from sample to sample of a law, are among the tasks.
+    firmest, short : float
+        Highest frequency of a line against the masses at its ends [rad/s]; by what share corrections are shortened.
     swift : int
         1: accelerations come from kernels of the whole machine, and Newton's method takes the mass at hand for the
         tangent; 0: the machine has none; below: steps until that is tried again, after one for which it was not enough.
@@ -270,6 +272,8 @@ class March:
     shelf: int
     leaping: int
     paced: int = 1
+    firmest: float = 0.0
+    short: float = 0.0
     swift: int = 0
     whole: int = 0
     tolerance: float = 0.0

@@ -14,6 +14,7 @@ from flexctrl.dynamics.march.contacts import feel, firmness
 from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
+from flexctrl.dynamics.stiff_lines import SHORT, STIFF, SURE, TURNING
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
@@ -73,6 +74,7 @@ def predict(m: March) -> None:
     m.last = math.inf
     m.contraction = 0.0
     m.strayed = 0.0
+    m.short = 0.0
 
 
 def fastest(m: March) -> float:
@@ -126,8 +128,8 @@ def newton(m: March) -> int:
                     feel(m.contacts, f)
                 push(f)
             m.phase = CORRECT
-            if m.attempt == 1 or m.contraction > _POOR or (m.iteration == 0 and stale(m)):
-                m.last = math.inf
+            if m.attempt == 1 or wary(m) or m.contraction > _POOR or (m.iteration == 0 and stale(m)):
+                m.last = m.last if wary(m) else math.inf
                 if m.whole == 1:
                     place(f)
                     drive(f)
@@ -145,9 +147,12 @@ def newton(m: March) -> int:
         m.last = size
         if m.swift == 1 and m.contraction > _POOR:
             return FAILED
-        if m.contraction > 2.0 and m.iteration > 3:
+        if m.contraction > 2.0 and m.iteration > 3 and not wary(m):
             return FAILED
-        if converged(m, size):
+        if wary(m):
+            if sure(m, size):
+                return DONE
+        elif converged(m, size):
             reckon(m)
             return DONE
         m.iteration += 1
@@ -189,6 +194,29 @@ def to_v(m: March) -> float:
 def to_rate(m: March) -> float:
     """Return what an increment of the step adds to the accelerations at its end."""
     return (1.0 - m.alpha_m) / (m.h * m.h * m.beta * (1.0 - m.alpha_f))
+
+
+def wary(m: March) -> bool:
+    """Tell whether lines are too stiff for tangents that were not made where the iteration stands.
+
+    What a stiff line gives way by is nothing to be seen, but its force, seen from where it pointed before, has a share
+    across it that moves the machine.
+    """
+    return m.h * m.firmest > STIFF and m.swift != 1
+
+
+def sure(m: March, size: float) -> bool:
+    """Tell whether a correction of this size was the last that stiff lines need; the last is never a short one.
+
+    What goes back and forth between a slack rope and a taut one goes a little less far from then on.
+    """
+    if size <= min(m.tolerance, SURE) or (m.contraction > _POOR and size <= _ROUND_OFF):
+        last = m.short == 0.0
+        m.short = 0.0
+        return last
+    if m.contraction > TURNING and m.iteration > 1:
+        m.short = SHORT
+    return False
 
 
 def reckon(m: March) -> None:
@@ -264,7 +292,7 @@ def correct(m: March) -> float:
     sums = most
     turn = most
     for i in range(0, f.padded, 8):
-        change = eight(f.force[i:])
+        change = (1.0 - m.short) * eight(f.force[i:])
         put(f.step[i:], eight(f.step[i:]) - change)
         put(f.v[i:], eight(f.v[i:]) - speed * change)
         put(f.rate[i:], eight(f.rate[i:]) - pull * change)
@@ -276,5 +304,5 @@ def correct(m: March) -> float:
     turned = largest(turn)
     m.strayed += turned
     if _MOST * m.h * m.h * m.fastest * speed * turned > m.tolerance:
-        cone(m, f.force, speed)
+        cone(m, f.force, (1.0 - m.short) * speed)
     return largest(most) if math.isfinite(total(sums)) else math.nan

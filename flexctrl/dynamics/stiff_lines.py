@@ -1,0 +1,113 @@
+"""Lines so stiff that steps do not see them give way: how steps over them are solved, and how well they can be.
+
+The force of such a line hangs on the last digits of places. Solved for a step by Newton's method, it is what balances
+accelerations; but with a tangent made elsewhere, a correction along where the line pointed then leaves a share of that
+force across it: (h ω/2)² times the angle between, of the correction itself. So each iteration has a tangent of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.dynamics.scales import once
+from flexctrl.model.model import Model
+from flexctrl.model.rounding import DIGITS
+from flexctrl.structure.drives import Winch
+from flexctrl.structure.lines import Rope, Spring
+
+__all__ = ["SHORT", "STIFF", "SURE", "TURNING", "firmest", "noise", "stiffest"]
+
+STIFF = 10.0
+"""Radians of its vibration against the masses at its ends in a step that a line is stiff from on."""
+SURE = 1e-11
+"""Size of the last correction of steps over such lines."""
+
+TURNING, SHORT = 0.5, 1.0 / 64.0
+"""Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
+shortened by that share from then on."""
+
+Line = Rope | Spring | Winch
+
+
+def firmest(model: Model) -> float:
+    """Return the highest frequency of a line against the masses at its ends [rad/s]; 0 where none turns.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    float
+    """
+    return float(once(model, _frequencies).max(initial=0.0))
+
+
+def _frequencies(model: Model) -> np.ndarray:
+    """Frequencies of the lines as drawn, each as if the others let go, shape (lines,)."""
+    lines = _lines(model)
+    if not lines:
+        return np.zeros(0)
+    still = np.zeros(model.n)
+    slope = model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs)))
+    mass = -slope.diagonal()
+    pulls = sp.csr_matrix(np.array([_pull(model, line) for line in lines])) @ model.motion.jacobian(model.rest)
+    light = mass <= model.dust
+    mobility = np.where(light, 0.0, 1.0 / np.where(light, 1.0, mass))
+    return np.sqrt(pulls.power(2) @ mobility * [_stiffness(line) for line in lines])
+
+
+def _lines(model: Model) -> tuple[Line, ...]:
+    """What pulls along a line between two nodes and turns with it: nothing in small motion."""
+    if not (isinstance(model, Model) and model.large):
+        return ()
+    parts = (*model.structure.elements, *model.structure.drives)
+    return tuple(p for p in parts if isinstance(p, Spring) or (isinstance(p, Rope | Winch) and model.bends(p)))
+
+
+def _stiffness(line: Line) -> float:
+    """Stiffness as drawn [N/m]."""
+    return line.stiffness if isinstance(line, Rope | Spring) else line.EA / line.length
+
+
+def _pull(model: Model, line: Line) -> np.ndarray:
+    """How each raw coordinate lengthens a line, shape (raw,)."""
+    nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
+    first, second = (model.structure.number(node) for node in nodes)
+    arm = model.rest.x[second] - model.rest.x[first]
+    found = np.zeros(model.motion.raw)
+    found[6 * second : 6 * second + 3] = arm / np.linalg.norm(arm)
+    found[6 * first : 6 * first + 3] -= arm / np.linalg.norm(arm)
+    if isinstance(line, Winch):
+        found[model.motion.source_base + model.structure.drives.index(line)] = -1.0 / line.effective_ratio
+    return found
+
+
+def stiffest(model: Model) -> tuple[str, float]:
+    """Return the name and the stiffness [N/m] of the stiffest line; 0 for none.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    str, float
+    """
+    return max(((p.name, _stiffness(p)) for p in _lines(model)), key=lambda found: found[1], default=("", 0.0))
+
+
+def noise(model: Model) -> float:
+    """Return what force the last digits of places make in the stiffest line [N].
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    float
+    """
+    reach = max(model.structure.size, float(np.abs(model.rest.x).max(initial=0.0)))
+    return DIGITS * stiffest(model)[1] * reach
