@@ -227,8 +227,11 @@ class Watch:
 
     def signals(self, state: State, u: np.ndarray) -> dict[str, float]:
         """Return all signals by name."""
+        return self._signals(self.feed.model.measure(state), u)
+
+    def _signals(self, outputs: np.ndarray, u: np.ndarray) -> dict[str, float]:
         model = self.feed.model
-        values = [*model.measure(state).tolist(), *np.asarray(u).tolist()]
+        values = [*outputs.tolist(), *np.asarray(u).tolist()]
         return dict(zip((*model.outputs, *model.inputs), values, strict=True))
 
     def values(self, state: State, u: np.ndarray, before: State | None = None) -> np.ndarray:
@@ -369,8 +372,16 @@ class Watch:
 
     def occurrence(self, crossing: Crossing, state: State, u: np.ndarray) -> Occurrence:
         """Return what is told of a crossing."""
-        named = [*(e.name for e in self.events), *self.names, *self.corner_names]
-        return Occurrence(named[crossing.gauge], crossing.t, crossing.rising, self.signals(state, u))
+        return self.named(crossing, self.feed.model.measure(state), u)
+
+    def named(self, crossing: Crossing, outputs: np.ndarray, u: np.ndarray) -> Occurrence:
+        """Return what is told of a crossing, where outputs are known."""
+        named = (*(e.name for e in self.events), *self.names, *self.corner_names)
+        return Occurrence(named[crossing.gauge], crossing.t, crossing.rising, self._signals(outputs, u))
+
+    def corner(self, which: int, t: float, rising: bool) -> Crossing:
+        """Return that a corner is met."""
+        return Crossing(t, len(self.events) + len(self.names) + which, rising)
 
 
 @dataclass(frozen=True)

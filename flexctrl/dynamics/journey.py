@@ -438,3 +438,8 @@ class Journey:
         """Note an event, unless that has been done."""
         if crossing.t > self.told:
             self.events.append(self.watch.occurrence(crossing, state, u))
+
+    def tell(self, event: Occurrence) -> None:
+        """Note what has happened on the way of many steps, unless that has been done."""
+        if event.t > self.told:
+            self.events.append(event)

@@ -63,7 +63,8 @@ def withheld(journey: Journey, at: Point, switch: int) -> Point:
 
 def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
     """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
-    watch, sign, span = journey.watch, 1.0 if corner.rising else -1.0, _LEAST * journey.mark.size
+    watch, sign = journey.watch, 1.0 if corner.rising else -1.0
+    span = max(_LEAST * journey.mark.size, corner.t - at.state.t)
     state, v = at.state, at.state.v
     for _ in range(_NUDGES):
         moved = journey.plan.model.advance(at.state, span * v, v, at.state.t)

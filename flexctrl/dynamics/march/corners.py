@@ -1,4 +1,4 @@
-"""Corners of laws of force in compiled loops: steps that pass one are left to be ended there."""
+"""Corners of laws of force in compiled loops: whether a step passes one."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexctrl.dynamics.massless import massless
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.flat import Flat
+from flexctrl.model.flat.layout import Flattened
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
-from flexctrl.model.model import Model
 
-__all__ = ["Corners", "corners_of", "passes", "within"]
+__all__ = ["Corners", "comes_through", "corners_of", "crossed", "passes", "value", "within"]
 
 
 @dataclass
@@ -36,7 +37,17 @@ class Corners:
         What is zero but for round-off; the sides the motion is on, 0: not yet known.
     arms : Reals
         Of the lines to sheaves, before the step (3 each).
+    last : Wholes
+        Which are ends of runs.
+    step, change : Reals
+        Room for a step and a sum of forces.
+    turning : int
+        Whether steps may end at corners and start anew beyond in the loops.
+    which, when : int, float
+        The corner where the last one did, and its time.
     """
+
+    LASTING = ("turning",)
 
     lines: int
     turns: int
@@ -51,32 +62,56 @@ class Corners:
     dust: Reals
     sides: Reals
     arms: Reals
+    last: Wholes
+    step: Reals
+    change: Reals
+    turning: int
+    which: int = 0
+    when: float = 0.0
 
 
-def corners_of(model: Model) -> Corners:
+def corners_of(F: Flattened) -> Corners:
     """Return the corners of a model."""
-    kinks = model.kinks
+    kinks = F.model.kinks
     (ends, lengths), (drives, sums), (travels, spans) = kinks.lines, kinks.shafts, kinks.rails
     sides = np.zeros(len(kinks.names))
     counts = len(lengths), len(drives), len(travels), kinks.sheaves
     places = NODE_SLOT * ends.ravel(), drives, lengths, sums.ravel(), NODE_SLOT * travels, spans.ravel()
-    return Corners(*counts, *places, kinks.dust, sides, np.zeros(3 * kinks.sheaves))
+    last = np.array([bool(end) for end in kinks.ends], dtype=np.int64)
+    step, change = np.zeros((2, F.flat.padded))
+    turning = int(bool(kinks.names) and not massless(F.model).all.size)
+    return Corners(*counts, *places, kinks.dust, sides, np.zeros(3 * kinks.sheaves), last, step, change, turning)
 
 
 def passes(c: Corners, f: Flat) -> bool:
     """Tell whether the step under way passes a corner."""
-    for k in range(c.lines + c.turns):
-        value = stretch(c, f, k) if k < c.lines else turn(c, f, k - c.lines)
-        if not within(c, k, value):
-            return True
+    return crossed(c, f) >= 0 or comes_through(c, f)
+
+
+def crossed(c: Corners, f: Flat) -> int:
+    """Return the first corner that the step under way passes; −1 if it passes none."""
+    for k in range(c.lines + c.turns + c.rails):
+        if not within(c, k, value(c, f, k)):
+            return k
+    return -1
+
+
+def value(c: Corners, f: Flat, k: int) -> float:
+    """Return how far a part is beyond its corner."""
+    if k < c.lines:
+        return stretch(c, f, k)
+    if k < c.lines + c.turns:
+        return turn(c, f, k - c.lines)
+    i = k - c.lines - c.turns
+    return c.spans[2 * i] * f.z[c.travels[i]] + c.spans[2 * i + 1]
+
+
+def comes_through(c: Corners, f: Flat) -> bool:
+    """Tell whether some line to a sheave may have come through it over the step; take up where they all are."""
+    came = False
     for k in range(c.lines - c.sheaves, c.lines):
-        if through(c, f, k):
-            return True
-    for k in range(c.rails):
-        left = c.spans[2 * k] * f.z[c.travels[k]] + c.spans[2 * k + 1]
-        if not within(c, c.lines + c.turns + k, left):
-            return True
-    return False
+        came = through(c, f, k) or came
+    return came
 
 
 def stretch(c: Corners, f: Flat, k: int) -> float:

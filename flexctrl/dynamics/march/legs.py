@@ -124,6 +124,8 @@ class Legs:
     memory : Memory
     first, moved : numpy.ndarray, shape (n,)
         Where the degrees of freedom were at first, and how far they had been from there.
+    sides : numpy.ndarray
+        The sides that corners of laws of force were on.
     size : float
         Of the step before, or the first one [s].
     parts : list of Leg, Held or Told
@@ -134,6 +136,7 @@ class Legs:
     memory: Memory
     first: np.ndarray
     moved: np.ndarray
+    sides: np.ndarray
     size: float
     parts: list[Leg | Held | Told] = field(default_factory=list)
     end: AlphaPoint = field(init=False)
@@ -175,6 +178,7 @@ class Legs:
         marcher = again.marcher
         marcher.open(self.first, self.moved, False)
         marcher.about_to(self.size)
+        marcher.watch(self.sides, self.start.state)
         marcher.keep(all_states=True)
         u, found = self.start.supply.u, []
         for leg in self.legs:

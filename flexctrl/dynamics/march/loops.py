@@ -33,6 +33,7 @@ from flexctrl.dynamics.march.record import (
     March,
 )
 from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
+from flexctrl.dynamics.march.turning import turn_corner
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import energy
 
@@ -160,7 +161,7 @@ def fixed(m: March) -> int:
         if m.watching == 1 and passes(m.corners, m.flat):
             if m.leaping == 1:
                 back(m)
-            return CORNER
+            return turn_corner(m)
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
             return CORNER
         if m.contacts.count > 0 and lets_go(m):

@@ -460,7 +460,7 @@ def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
     return March(
         flat=flat,
         gauges=F.gauges,
-        corners=corners_of(F.model),
+        corners=Packed(corners_of(F)),  # type: ignore[arg-type]
         closing=closing_of(F),
         flows=flows_of(F),
         contacts=contacts,

@@ -20,9 +20,10 @@ from flexctrl.model.flat.fronts import Fronts
 from flexctrl.model.gauges import Gauges
 
 DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT, CORNER, SILENT = 0, 1, 2, 3, 4, 5, 6, 7
+TURNED, TURN = 8, 9
 """How a call ends: with all done; before it can go on; at a step that does not converge, or cannot be shorter; before
 one that passes a corner of a law of force, or a place where a loop of rigid parts may lock; at a sample at which the
-law does not say numbers."""
+law does not say numbers; beyond a corner, anew, or where that is to be done."""
 
 FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """What to do."""

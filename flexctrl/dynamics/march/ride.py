@@ -15,16 +15,18 @@ import numpy as np
 
 from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.dense import Dense
+from flexctrl.dynamics.events import Crossing
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.foresight import calm_steps
 from flexctrl.dynamics.march.law import Sampling
 from flexctrl.dynamics.march.legs import Held, Leg, Legs, Told, same
 from flexctrl.dynamics.march.marching import Pacing
-from flexctrl.dynamics.march.record import DONE, SILENT
+from flexctrl.dynamics.march.record import DONE, SILENT, TURN, TURNED
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.massless import massless
 from flexctrl.dynamics.steps import Controlled, Fixed
+from flexctrl.dynamics.switching import beyond
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.native import Packed
 
@@ -87,14 +89,13 @@ class _Ride:
         self.faults: list[ControllerError | KeyboardInterrupt] = []
         stepper.enter(j.point)
         sums = j.books.sums
-        self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved, j.mark.size)
+        sides = j.watch.corner_sides.copy()
+        self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved, sides, j.mark.size)
         self.marcher.about_to(j.mark.size)
         self.marcher.open(j.books.first, sums.moved, j.books.dissipates)
         self.marcher.go_on(sums)
         self.marcher.watch(j.watch.corner_sides, j.point.state)
-        self.marcher.keep(
-            not j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time, j.point.state.t), *j.rows.due()
-        )
+        self.marcher.keep(not self._on_steps, *j.rows.due())
         self.weaver: Weaver | None = None
         if self.marcher.march.keeping and not isinstance(stepper, Dense):
             self.weaver = self.marcher.weaver
@@ -103,6 +104,7 @@ class _Ride:
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
         self.mute, self.wary, self.balked = False, bool(j.watch.events), False
+        self.turn: Crossing | None = None
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
@@ -147,8 +149,25 @@ class _Ride:
 
     def _well(self, status: int) -> bool:
         """Tell whether a march ended well; the step before which it did not is then to be taken by itself."""
-        self.balked = status not in (DONE, SILENT, _EVENT)
-        return status == DONE
+        self.balked = status not in (DONE, SILENT, TURNED, TURN, _EVENT)
+        if status in (TURNED, TURN):
+            corner = self._met()
+            self.turn = corner if status == TURN else None
+        return status == DONE or (status == TURNED and self._on_steps == (not self.marcher.march.keeping))
+
+    @property
+    def _on_steps(self) -> bool:
+        """Whether rows are due at the ends of steps only."""
+        j = self.journey
+        return j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time, self.marcher.march.t)
+
+    def _met(self) -> Crossing:
+        """Tell of the corner beyond which the march goes on."""
+        watch, m = self.journey.watch, self.marcher.march
+        corner = watch.corner(m.corners.which, m.corners.when, bool(m.corners.sides[m.corners.which] > 0.0))
+        watch.cross(corner)
+        self.journey.tell(watch.named(corner, self.marcher.rows[m.done - 1, 1:], self.supply.u))
+        return corner
 
     def _wary(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
         """Take steps up to the first one in which an event may happen; return how it ended, and how many there were.
@@ -288,7 +307,7 @@ class _Ride:
             done = steps[0]
             if done > start:
                 held.samples.append((t, h, done - start, u, x))
-            if done < wanted or stop >= nearly:
+            if status != DONE or done < wanted or stop >= nearly:
                 mark.left = wanted - done
                 break
             t = clock[0] = times[done - 1] = stop
@@ -387,6 +406,8 @@ class _Ride:
         j.track.remember(self.legs)
         if not j.watch.idle:
             j.watch.settle(j.point)
+        if self.turn is not None:
+            j.point = beyond(j, j.point, self.turn)
         if not self.jumped:
             held = replace(j.point, state=j.under(self.supply.u))
             j.point = self.stepper.plain.renew(held, self.supply, j.mark.size)

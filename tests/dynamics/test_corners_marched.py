@@ -1,0 +1,108 @@
+"""Corners of laws of force met in compiled loops: the same runs as by plain steps, without plain ones."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.design import Step, Tracking, pd
+from flexctrl.dynamics import alpha, journey
+
+
+def geared(*effects: fc.Effect) -> fc.Model:
+    """A wheel on a motor with play."""
+    wheel = fc.RigidBody("wheel", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
+    drive = fc.RotaryDrive("motor", wheel.node, axis="z", stiffness=30.0, ratio=2.0, inertia=0.05, damping=0.05)
+    structure = fc.Structure(
+        [wheel],
+        [fc.Support(wheel.node, "u v w rx ry")],
+        [drive],
+        [fc.MotorTorque("torque", drive)],
+        [fc.DriveAngle("angle", drive), fc.DriveSpeed("speed", drive)],
+    )
+    play = fc.Backlash({"motor": 0.1})
+    return fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity(), play, *effects])
+
+
+def chain() -> fc.Model:
+    """Three masses on ropes that catch them one by one."""
+    ropes = [fc.Rope(f"rope{i}", (0, 0, -i), (0, 0, -i - 1), EA=1e4, length=1.1) for i in range(3)]
+    masses = [fc.PointMass(f"mass{i}", rope.end, 1.0) for i, rope in enumerate(ropes)]
+    joints = [fc.Support(ropes[0].start), *(fc.Support(mass.node, "v") for mass in masses)]
+    joints += [fc.Pin(rope.end, mass.node) for rope, mass in zip(ropes, masses, strict=True)]
+    joints += [fc.Pin(one.node, rope.start) for one, rope in zip(masses, ropes[1:], strict=False)]
+    outputs = [fc.Position("z", masses[-1].node, "z")]
+    effects = [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()]
+    return fc.assemble(fc.Structure([*ropes, *masses], joints, outputs=outputs), effects)
+
+
+def sampled(model: fc.Model) -> dict:
+    law = Tracking(pd(20.0, 2.0, measured="angle", rate="speed", command="torque"), {"angle": Step(1.0)})
+    return {"model": model, "until": 0.5, "controller": fc.Sampled(law, 0.01)}
+
+
+CASES = {
+    "play": lambda: {"model": geared(), "until": 0.5, "inputs": {"torque": 1.9}},
+    "play under control": lambda: sampled(geared()),
+    "play behind a lag": lambda: sampled(geared(fc.MotorLag({"motor": 0.02}))),
+    "ropes": lambda: {"model": chain(), "until": 0.35},
+}
+
+
+@pytest.fixture
+def plainly(monkeypatch):
+    """Runs by plain steps."""
+
+    def run(**asked: object) -> fc.Run:
+        with monkeypatch.context() as patch:
+            patch.setattr(alpha, "_quickest", lambda plain: plain)
+            return fc.simulate(**asked)
+
+    return run
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_marched_corners_are_those_of_plain_steps(case, plainly, monkeypatch):
+    asked = {**case(), "method": fc.GeneralizedAlpha(2e-3)}
+    plain = plainly(**asked)
+    monkeypatch.setattr(journey, "landed", None)  # no corner is met in a plain step
+    run = fc.simulate(**asked)
+    assert len(run.events) == len(plain.events) > 1
+    assert [(e.name, e.rising) for e in run.events] == [(e.name, e.rising) for e in plain.events]
+    assert [e.t for e in run.events] == pytest.approx([e.t for e in plain.events], abs=1e-8)
+    for one, other in zip(run.events, plain.events, strict=True):
+        assert one.signals == pytest.approx(other.signals, rel=1e-5, abs=1e-8)
+    assert run.report.steps == plain.report.steps
+    scale = np.abs(plain.final.v).max()
+    assert run.final.v == pytest.approx(plain.final.v, abs=1e-5 * scale)
+    for name in run.outputs:
+        assert run[name] == pytest.approx(plain[name], abs=1e-6)
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_states_on_the_way_are_those_of_the_run(case):
+    """Made again when asked for: corners are met again, to round-off."""
+    run = fc.simulate(**case(), method=fc.GeneralizedAlpha(2e-3))
+    met = np.array([event.t for event in run.events])
+    for name in run.outputs:
+        for t, value in zip(run.t.tolist(), run[name].tolist(), strict=True):
+            if np.abs(met - t).min() > 1e-6:  # where a step ends at a corner, the next one starts just beyond
+                assert run.at(t)[name] == pytest.approx(value, rel=1e-11, abs=1e-11)
+
+
+def test_steps_are_of_second_order_through_a_corner():
+    """A mass thrown over its play into a spring and back: x = −b − v/ω sin ω(t − 2b/v) while it is there."""
+    body, spring = fc.PointMass("block", (1, 0, 0), 1.0), fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=100.0)
+    held = [fc.Support(spring.start), fc.Pin(spring.end, body.node), fc.Support(body.node, "v w")]
+    structure = fc.Structure([body, spring], held, outputs=[fc.Position("x", body.node, "x")])
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.Backlash({"spring": 0.02})])
+    start, until = model.rest.with_(v=np.ones(1)), 0.2
+    exact = 1.0 + 0.01 + 0.1 * np.sin(10.0 * (until - 0.01))
+    errors = [
+        abs(fc.simulate(model, start=start, until=until, method=fc.GeneralizedAlpha(h))["x"][-1] - exact)
+        for h in (4e-3, 2e-3, 1e-3)
+    ]
+    assert all(3.0 < coarse / fine < 5.5 for coarse, fine in pairwise(errors))
