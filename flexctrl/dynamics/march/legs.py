@@ -185,6 +185,8 @@ class Legs:
             marcher.march.t = leg.t
             if not same(leg.supply.u, u):
                 u = leg.supply.u
+                if isinstance(leg.pacing, float):
+                    marcher.about_to(leg.pacing)
                 marcher.jump(u)
             found.append(marcher.travelled(leg.pacing, leg.steps))
         return found
