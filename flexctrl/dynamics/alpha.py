@@ -34,6 +34,7 @@ from flexctrl.structure.freedoms import check_number, check_seconds
 
 _TURNED = 0.02
 _SHARE = 1e-3
+_SIGHT = 2.1
 _POOR = 0.25
 _ASTRAY = 1.5
 _ITERATIONS = 12
@@ -103,12 +104,15 @@ class Stepper:
     coefficients : Coefficients
     tolerance : float
         Size of the last Newton correction [rad, and m over the size of the machine].
+    sight : float
+        Time constants of what has damping but no mass up to which a step sees how it sets out.
     """
 
     model: Model
     feed: Feed
     coefficients: Coefficients
     tolerance: float
+    sight: float = _SIGHT
     counts: Counts = field(default_factory=Counts)
     memory: Tangent | None = None
     _solve: Solve | None = None
@@ -150,7 +154,7 @@ class Stepper:
         light = massless(self.model)
         if self.feed.continuous or not light.all.size:
             return light.none
-        return light if light.seen(state, supply.u, step) else light.none
+        return light if light.seen(state, supply.u, step, self.sight) else light.none
 
     def _later(self, state: State, rate: np.ndarray, step: float) -> State:
         t = _SHARE * step
@@ -442,7 +446,8 @@ class AdaptiveAlpha(_Damped):
 
     def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
         newton = min(_LEFTOVER, max(1e-3 * tolerance.absolute, _LAST))
-        return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
+        # steps too long for what has damping but no mass are seen to be by their error, if it sets out as it does
+        return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton, sight=np.inf))
 
 
 def _check_rho(rho: float) -> None:

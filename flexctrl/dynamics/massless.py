@@ -28,7 +28,6 @@ __all__ = ["Massless", "massless"]
 
 _ITERATIONS = 25
 _EXACT = 1e-13
-_SEEN = 2.1
 
 
 def massless(model: Model) -> Massless:
@@ -63,13 +62,13 @@ class Massless:
         """None of them."""
         return Massless(self.model, self.loose[:0], self.damped[:0])
 
-    def seen(self, state: State, u: np.ndarray, step: float) -> bool:
-        """Tell whether a step sees how the damped ones come to their balance."""
-        if not self.damped.size:
+    def seen(self, state: State, u: np.ndarray, step: float, sight: float) -> bool:
+        """Tell whether a step sees how the damped ones come to their balance: it is so many time constants at most."""
+        if not self.damped.size or sight == np.inf:
             return True
         zero = np.zeros(self.model.n)
         K, C = (self.model.slope(state, state.v, zero, seed, u).diagonal() for seed in ((1.0, 0, 0), (0, 1.0, 0)))
-        return bool((np.abs(K) * step <= _SEEN * np.abs(C))[self.damped].all())
+        return bool((np.abs(K) * step <= sight * np.abs(C))[self.damped].all())
 
     def pushed(self, state: State, u: np.ndarray) -> State:
         """Return a state whose damped freedoms move as fast as their forces push them."""
