@@ -15,11 +15,11 @@ from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
-__all__ = ["LASTING", "lasts"]
+__all__ = ["LASTING", "SEEN", "SMALL", "STEPS", "lasts"]
 
-_SEEN = 300.0
-_SMALL = 1e-4
-_STEPS = 12.0
+SEEN = 300.0
+SMALL = 1e-4
+STEPS = 12.0
 LASTING = 56
 """Steps an impact is followed for: it takes π/ω, 38 of them, or stays."""
 
@@ -50,8 +50,8 @@ def lasts(model: Model, before: State, beyond: State, u: np.ndarray, how: tuple[
     pushes = [model.slope(state, v, still, (1.0, 0.0, 0.0), u) @ v for state in (beyond, before)]
     momentum = -(model.slope(beyond, v, still, (0.0, 0.0, 1.0), u) @ v)
     stiffness, mass = -float(v @ (pushes[0] - pushes[1])), float(v @ momentum)
-    if not (stiffness > 0.0 and mass > 2.0 * _SMALL * turnover):
+    if not (stiffness > 0.0 and mass > 2.0 * SMALL * turnover):
         return math.inf
     period = math.sqrt(mass / stiffness)
-    deep = np.abs(v) * period / yardsticks(model) >= _SEEN * tolerance.of(farthest(model, moved))
-    return math.inf if deep.any() else period / _STEPS
+    deep = np.abs(v) * period / yardsticks(model) >= SEEN * tolerance.of(farthest(model, moved))
+    return math.inf if deep.any() else period / STEPS

@@ -172,7 +172,7 @@ class Journey:
 
     def go(self, stop: float, until: float, most: int | None = None) -> None:
         """Go on towards a stop, by many steps at once (``most`` of them) or by one, not passing ``until``."""
-        if not (self.balked or self.mark.follow or self.mark.led) and ride(self, until, most):
+        if not self.balked and ride(self, until, most):
             return
         if isinstance(self.plan.method.pace, Fixed):
             self._fixed(stop, until)

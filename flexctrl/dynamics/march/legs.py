@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from flexctrl.dynamics.alpha import AlphaPoint
+from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
-from flexctrl.dynamics.steps import Point
+from flexctrl.dynamics.steps import Mark, Point
 from flexctrl.model.state import State
 
 __all__ = ["Leg", "Legs", "Span", "Told", "same"]
@@ -113,6 +114,26 @@ class Told(NamedTuple):
         return Leg(supply, t, self.pacing._replace(size=size, stop=stop), int(steps))
 
 
+class Opened(NamedTuple):
+    """Books and watch as a ride opens them.
+
+    Attributes
+    ----------
+    first : numpy.ndarray, shape (n,)
+        Where the degrees of freedom were at first.
+    sums : Sums
+    losing : bool
+        Whether power is dissipated.
+    sides : numpy.ndarray
+        The sides that corners of laws of force were on.
+    """
+
+    first: np.ndarray
+    sums: Sums
+    losing: bool
+    sides: np.ndarray
+
+
 @dataclass(eq=False)
 class Legs:
     """What a ride has done.
@@ -122,22 +143,17 @@ class Legs:
     stepper : MarchingStepper
     start, end : AlphaPoint
     memory : Memory
-    first, moved : numpy.ndarray, shape (n,)
-        Where the degrees of freedom were at first, and how far they had been from there.
-    sides : numpy.ndarray
-        The sides that corners of laws of force were on.
-    size : float
-        Of the step before, or the first one [s].
+    books : Opened
+    mark : Mark
+        At the start.
     parts : list of Leg, Held or Told
     """
 
     stepper: MarchingStepper
     start: AlphaPoint
     memory: Memory
-    first: np.ndarray
-    moved: np.ndarray
-    sides: np.ndarray
-    size: float
+    books: Opened
+    mark: Mark
     parts: list[Leg | Held | Told] = field(default_factory=list)
     end: AlphaPoint = field(init=False)
 
@@ -176,9 +192,11 @@ class Legs:
         again.marcher.recall(self.memory.march)
         again.enter(self.start)
         marcher = again.marcher
-        marcher.open(self.first, self.moved, False)
-        marcher.about_to(self.size)
-        marcher.watch(self.sides, self.start.state)
+        marcher.open(self.books.first, self.books.sums.moved, self.books.losing)
+        marcher.go_on(self.books.sums)
+        marcher.about_to(self.mark.size)
+        marcher.watch(self.books.sides, self.start.state)
+        marcher.follow(self.mark)
         marcher.keep(all_states=True)
         u, found = self.start.supply.u, []
         for leg in self.legs:

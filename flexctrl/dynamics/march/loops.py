@@ -33,7 +33,7 @@ from flexctrl.dynamics.march.record import (
     March,
 )
 from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
-from flexctrl.dynamics.march.turning import turn_corner
+from flexctrl.dynamics.march.turning import start_anew, turn_corner
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import energy
 
@@ -161,7 +161,7 @@ def fixed(m: March) -> int:
         if m.watching == 1 and passes(m.corners, m.flat):
             if m.leaping == 1:
                 back(m)
-            return turn_corner(m)
+            return turn_corner(m, m.h)
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
             return CORNER
         if m.contacts.count > 0 and lets_go(m):
@@ -195,9 +195,11 @@ def controlled(m: March) -> int:
             if not again:
                 m.tried = m.size
                 m.refused = m.rejected
-            m.h = m.size if again else fitted(min(m.size, m.largest), m.stop - m.t)
+            m.h = m.size if again else fitted(min(capped(m), m.largest), m.stop - m.t)
             if m.t + m.h > m.until * (1.0 + 1e-12):
                 return DONE
+            if m.led > 0.0 and m.h != m.led and not led(m):
+                return unmarched(m)
         if m.h < SMALLEST * max(SHORTEST * m.until, m.t):
             return SHORT
         status = step(m)
@@ -215,18 +217,23 @@ def controlled(m: March) -> int:
             again = True
             continue
         again = False
+        factor = 0.9 * growth(error)
+        grown = m.size
+        if factor > 1.3 and m.h > 0.5 * m.size:
+            grown = m.h * min(2.5, factor)
+        elif factor < 1.0:
+            grown = m.h * factor
         reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
-            return unmarched(m)
+            status = turn_corner(m, grown)
+            return unmarched(m) if status == CORNER else status
         if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
             return unmarched(m)
         if m.contacts.count > 0 and lets_go(m):
             return unmarched(m)
-        factor = 0.9 * growth(error)
-        if factor > 1.3 and m.h > 0.5 * m.size:
-            m.size = m.h * min(2.5, factor)
-        elif factor < 1.0:
-            m.size = m.h * factor
+        m.size = grown
+        m.led = 0.0
+        m.follow = max(0, m.follow - 1)
         accept(m)
     return DONE
 
@@ -236,6 +243,18 @@ def unmarched(m: March) -> int:
     m.size = m.tried
     m.rejected = m.refused
     return CORNER
+
+
+@seldom
+def led(m: March) -> bool:
+    """Start anew at the corner where the march stands, for a step of another length; tell whether that could be."""
+    m.led = m.h
+    return m.corners.turning == 1 and start_anew(m) == DONE
+
+
+def capped(m: March) -> float:
+    """Return the next step, short enough to follow an impact."""
+    return min(m.size, m.cap) if m.follow > 0 else m.size
 
 
 def fitted(h: float, left: float) -> float:

@@ -44,6 +44,7 @@ from flexctrl.dynamics.march.record import (
 from flexctrl.dynamics.march.shelf import states_of, width_of
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.scales import components, farthest
+from flexctrl.dynamics.steps import Mark
 from flexctrl.dynamics.stiff_lines import firmest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import Compiled
@@ -369,6 +370,10 @@ class Marcher:
         m.corners.arms[:] = self.model.kinks.sheaved(state).ravel()
         m.corners.sides[:] = sides
         m.watching, self.contacts.watched = int(sides.size > 0), int(self.contacts.count > 0)
+
+    def follow(self, mark: Mark) -> None:
+        """Take up how steps of controlled error go on beyond a corner."""
+        self.march.follow, self.march.cap, self.march.led = mark.follow, mark.cap, mark.led
 
     def watch_no_more(self) -> None:
         """End steps wherever they do."""

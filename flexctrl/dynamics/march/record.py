@@ -172,6 +172,8 @@ class March:
         Steps.
     tried, refused : float, int
         Size and count before the step under way was rejected.
+    follow, cap, led : int, float
+        Of error-controlled steps beyond a corner; see `flexctrl.dynamics.steps.Mark`.
     phase, attempt, iteration, last, contraction, strayed : int, float
         Where in a step it is.
     leaping : int
@@ -294,6 +296,9 @@ class March:
     rejected: int = 0
     tried: float = 0.0
     refused: int = 0
+    follow: int = 0
+    cap: float = 0.0
+    led: float = 0.0
     phase: int = FRESH
     attempt: int = 0
     iteration: int = 0

@@ -19,7 +19,7 @@ from flexctrl.dynamics.events import Crossing
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.foresight import calm_steps
 from flexctrl.dynamics.march.law import Sampling
-from flexctrl.dynamics.march.legs import Held, Leg, Legs, Told, same
+from flexctrl.dynamics.march.legs import Held, Leg, Legs, Opened, Told, same
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT, TURN, TURNED
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
@@ -89,12 +89,13 @@ class _Ride:
         self.faults: list[ControllerError | KeyboardInterrupt] = []
         stepper.enter(j.point)
         sums = j.books.sums
-        sides = j.watch.corner_sides.copy()
-        self.legs = Legs(stepper, j.point, stepper.memory, j.books.first, sums.moved, sides, j.mark.size)
+        books = Opened(j.books.first, replace(sums), j.books.dissipates, j.watch.corner_sides.copy())
+        self.legs = Legs(stepper, j.point, stepper.memory, books, replace(j.mark))
         self.marcher.about_to(j.mark.size)
         self.marcher.open(j.books.first, sums.moved, j.books.dissipates)
         self.marcher.go_on(sums)
         self.marcher.watch(j.watch.corner_sides, j.point.state)
+        self.marcher.follow(j.mark)
         self.marcher.keep(not self._on_steps, *j.rows.due())
         self.weaver: Weaver | None = None
         if self.marcher.march.keeping and not isinstance(stepper, Dense):
@@ -205,6 +206,7 @@ class _Ride:
         self.marcher.open(books.first, begun.sums.moved, books.dissipates)
         self.marcher.go_on(begun.sums)
         self.marcher.watch(self.journey.watch.corner_sides, begun.point.state)
+        self.marcher.follow(self.journey.mark)
         self.marcher.keep(keeping, begun.due, spacing)
 
     def _lowered(self, stop: float) -> bool:
@@ -398,6 +400,7 @@ class _Ride:
         self.stepper.count()
         self.marcher.watch_no_more()
         j.mark.rejected += m.rejected - self.rejected
+        j.mark.follow, j.mark.cap, j.mark.led = m.follow, m.cap, m.led
         if not self.legs.parts:
             return False
         j.balked, j.mark.stuck = self.balked, 0

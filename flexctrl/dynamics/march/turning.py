@@ -8,20 +8,21 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.impact import LASTING, SEEN, SMALL, STEPS
 from flexctrl.dynamics.march.axes import mark, solved
 from flexctrl.dynamics.march.books import accept, copy, reach
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import comes_through, crossed, value, within
 from flexctrl.dynamics.march.flowing import released
 from flexctrl.dynamics.march.jumping import jump
-from flexctrl.dynamics.march.record import CORNER, DONE, FRESH, SINGULAR, TURN, TURNED, March
+from flexctrl.dynamics.march.record import CONTROLLED, CORNER, DONE, FRESH, SAMPLED, SINGULAR, TURN, TURNED, March
 from flexctrl.dynamics.march.step import sloped, step
-from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.eights import eight, put, total
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, drive, energy, keep, place, press_entire, push
 from flexctrl.model.flat.fronts import factor
 
-__all__ = ["turn_corner"]
+__all__ = ["start_anew", "turn_corner"]
 
 _LANDINGS, _MOST, _QUICK = 12, 60, 8
 _SMALLEST, _BRIEF = 1e-12, 1e-6
@@ -35,10 +36,10 @@ _FIRM = 1e30
 
 
 @seldom
-def turn_corner(m: March) -> int:
+def turn_corner(m: March, size: float) -> int:
     """Take the step under way again, to just before the first corner that it passes, and start anew beyond that one.
 
-    Where that is not for the loops, nothing has happened.
+    Steps are of some size from there on. Where that is not for the loops, nothing has happened.
     """
     h = m.h
     if m.corners.turning == 0 or m.leaping == 1 or m.contacts.count > 0:
@@ -51,11 +52,20 @@ def turn_corner(m: March) -> int:
         return CORNER
     m.corners.when += m.t + end
     accept(m)
-    m.h = h
+    m.h = size
     m.corners.sides[m.corners.which] = -m.corners.sides[m.corners.which]
-    if nudged(m) and start_anew(m) == DONE:
-        return TURNED
-    return TURN
+    chosen = m.task == CONTROLLED or (m.task == SAMPLED and m.law.pace == 0.0)
+    if chosen:
+        m.size = size
+        m.follow = max(0, m.follow - 1)
+    before = stiffness(m, -_SHARE * size) if chosen else 0.0
+    if not nudged(m):
+        return TURN
+    if chosen:
+        follow_impact(m, stiffness(m, _SHARE * size) - before)
+        m.h = min(size, m.cap) if m.follow > 0 else size
+        m.led = m.h
+    return TURNED if start_anew(m) == DONE else TURN
 
 
 @seldom
@@ -272,6 +282,57 @@ def nudged(m: March) -> bool:
 
 
 @seldom
+def stiffness(m: March, t: float) -> float:
+    """Return v·K v for the rates v, told from forces on the way to a time from now."""
+    f = m.flat
+    there = along_rates(m, t, 0.0)
+    further = along_rates(m, 2.0 * t, 0.0)
+    here = along_rates(m, 0.0, 0.0)
+    clear(f.padded, f.step)
+    reach(m)
+    return (3.0 * here - 4.0 * there + further) * (0.5 / t)
+
+
+@seldom
+def along_rates(m: March, t: float, share: float) -> float:
+    """Return the power of all forces where the rates lead within a time, with accelerations that are a share of them.
+
+    Rates are as they are now.
+    """
+    f = m.flat
+    for i in range(0, f.padded, 8):
+        put(f.step[i:], t * eight(m.v[i:]))
+        put(f.v[i:], eight(m.v[i:]))
+        put(f.rate[i:], share * eight(m.v[i:]))
+    press_all(m)
+    power = 0.0 * eight(m.weight)
+    f.force[f.n] = 0.0
+    for i in range(0, f.padded, 8):
+        power = power + eight(f.force[i:]) * eight(m.v[i:])
+    return total(power)
+
+
+@seldom
+def follow_impact(m: March, stiffer: float) -> None:
+    """Follow an impact by short steps, where these would not see it; see `flexctrl.dynamics.impact.lasts`."""
+    mass = along_rates(m, 0.0, 0.0) - along_rates(m, 0.0, 1.0)
+    clear(m.flat.padded, m.flat.step)
+    reach(m)
+    m.follow = 0
+    m.cap = 0.0
+    if not (stiffer > 0.0 and mass > 2.0 * SMALL * m.turnover):
+        return
+    period = math.sqrt(mass / stiffer)
+    deep = False
+    for i in range(m.flat.n):
+        allowed = m.absolute + m.relative * (m.reached if m.parts == 1 else m.farthest[m.part[i]])
+        deep = deep or abs(m.v[i]) * period * m.weight[i] >= SEEN * allowed
+    if not deep:
+        m.follow = LASTING
+        m.cap = period / STEPS
+
+
+@seldom
 def start_anew(m: March) -> int:
     """Find the accelerations under the law of force that holds from now on, and the method's own.
 
@@ -281,6 +342,9 @@ def start_anew(m: March) -> int:
     m.made_for = -1.0
     m.lean = 1.0
     clear(f.padded, m.trend)
+    clear(f.padded, f.step)
+    copy(f.padded, m.v, f.v)
+    reach(m)
     m.unsure = 1
     status = jump(m)
     m.unsure = 0
@@ -351,6 +415,13 @@ def forces_in(m: March, t: float) -> None:
     for i in range(0, f.padded, 8):
         put(f.step[i:], t * eight(m.v[i:]))
         put(f.v[i:], eight(m.v[i:]) + t * eight(m.rate[i:]))
+    press_all(m)
+
+
+@seldom
+def press_all(m: March) -> None:
+    """Sum up the forces of the motion under way."""
+    f = m.flat
     if m.whole == 1:
         press_entire(f)
         return
