@@ -24,7 +24,7 @@ from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Integrator, Point, StepError, check_step
-from flexctrl.dynamics.stiff_lines import SHORT, STIFF, SURE, TURNING, firmest
+from flexctrl.dynamics.stiff_lines import STIFF, SURE, Caution, firmest
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.flows import flow_rates, flowing, without
 from flexctrl.model.model import Model
@@ -262,7 +262,7 @@ class Stepper:
         step = step + self.coning(h, now.v, v)
         foreseen, last, contraction, end = step, np.inf, 0.0, later(now.t, h)
         wary = h * self.firmest > STIFF
-        tolerance, short = (min(self.tolerance, SURE) if wary else self.tolerance), 0.0
+        caution = Caution(min(self.tolerance, SURE))
         for iteration in range(_ITERATIONS):
             state = self.model.advance(now, step, v, end)
             supply = self.feed.at(state, point.supply, h)
@@ -271,7 +271,7 @@ class Stepper:
                 self._factor(Tangent(state, v, rate, (1.0, to_v, to_rate), supply, h))
                 last = last if wary else np.inf
             assert self._solve is not None
-            correction = (1.0 - short) * self._solve(force)
+            correction = (1.0 - caution.short) * self._solve(force)
             size, worst = largest(correction * self.weight)
             self.counts.newton += 1
             step = step + correction + self.coning(h, now.v, to_v * correction)
@@ -280,13 +280,8 @@ class Stepper:
             worse = contraction > 2.0 and iteration > 3 and not wary
             if not np.isfinite(size) or worse or self._astray(step - foreseen):
                 break
-            foretold = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * tolerance and not wary
-            if size <= tolerance or foretold or (contraction > _POOR and size <= _ROUND_OFF):
-                if not short:
-                    return self._finish(point, h, step, v, rate, worst)
-                short = 0.0
-            elif wary and contraction > TURNING and iteration > 1:
-                short = SHORT
+            if caution.over(size, contraction, iteration) if wary else self._solved(size, contraction):
+                return self._finish(point, h, step, v, rate, worst)
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
 
@@ -305,6 +300,11 @@ class Stepper:
         change = rate - point.rate
         lean = _lean(change * self.weight, point.trend * self.weight)
         return AlphaPoint(state, rate, self.feed.at(state, point.supply, h), algorithmic, change, lean)
+
+    def _solved(self, size: float, contraction: float) -> bool:
+        """Tell whether a correction was the last that is needed, or the next is foretold to be none."""
+        foretold = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * self.tolerance
+        return size <= self.tolerance or foretold or (contraction > _POOR and size <= _ROUND_OFF)
 
     def _astray(self, unforeseen: np.ndarray) -> bool:
         """Tell whether Newton's method heads for a turn that the motion did not announce: another root."""

@@ -24,6 +24,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
+from flexctrl.dynamics.stiff_lines import STIFF, Caution, firmest
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.model import Model
 from flexctrl.model.momenta import Momenta
@@ -130,6 +131,7 @@ class _Stepper:
         self.masses = Masses(self.model, self.counts)
         self.massless = False
         self.light = massless(self.model)
+        self.firmest = firmest(self.model)
 
     @property
     def memory(self) -> _Memory:
@@ -181,6 +183,8 @@ class _Stepper:
 
     def step(self, point: _Point, h: float) -> _Point:
         """Return the point a step later."""
+        if h * self.firmest > STIFF:
+            return self._carefully(point, h)
         try:
             return self._attempt(point, h, fresh=False)
         except StepError:
@@ -211,7 +215,30 @@ class _Stepper:
             if not np.isfinite(size) or (contraction > 2.0 and iteration > 3) or (contraction > 1.0 and not fresh):
                 break
             last = size
-        raise StepError(worst, f"Newton's method did not converge at t = {t + h:.6g} s with a step of {h:.3g} s")
+        raise _astray(worst, t, h)
+
+    def _carefully(self, point: _Point, h: float) -> _Point:
+        """Take a step over lines that are stiff in it, with a tangent of its own in every iteration.
+
+        Their force hangs on the last digits of places: it is not summed up, momenta follow from where the step ends.
+        """
+        now, t, caution = point.state, point.state.t, Caution(_NEWTON)
+        step, last, worst = h * (now.v + 0.5 * h * point.rate), np.inf, 0
+        for iteration in range(_ITERATIONS):
+            middle, supply, momenta, change = self._middle(point, step, h)
+            self._factor(_Tangent(middle, 2.0 * (step / h - now.v) / h, supply, h))
+            assert self._solve is not None
+            correction = (caution.short - 1.0) * self._solve(momenta - point.momenta - 0.5 * h * change)
+            size, worst = largest(correction * self.weight)
+            self.counts.newton += 1
+            step = step + correction
+            if not np.isfinite(size):
+                break
+            if caution.over(size, size / last, iteration):
+                self.counts.worst = worst
+                return self._end(point, h, step, 2.0 * self._middle(point, step, h)[2] - point.momenta)
+            last = size
+        raise _astray(worst, t, h)
 
     def _middle(self, point: _Point, step: np.ndarray, h: float) -> tuple[State, Supply, np.ndarray, np.ndarray]:
         """The middle of a step, inputs there, momenta there, and how they change."""
@@ -260,3 +287,7 @@ class _Stepper:
     def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Steps are of one length; nothing is estimated."""
         return 0.0
+
+
+def _astray(worst: int, t: float, h: float) -> StepError:
+    return StepError(worst, f"Newton's method did not converge at t = {t + h:.6g} s with a step of {h:.3g} s")

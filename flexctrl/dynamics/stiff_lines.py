@@ -7,6 +7,8 @@ force across it: (h ω/2)² times the angle between, of the correction itself. S
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -16,7 +18,7 @@ from flexctrl.model.rounding import DIGITS
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope, Spring
 
-__all__ = ["SHORT", "STIFF", "SURE", "TURNING", "firmest", "noise", "stiffest"]
+__all__ = ["SHORT", "STIFF", "SURE", "TURNING", "Caution", "firmest", "noise", "stiffest"]
 
 STIFF = 10.0
 """Radians of its vibration against the masses at its ends in a step that a line is stiff from on."""
@@ -27,7 +29,38 @@ TURNING, SHORT = 0.5, 1.0 / 64.0
 """Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
 shortened by that share from then on."""
 
+_POOR, _ROUND_OFF = 0.25, 1e-13
+
 Line = Rope | Spring | Winch
+
+
+@dataclass
+class Caution:
+    """How Newton's iterations over stiff lines go; the compiled loops do the same.
+
+    Attributes
+    ----------
+    enough : float
+        Size of the last correction.
+    short : float
+        By what share corrections are shortened.
+    """
+
+    enough: float
+    short: float = 0.0
+
+    def over(self, size: float, contraction: float, iteration: int) -> bool:
+        """Tell whether a correction was the last; that is never a short one.
+
+        What goes back and forth between a slack rope and a taut one goes a little less far from then on.
+        """
+        if size <= self.enough or (contraction > _POOR and size <= _ROUND_OFF):
+            last = not self.short
+            self.short = 0.0
+            return last
+        if contraction > TURNING and iteration > 1:
+            self.short = SHORT
+        return False
 
 
 def firmest(model: Model) -> float:

@@ -78,10 +78,19 @@ def test_a_stiff_line_is_a_rigid_one(line, angle, pull):
 
 
 @pytest.mark.parametrize("pull", [1e6, 1e10, 1e14, 1e18], ids="{:.0e}".format)
-def test_steps_of_one_length_over_a_stiff_line(pull):
-    run = fc.simulate(chain(pull, 1.0), until=1.0, method=fc.GeneralizedAlpha(5e-3))
+@pytest.mark.parametrize("line", [rope, spring])
+def test_steps_of_one_length_over_a_stiff_line(line, pull):
+    run = fc.simulate(chain(pull, 1.0, line), until=1.0, method=fc.GeneralizedAlpha(5e-3))
     assert np.abs(run["x"] - np.sin(swing(run.t, 1.0))).max() < 3e-4
     assert run.report.energy_residual < 1e-3
+
+
+@pytest.mark.parametrize("pull", [1e6, 1e10, 1e14, 1e18], ids="{:.0e}".format)
+@pytest.mark.parametrize("line", [rope, spring])
+def test_steps_that_keep_energy_keep_it_on_a_stiff_line(line, pull):
+    run = fc.simulate(chain(pull, 1.0, line), until=1.0, method=fc.ConservingMidpoint(5e-3))
+    assert np.abs(run["x"] - np.sin(swing(run.t, 1.0))).max() < 2e-4
+    assert run.report.energy_residual < 1e-8
 
 
 @pytest.mark.parametrize("pull", [1e6, 1e10, 1e14, 1e16], ids="{:.0e}".format)
