@@ -143,32 +143,35 @@ class Stepper:
     def _fresh(self, state: State, supply: Supply, step: float) -> AlphaPoint:
         state, supply = settled(self.model, state, self.feed, supply)
         light = self._light(state, supply, step)
-        state, rate = self._set_out(state, supply, step, light)
+        state, supply, rate = self._set_out(state, supply, step, light)
         if light.loose.size:
-            later, _ = self._set_out(self._later(state, rate, step), supply, step, light)
+            later = self._set_out(*self._later(state, supply, rate, step), step, light)[0]
             rate[light.loose] = (later.v - state.v)[light.loose] / (_SHARE * step)
         return AlphaPoint(state, rate, supply, rate, np.zeros(self.model.n))
 
     def _light(self, state: State, supply: Supply, step: float) -> Massless:
         """What moves no mass and sets out as its forces say: nothing, where a step would not see how it begins."""
-        light = massless(self.model)
-        if self.feed.continuous or not light.all.size:
-            return light.none
-        return light if light.seen(state, supply.u, step, self.sight) else light.none
+        light = massless(self.feed)
+        return light if light.all.size and light.seen(state, supply, step, self.sight) else light.none
 
-    def _later(self, state: State, rate: np.ndarray, step: float) -> State:
+    def _later(self, state: State, supply: Supply, rate: np.ndarray, step: float) -> tuple[State, Supply]:
+        """Return a state that soon follows, and the inputs there."""
         t = _SHARE * step
-        return self.model.advance(state, t * state.v, state.v + t * rate, state.t + t)
+        state = self.model.advance(state, t * state.v, state.v + t * rate, state.t + t)
+        return state, self.feed.restart(state, replace(supply, x=supply.x + t * supply.rate))
 
-    def _set_out(self, state: State, supply: Supply, step: float, light: Massless) -> tuple[State, np.ndarray]:
-        """Return a state with the rates of what has no mass, and the accelerations of all others."""
+    def _set_out(self, state: State, supply: Supply, step: float, light: Massless) -> tuple[State, Supply, np.ndarray]:
+        """Return a state with the rates of what has no mass, the inputs there, and the accelerations of all others."""
         flows = self.model.motion.flows
-        state = light.pushed(flowing(self.model, state, supply.u), supply.u)
+        state, supply = light.pushed(flowing(self.model, state, supply.u), supply)
         force = self.model.balance(state, state.v, np.zeros(self.model.n)) + self.model.loads(state, supply.u)
         if flows.size:
             force[flows] = flow_rates(self.model, state, supply.u, step)
         rate = self._mass(state, supply, step, light)(force)
-        return light.moving(state, rate, supply.u) if light.all.size else (state, rate)
+        if light.all.size:
+            state, rate = light.moving(state, rate, supply, step)
+            supply = self.feed.restart(state, supply)
+        return state, supply, rate
 
     def renew(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
         """Return a point under other inputs: the true accelerations jump; the method's own keep their lead on them.
@@ -208,11 +211,11 @@ class Stepper:
         """What may be over within a step: freedoms of first order, those that follow them; their rates and changes."""
         (state, rate), inner = (point.state, point.rate), self.model.motion.settling
         found = [(int(i), float(state.v[i]), float(rate[i])) for i in inner]
-        light = self._light(state, point.supply, step) if found else massless(self.model).none
+        light = self._light(state, point.supply, step) if found else massless(self.feed).none
         if not light.loose.size:
             return found
-        later, after = self._set_out(self._later(state, rate, step), point.supply, step, light)
-        now, then = (light.hurried(*at, point.supply.u) for at in ((state, rate), (later, after)))
+        later, supply, after = self._set_out(*self._later(state, point.supply, rate, step), step, light)
+        now, then = (light.hurried(*at) for at in ((state, rate, point.supply), (later, after, supply)))
         rates = zip(light.loose.tolist(), now.tolist(), ((then - now) / (_SHARE * step)).tolist(), strict=True)
         return [*found, *rates]
 

@@ -10,10 +10,9 @@ import numpy as np
 from flexctrl.dynamics.dense import Booked, Curve
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.march.record import OFTEN
-from flexctrl.dynamics.massless import massless
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
-from flexctrl.dynamics.settling import quasistatic
+from flexctrl.dynamics.settling import dragged, quasistatic
 from flexctrl.dynamics.steps import Point
 from flexctrl.dynamics.stiff_lines import noise, stiffest
 from flexctrl.model.state import State
@@ -106,7 +105,7 @@ class Books:
 
         Places of what has no mass have jumped too: what the inputs did on the way and springs do not store is lost.
         """
-        if self.model.motion.flows.size or massless(self.model).damped.size:
+        if self.model.motion.flows.size or dragged(self.model).size:
             self.turn(after)
         if quasistatic(self.model).size:
             (k0, v0, _), (k1, v1, _) = (self.model.energy(point.state) for point in (before, after))

@@ -130,7 +130,7 @@ class _Stepper:
         self.turning = turning(self.model)
         self.masses = Masses(self.model, self.counts)
         self.massless = False
-        self.light = massless(self.model)
+        self.light = massless(self.feed)
         self.firmest = firmest(self.model)
 
     @property
@@ -163,7 +163,7 @@ class _Stepper:
             rate = self.masses.accelerations(state, supply.u, still)
         except SingularMatrixError:
             self.massless, rate = True, still
-            state = self.light.pushed(state, supply.u)
+            state, supply = self.light.pushed(state, supply)
             self._check_held(state, supply, step)
         return _Point(state, rate, supply, self.momenta.at(state, supply.u)[0])
 
@@ -177,7 +177,8 @@ class _Stepper:
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs: momenta do not jump."""
         state, supply = settled(self.model, point.state, self.feed, supply)
-        state = self.light.pushed(state, supply.u) if self.massless else state
+        if self.massless:
+            state, supply = self.light.pushed(state, supply)
         rate = point.rate if self.massless else self.masses.accelerations(state, supply.u, point.rate)
         return _Point(state, rate, supply, point.momenta)
 
@@ -255,7 +256,7 @@ class _Stepper:
                 self.counts.worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part bend"
             )
         if self.massless:
-            state = self.light.pushed(state, self.feed.at(state, point.supply, h).u)
+            state = self.light.pushed(state, self.feed.at(state, point.supply, h))[0]
         else:
             state = state.with_(v=self.masses.solve(lambda v: self.momenta.of(state, v) - momenta, state, state.v))
         return _Point(state, 2.0 * (state.v - mean) / h, self.feed.at(state, point.supply, h), momenta)

@@ -17,7 +17,7 @@ from flexctrl.model.model import Model
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 
-__all__ = ["dragged", "quasistatic", "settled"]
+__all__ = ["dragged", "quasistatic", "settled", "weightless"]
 
 _EXACT = 1e-12
 _ITERATIONS = 25
@@ -31,6 +31,11 @@ def quasistatic(model: Model) -> np.ndarray:
 def dragged(model: Model) -> np.ndarray:
     """Return the degrees of freedom with damping but no mass, shape (k,)."""
     return once(model, _dragged)
+
+
+def weightless(model: Model) -> np.ndarray:
+    """Return the degrees of freedom that stiffness or damping holds without mass, shape (k,)."""
+    return np.concatenate([quasistatic(model), dragged(model)])
 
 
 def _quasistatic(model: Model) -> np.ndarray:

@@ -128,3 +128,49 @@ def test_the_start_is_where_torque_that_is_yet_to_build_up_leaves_it():
     run = fc.simulate(machine(fc.MotorLag({"drive": 0.02})), until=1.0, inputs={"torque": 1.0})
     assert run.status is fc.Status.FINISHED
     assert np.allclose(run.y[0], [0.0, 1.0 / (0.02 * SHAFT), 0.0], atol=1e-9)
+
+
+class Following:
+    """A continuous law with a state: P times the gap of the angle, and five times the gap, filtered."""
+
+    inputs, outputs, sample_time = ("angle",), ("torque",), 0.0
+    P, T = 10.0, 0.05
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(1)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([self.P * (1.0 - y[0]) + 5.0 * x[0]])
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([(1.0 - y[0] - x[0]) / self.T])
+
+
+def followed(c: float, until: float) -> np.ndarray:
+    """The angle, its rate and the turn under it; c = 0: the angle is where forces balance."""
+    P, T = Following.P, Following.T
+
+    def slope(t: float, z: np.ndarray) -> list[float]:
+        r, w, x = z[:3]
+        a = z[3] if c else (P + 5.0 * x + SHAFT * RATIO * r) / (P + SHAFT)
+        shaft = SHAFT * (RATIO * r - a)
+        return [w, -RATIO * shaft, (1.0 - a - x) / T, (P * (1.0 - a) + 5.0 * x + shaft) / c if c else 0.0]
+
+    z = solve_ivp(slope, (0.0, until), [0.0] * 4, method="Radau", rtol=1e-11, atol=1e-13).y[:, -1]
+    rates = slope(until, z)
+    if c:
+        return np.array([z[3], rates[3], z[0]])
+    return np.array([P + 5.0 * z[2] + SHAFT * RATIO * z[0], 5.0 * rates[2] + SHAFT * RATIO * z[1], 0.0]) / (
+        P + SHAFT
+    ) + np.array([0.0, 0.0, z[0]])
+
+
+@pytest.mark.parametrize("c", [0.1, 0.0], ids=["friction", "stiffness alone"])
+def test_under_a_continuous_controller_it_sets_out_as_its_forces_say(c):
+    model, exact = machine(fc.ViscousFriction({"drive": c}) if c else fc.Gravity()), followed(c, 0.5)
+    runs = [fc.simulate(model, Following(), until=0.5, method=fc.GeneralizedAlpha(h)) for h in (2e-3, 1e-3)]
+    first = [0.0, (Following.P * 1.0) / c, 0.0] if c else [1 / 6, 5.0 * (5 / 6) / Following.T / 60.0, 0.0]
+    assert runs[0].y[0] == pytest.approx(first, rel=1e-6, abs=1e-12)
+    errors = [np.abs(run.y[-1] - exact) for run in runs]
+    assert (errors[0] <= [2e-4, 2e-4, 1e-4]).all()
+    assert errors[0] / errors[1] == pytest.approx([4.0] * 3, rel=0.05)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.dynamics.massless import massless
+from flexctrl.dynamics.settling import weightless
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.layout import Flattened
@@ -79,7 +79,7 @@ def corners_of(F: Flattened) -> Corners:
     places = NODE_SLOT * ends.ravel(), drives, lengths, sums.ravel(), NODE_SLOT * travels, spans.ravel()
     last = np.array([bool(end) for end in kinks.ends], dtype=np.int64)
     step, change = np.zeros((2, F.flat.padded))
-    turning = int(bool(kinks.names) and not massless(F.model).all.size)
+    turning = int(bool(kinks.names) and not weightless(F.model).size)
     return Corners(*counts, *places, kinks.dust, sides, np.zeros(3 * kinks.sheaves), last, step, change, turning)
 
 

@@ -24,7 +24,7 @@ from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT, TURN, TURNED
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.march.weaving import Weaver
-from flexctrl.dynamics.massless import massless
+from flexctrl.dynamics.settling import weightless
 from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.dynamics.switching import beyond
 from flexctrl.errors import ControllerError
@@ -57,7 +57,7 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
         return False
     if journey.watch.events and _near_stop(journey):
         return False
-    if plan.feed.sample_time and massless(plan.model).all.size:
+    if plan.feed.sample_time and weightless(plan.model).size:
         return False
     return _Ride(journey, stepper, until, most).go()
 
