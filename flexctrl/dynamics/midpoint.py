@@ -150,7 +150,7 @@ class _Stepper:
             self._factor(memory.tangent)
 
     def start(self, state: State, supply: Supply, step: float) -> _Point:
-        """Return the point of a state; what has no mass but damping moves as fast as its forces push it.
+        """Return the point of a state; what has no mass moves as its forces say.
 
         Raises
         ------
@@ -163,9 +163,17 @@ class _Stepper:
             rate = self.masses.accelerations(state, supply.u, still)
         except SingularMatrixError:
             self.massless, rate = True, still
-            state, supply = self.light.pushed(state, supply)
+            state, supply = self._set_out(state, still, supply, step)
             self._check_held(state, supply, step)
         return _Point(state, rate, supply, self.momenta.at(state, supply.u)[0])
+
+    def _set_out(self, state: State, rate: np.ndarray, supply: Supply, step: float) -> tuple[State, Supply]:
+        """Return a state in which what has no mass moves as its forces say, and the inputs there."""
+        if not self.light.seen(state, supply, step, np.inf):
+            return state, supply
+        state, supply = self.light.pushed(state, supply)
+        state = self.light.moving(state, rate, supply, step)[0]
+        return state, self.feed.restart(state, supply)
 
     def _check_held(self, state: State, supply: Supply, step: float) -> None:
         """Raise SingularMatrixError where nothing holds a freedom over a step, neither mass nor stiffness."""
@@ -178,7 +186,7 @@ class _Stepper:
         """Return the point under other inputs: momenta do not jump."""
         state, supply = settled(self.model, point.state, self.feed, supply)
         if self.massless:
-            state, supply = self.light.pushed(state, supply)
+            state, supply = self._set_out(state, point.rate, supply, step)
         rate = point.rate if self.massless else self.masses.accelerations(state, supply.u, point.rate)
         return _Point(state, rate, supply, point.momenta)
 
@@ -256,7 +264,8 @@ class _Stepper:
                 self.counts.worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part bend"
             )
         if self.massless:
-            state = self.light.pushed(state, self.feed.at(state, point.supply, h))[0]
+            supply = self.feed.at(state, point.supply, h)
+            state = self._set_out(state, 2.0 * (state.v - mean) / h, supply, h)[0]
         else:
             state = state.with_(v=self.masses.solve(lambda v: self.momenta.of(state, v) - momenta, state, state.v))
         return _Point(state, 2.0 * (state.v - mean) / h, self.feed.at(state, point.supply, h), momenta)

@@ -166,11 +166,12 @@ def followed(c: float, until: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("c", [0.1, 0.0], ids=["friction", "stiffness alone"])
-def test_under_a_continuous_controller_it_sets_out_as_its_forces_say(c):
+@pytest.mark.parametrize("method", [fc.GeneralizedAlpha, fc.ConservingMidpoint])
+def test_under_a_continuous_controller_it_moves_as_its_forces_say(method, c):
     model, exact = machine(fc.ViscousFriction({"drive": c}) if c else fc.Gravity()), followed(c, 0.5)
-    runs = [fc.simulate(model, Following(), until=0.5, method=fc.GeneralizedAlpha(h)) for h in (2e-3, 1e-3)]
+    runs = [fc.simulate(model, Following(), until=0.5, method=method(h)) for h in (2e-3, 1e-3)]
     first = [0.0, (Following.P * 1.0) / c, 0.0] if c else [1 / 6, 5.0 * (5 / 6) / Following.T / 60.0, 0.0]
     assert runs[0].y[0] == pytest.approx(first, rel=1e-6, abs=1e-12)
     errors = [np.abs(run.y[-1] - exact) for run in runs]
-    assert (errors[0] <= [2e-4, 2e-4, 1e-4]).all()
+    assert (errors[0] <= [2e-4, 5e-4, 1e-4]).all()
     assert errors[0] / errors[1] == pytest.approx([4.0] * 3, rel=0.05)
