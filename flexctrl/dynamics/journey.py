@@ -35,6 +35,7 @@ __all__ = ["Journey", "Plan"]
 
 _NEAR = 1e-9
 _CHATTER = 20
+_TOGETHER = 1e-7
 _FORESEEN = 20_000
 
 
@@ -404,11 +405,13 @@ class Journey:
         after, landing = landed(self, before, after, landing)
         switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
         brief = 0 <= switch < len(watch.names) and is_brief(self, before, after, slid, switch)
-        self._note(earlier, curve, before)
+        there = [c for c in crossings if c.gauge != landing.gauge and self._is_there(c, before, after, slid)]
+        self._note([c for c in earlier if c not in there], curve, before)
         watch.settle(after)
-        watch.cross(landing)
-        if not 0 <= switch < len(watch.names):
-            self._tell(landing, after.state, after.supply.u)
+        for c in sorted((*there, landing), key=lambda c: c.gauge):
+            watch.cross(c)
+            if not 0 <= c.gauge - len(watch.events) < len(watch.names):
+                self._tell(replace(c, t=landing.t), after.state, after.supply.u)
         if end := watch.last_word(landing.gauge):
             self.status, self.message = Status.STOPPED, f"{end} at t = {landing.t:.6g} s"
             return after, None
@@ -417,6 +420,16 @@ class Journey:
         if switch >= len(watch.names):
             return after, landing
         return self._switched(after, landing, switch, brief), None
+
+    def _is_there(self, crossing: Crossing, before: Point, after: Point, slid: Point) -> bool:
+        """Tell whether an event asked for, seen in a step, happens just where that ends now that it is cut short."""
+        watch, t, whole = self.watch, before.state.t, slid.state.t - before.state.t
+        if crossing.gauge >= len(watch.events):
+            return False
+        if after.state.t == t:
+            return crossing.t - t <= _TOGETHER * whole
+        off = watch.offset(self.track.curve(before, after), before, after, crossing.gauge)
+        return abs(off) <= _TOGETHER * whole
 
     def _switched(self, at: Point, landing: Crossing, switch: int, brief: bool) -> Point:
         """Go on under the law of force that holds from now on; note whether the contact slides under it."""

@@ -1,0 +1,54 @@
+"""Events at one instant are all told, whichever of them ends the run."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import permutations
+
+import pytest
+
+import flexctrl as fc
+
+METHODS = {
+    "chosen": fc.AdaptiveAlpha(),
+    "even": fc.GeneralizedAlpha(1e-2),
+    "explicit": fc.ExplicitRungeKutta(),
+    "extrapolated": fc.Richardson(fc.GeneralizedAlpha(1e-2)),
+}
+LOG, STOP = fc.Event("log", "z", 5.0), fc.Event("stop", "z", 5.0, terminal=True)
+HALT = fc.Event("halt", lambda s: 2.0 * s["z"] - 10.0, terminal=True)
+EARLY, LATE = fc.Event("early", "z", 5.001), fc.Event("late", "z", 4.999)
+
+
+@cache
+def falling(backend: str) -> fc.Model:
+    mass = fc.PointMass("mass", (0, 0, 10), 1.0)
+    machine = fc.Structure([mass], [fc.Support(mass.node, "u v")], outputs=[fc.Position("z", mass.node, "z")])
+    return fc.assemble(machine, [fc.Gravity()], {"compiled": None, "plain": fc.CasadiVM()}[backend])
+
+
+def fallen(events, method, backend="compiled", start=None) -> fc.Run:
+    return fc.simulate(falling(backend), until=2.0, method=METHODS[method], events=events, start=start)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("backend", ["compiled", "plain"])
+def test_all_events_at_the_end_are_told(method, backend):
+    run = fallen([LATE, STOP, EARLY, LOG, HALT], method, backend)
+    assert run.status is fc.Status.STOPPED
+    assert [e.name for e in run.events] == ["early", "stop", "log", "halt"]
+    assert {e.t for e in run.events[1:]} == {run.t[-1]}
+    assert run["z"][-1] == pytest.approx(5.0, abs=1e-8)
+
+
+def test_their_order_is_that_of_the_list():
+    for events in permutations([LOG, STOP, HALT]):
+        assert [e.name for e in fallen(events, "chosen").events] == [e.name for e in events]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_run_that_goes_on_tells_none_of_them_again(method):
+    events = [LATE, STOP, LOG, HALT, EARLY]
+    rest = fallen(events, method, start=fallen(events, method).checkpoint)
+    assert [e.name for e in rest.events] == ["late"]
+    assert rest.status is fc.Status.FINISHED
