@@ -5,15 +5,12 @@ from __future__ import annotations
 from flexctrl.cli.answer import Answer, plain, write_json
 from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
-from flexctrl.errors import SceneError
 from flexctrl.scene import load_scene
 from flexctrl.study.work_precision import WorkPrecision, work_precision
 
 
 def answer(request: Request) -> Answer:
     """Try many settings on a scene."""
-    if not request.tolerance > 0.0:
-        raise SceneError(f"--tolerance {request.tolerance}: expected a relative error > 0, e.g. 0.01")
     scene = load_scene(request.scene)
     store = None if request.out is None else request.out / "cost.jsonl"
     with progress(f"{scene.name}: cost") as tell:

@@ -5,15 +5,12 @@ from __future__ import annotations
 from flexctrl.cli.answer import Answer, plain, write_json
 from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
-from flexctrl.errors import SceneError
 from flexctrl.scene import load_scene
 from flexctrl.study.ladder import Ladder, ladder
 
 
 def answer(request: Request) -> Answer:
     """Run a scene at every fidelity."""
-    if not request.tolerance > 0.0:
-        raise SceneError(f"--tolerance {request.tolerance}: expected a relative error > 0, e.g. 0.01")
     scene = load_scene(request.scene)
     with progress(f"{scene.name}: ladder") as tell:
         study = ladder(scene, tolerance=request.tolerance, progress=tell)

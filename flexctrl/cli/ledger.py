@@ -8,7 +8,6 @@ from flexctrl.cli.answer import Answer, plain, write_json
 from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
 from flexctrl.effects.automatic import Within
-from flexctrl.errors import SceneError
 from flexctrl.scene import load_scene
 from flexctrl.study.bookkeeping import ledger
 from flexctrl.study.ledger import Entry, Ledger
@@ -16,8 +15,6 @@ from flexctrl.study.ledger import Entry, Ledger
 
 def answer(request: Request) -> Answer:
     """Leave every effect out in turn."""
-    if not request.tolerance > 0.0:
-        raise SceneError(f"--tolerance {request.tolerance}: expected a relative change > 0, e.g. 0.01")
     scene = load_scene(request.scene)
     asked = Within(outputs=request.tolerance) if request.outputs_only else Within.of(request.tolerance, "ledger")
     with progress(f"{scene.name}: ledger") as tell:

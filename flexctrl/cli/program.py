@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import math
 import re
 import sys
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import flexctrl
-from flexctrl.errors import FlexctrlError, MechanismError, did_you_mean
+from flexctrl.errors import FlexctrlError, MechanismError, SceneError, did_you_mean
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -138,6 +139,10 @@ class Request:
     tolerance: float = 0.01
     outputs_only: bool = False
     workers: int | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < math.inf:
+            raise SceneError(f"--tolerance {self.tolerance}: expected a relative change > 0, e.g. 0.01")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

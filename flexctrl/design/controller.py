@@ -352,6 +352,8 @@ def _from_object(candidate: Any) -> Controller:
     if all(hasattr(candidate, name) for name in _PARTS):  # what isinstance asks, ten times quicker
         return cast(Controller, candidate)
     missing = [m for m in ("inputs", "outputs", "initial", "command") if not hasattr(candidate, m)]
+    if missing and hasattr(candidate, "build"):
+        raise ControllerError(f"a {type(candidate).__name__} is no controller yet; give the scene's law, scene.law")
     if missing:
         raise ControllerError(
             f"a {type(candidate).__name__} is no controller, it has no {', '.join(missing)}; give a named "

@@ -91,6 +91,8 @@ class RotatingFrame(Effect):
         """Centrifugal potential of the offset."""
         import casadi as ca
 
+        if not any(self.rate):
+            return ca.SX(1, 1)
         return -m.p["mass"] * ca.dot(self._pull(middle), m.frame @ offset(m))
 
     def _pull(self, x: ca.SX) -> ca.SX:

@@ -154,9 +154,14 @@ class Comparison:
         Raises
         ------
         StructureError
-            If their signals differ.
+            If their signals differ, or there are none.
         """
         known = (*rigid.outputs, *rigid.inputs)
+        if not known and not flexible.outputs:
+            raise StructureError(
+                "compare: the machine has no outputs and no inputs, and nothing to compare; give some, as "
+                "outputs=[Position('tip_z', beam.end, 'z')]"
+            )
         names = [name for name in (*flexible.outputs, *flexible.inputs) if name in known]
         seen = bool(rigid.outputs) or not flexible.outputs
         if flexible.inputs != rigid.inputs or set(names) != set(known) or not seen:

@@ -15,7 +15,7 @@ from flexctrl.model.model import Model
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
-__all__ = ["Subject", "planned", "prepared"]
+__all__ = ["Subject", "check_outputs", "planned", "prepared"]
 
 _ROWS = 1000
 
@@ -82,12 +82,33 @@ def prepared(scene: Subject, tolerance: float, study: str) -> Subject:
     Raises
     ------
     StructureError
-        For a tolerance that is not positive, what is no scene, or a scene without a simulation.
+        For a tolerance that is not positive, what is no scene, or a scene without a simulation or outputs.
     """
     check_finite(tolerance, "tolerance (relative, as 0.01)", study, above=0.0)
     plan = planned(scene, study)
+    check_outputs(scene.structure, study)
     every = plan.every or plan.until / _ROWS
     return scene.with_(controller=scene.law, simulation=replace(plan, every=every, rigid_twin=False))
+
+
+def check_outputs(structure: Structure, study: str) -> None:
+    """Refuse a machine that nothing is measured on.
+
+    Parameters
+    ----------
+    structure : Structure
+    study : str
+        Who asks, for the message.
+
+    Raises
+    ------
+    StructureError
+    """
+    if not structure.outputs:
+        raise StructureError(
+            f"{study}: {structure.name or 'the machine'} has no outputs, and nothing to judge by; give some, as "
+            "outputs=[Position('tip_z', beam.end, 'z')]"
+        )
 
 
 def planned(scene: Subject, study: str) -> Any:
