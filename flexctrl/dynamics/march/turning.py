@@ -30,7 +30,7 @@ _LEAD, _LEAD_MOST, _LEAD_FAR = 1e-8, 1e-7, 1e-4
 _ROUND_OFF = 8.0 * 2.0**-52
 _SLOPE, _TRIES = 1e-2, 9
 _NUDGES, _LEAST = 8, 1e-9
-_SHARE = 1e-4
+_SHARE, _CLEAR = 1e-4, 1e-3
 _FIRM = 1e30
 """What holds freedoms of first order, over what stands for their mass."""
 
@@ -202,7 +202,10 @@ def short_of(m: March, guess: float, h: float) -> bool:
             back = 4.0 * back
             at = at + on - back
         at = inside(low, high, ahead, behind, at, count + 1)
-    return best > 0.0 and towards(m, best) and m.h == best and distance(m) > dust
+    if not (best > 0.0 and towards(m, best)):
+        return False
+    c.when += best - m.h
+    return distance(m) > dust
 
 
 @seldom
@@ -376,7 +379,14 @@ def at_rest_in(m: March) -> None:
 def firm(m: March) -> bool:
     """Factorise the forces that answer accelerations over a step, in the place of the tangent; tell if that can be."""
     f = m.flat
+    clear(f.padded, f.rate)
+    if m.probes.groups > 0:  # differences are not to reach back over the corner
+        for i in range(0, f.padded, 8):
+            put(f.step[i:], _CLEAR * m.h * eight(m.v[i:]))
+    at_rest_in(m)
     sloped(m, 1.0, m.gamma / (m.beta * m.h), 1.0 / (m.beta * m.h * m.h))
+    clear(f.padded, f.step)
+    copy(f.padded, m.rate, f.rate)
     for k in range(m.flows.count):
         m.entries[m.flows.cells[k]] = -_FIRM * m.flows.mass
     where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
