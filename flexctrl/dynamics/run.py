@@ -33,7 +33,10 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Accuracy asked of an error-controlled run.
+    """Accuracy asked of an error-controlled run: of each of its steps.
+
+    Their errors may all go one way and add up: a top that sways for 10 s in 1,200 steps under the default is 0.17 rad
+    off. Each tenth of the tolerance leaves about a fifth of that; `Richardson` and `ExplicitRungeKutta` leave far less.
 
     Parameters
     ----------
