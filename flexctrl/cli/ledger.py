@@ -46,7 +46,15 @@ def _data(found: Ledger) -> dict[str, object]:
             "effects": [_entry(e) for e in found.entries],
             "minimal_set": found.minimal_set,
             "minimal": minimal,
-            "full": {"states": found.size.states, "nonzeros": found.size.nonzeros, "steps": found.size.steps},
+            "full": {
+                "states": found.size.states,
+                "nonzeros": found.size.nonzeros,
+                "steps": found.size.steps,
+                "error": found.accuracy.own,
+                "judged_steps": found.accuracy.steps,
+                "judged_error": found.accuracy.known,
+            },
+            "notes": found.notes,
         }
     )
 

@@ -25,7 +25,9 @@ def ledger(
 ) -> Ledger:
     """Draw up the ledger of a scene.
 
-    Every effect is left out in turn and the scene run again. What keeps the answer (outputs, poles of the closed
+    Every effect is left out in turn and the scene run again. The full run is held against one with shorter steps; if
+    they are apart by more than a third of what is borne, finer runs are compared (times are those of the scene's own).
+    What keeps the answer (outputs, poles of the closed
     loop, margins) within ``tolerance`` is a candidate to go; candidates are left out together, as many as the answer
     bears, and every other effect is tried once more on top of that, one by one. Nothing goes whose absence makes the
     run dearer, counted or by the clock, and no way to give that saves nothing: beams that are stiffer keep their
@@ -86,6 +88,7 @@ class _Auditor:
             speedup,
             minimal.size,
             self._noise,
+            self.bench.accuracy,
             minimal.scene,
         )
 

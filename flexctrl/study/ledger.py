@@ -10,6 +10,7 @@ import numpy as np
 from flexctrl.dynamics.exact import Exact
 from flexctrl.effects.automatic import Within
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.study.accuracy import Accuracy
 from flexctrl.study.answers import Answer, Change
 from flexctrl.study.subject import Subject
 
@@ -94,6 +95,7 @@ class Ledger:
     entries : tuple of Entry
         In the scene's order.
     full : Answer
+        From a run that is finer than the scene's own where that is not accurate enough to judge changes by.
     size : Size
         Of the full scene.
     minimal : Answer
@@ -105,6 +107,8 @@ class Ledger:
     minimal_size : Size
     noise : float
         Relative spread of the times of the full scene, run several times: smaller differences of times say nothing.
+    accuracy : Accuracy
+        How well the outputs of the full run are known.
     scene : Scene
         The scene with the minimal set.
     """
@@ -119,6 +123,7 @@ class Ledger:
     speedup: float
     minimal_size: Size
     noise: float
+    accuracy: Accuracy
     scene: Subject = field(repr=False)
 
     @property
@@ -143,6 +148,11 @@ class Ledger:
         if self.modes is None:
             return "; linear: integrated exactly"
         return f"; linear: integrated exactly, free motion and {self.modes} vibration{'s' * (self.modes != 1)}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What stands against the numbers."""
+        return (self.accuracy.note,) if self.accuracy.note else ()
 
     @property
     def minimal_set(self) -> tuple[str, ...]:
@@ -172,12 +182,13 @@ class Ledger:
         lines = [f"{'without':<{wide}}" + "".join(f"  {head:>{_width(head)}}" for head in heads)]
         lines += [self._line(e, wide) for e in self.entries]
         lines.append(f"time: of a run without it over that of the full scene, known to {_percent(self.noise)}")
+        lines.append(str(self.accuracy))
         kept = ", ".join(self.minimal_set) or "nothing"
         size = f"{self.minimal_size.states} of {self.size.states} states"
         lines += [f"kept: {kept}", f"{self.changes} (asked: {self.within}), {self.pace}, {size}{self._way}"]
         if all(e.keep for e in self.entries):
             lines.append("the full set: no smaller one keeps the answer and is as fast")
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
     @property
     def changes(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from time import thread_time
 
@@ -14,6 +14,7 @@ from flexctrl.dynamics.run import Run, Status
 from flexctrl.effects.automatic import Within
 from flexctrl.errors import FlexctrlError
 from flexctrl.model.model import Model
+from flexctrl.study.accuracy import accurate
 from flexctrl.study.answers import Answer, answer_of, change_between, outputs_apart
 from flexctrl.study.exactly import exactly, fewer_modes
 from flexctrl.study.ledger import Size
@@ -40,6 +41,8 @@ class Trial:
     times : list of float
         Processor times [s]; the first may have compiled.
     model : Model
+    judged : Run
+        What is compared: the run, or a finer one of the same scene.
     whole : Trial or None
         The same machine with all its modes; it has the same poles and margins.
     """
@@ -48,14 +51,15 @@ class Trial:
     run: Run
     times: list[float]
     model: Model = field(repr=False)
+    judged: Run
     whole: Trial | None = None
 
     @cached_property
     def answer(self) -> Answer:
         """Curves, poles and margins."""
         if self.whole is not None:
-            return Answer(self.run, self.whole.answer.poles, self.whole.answer.margins)
-        return answer_of(self.scene, self.run)
+            return replace(self.whole.answer, run=self.judged)
+        return answer_of(self.scene, self.judged)
 
     @cached_property
     def size(self) -> Size:
@@ -113,7 +117,9 @@ class Bench:
 
     def __init__(self, scene: Subject, within: Within, tick: Callable[[], None]) -> None:
         self.within, self.tick = within, tick
-        self.full = self._tried(scene)
+        own = _ran(scene, scene.model)
+        self.accuracy, judged = accurate(scene, own.model, own.run, within.outputs)
+        self.full = replace(own, judged=judged)
         self.plain: dict[frozenset[str], Trial | Refused] = {frozenset(): self.full}
         self.quick: dict[tuple[frozenset[str], bool], Trial | None] = {}
 
@@ -150,7 +156,7 @@ class Bench:
 
     def excess(self, trial: Trial) -> float:
         """Return the largest change over what is borne; infinite at once if outputs alone are beyond it."""
-        outputs = max(outputs_apart(self.full.run, trial.run).values(), default=0.0)
+        outputs = max(outputs_apart(self.full.judged, trial.judged).values(), default=0.0)
         if outputs > self.within.outputs:
             return np.inf
         change = change_between(self.full.answer, trial.answer)
@@ -197,19 +203,26 @@ class Bench:
             return None
         for fewer in fewer_modes(exact):
             run, taken = timed(fewer, fewer.model)  # of its own, whose equilibrium is found once
-            trial = Trial(fewer, run, [taken], fewer.model, whole)
+            trial = Trial(fewer, run, [taken], fewer.model, run, whole)
             if run.status is Status.FINISHED and self.excess(trial) <= 1.0:
                 return trial
         return whole
 
     def _tried(self, scene: Subject) -> Trial:
-        model = scene.model
-        run, taken = timed(scene, model)
-        if run.status is Status.INTERRUPTED:
-            raise KeyboardInterrupt
-        if run.status is not Status.FINISHED:
-            raise FlexctrlError(f"the run ended early: {run.report.message}")
-        return Trial(scene, run, [taken], model)
+        """A scene's own run, and one as fine as the full one is judged by if it is integrated alike."""
+        found = _ran(scene, scene.model)
+        if not self.accuracy.refinements or scene.simulation != self.full.scene.simulation:
+            return found
+        return replace(found, judged=_ran(self.accuracy.of(scene), found.model).run)
+
+
+def _ran(scene: Subject, model: Model) -> Trial:
+    run, taken = timed(scene, model)
+    if run.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    if run.status is not Status.FINISHED:
+        raise FlexctrlError(f"the run ended early: {run.report.message}")
+    return Trial(scene, run, [taken], model, run)
 
 
 def timed(scene: Subject, model: Model) -> tuple[Run, float]:
