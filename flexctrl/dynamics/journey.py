@@ -156,6 +156,8 @@ class Journey:
                 continue
             self.go(stop, self.plan.until)
             self._pause()
+            if apart := self.plan.model.apart(self.point.state):
+                raise StepError(self.stepper.counts.worst, f"{apart} (t = {self.point.state.t:.6g} s)")
             if self.books.overflown:
                 where = f"at t = {self.point.state.t:.6g} s; look at the commands and at the start"
                 raise StepError(self.stepper.counts.worst, f"energies are beyond all numbers {where}")

@@ -232,6 +232,10 @@ class LinearPlant:
         """Return the state a step further."""
         return State(state.x, state.R, state.q + step, v, state.driven, t)
 
+    def apart(self, state: State) -> str:
+        """There are no joints."""
+        return ""
+
     def rates(self, state: State) -> np.ndarray:
         """Return the rates."""
         return state.v

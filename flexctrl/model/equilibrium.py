@@ -127,7 +127,7 @@ def equilibrium(
     ------
     EquilibriumError
         If none is found: with the residual, the worst freedom by name, what to try, and the best
-        state reached.
+        state reached. So it is where rigid parts that were drawn in line would come apart.
     StructureError
         For an unknown coordinate or input, or something that is no model.
     """
@@ -167,6 +167,8 @@ def rest_of(balance: Balance, found: Found) -> Rest:
     outputs = dict(zip(model.outputs, model.measure(found.state).tolist(), strict=True))
     held = tuple(model.coordinates[i] for i in balance.held)
     residual = min(found.residual, balance.beyond_noise(found.state))
+    if apart := model.apart(found.state):
+        raise EquilibriumError(f"no equilibrium found: {apart}", found.state, residual)
     return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held)
 
 

@@ -51,8 +51,8 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     MechanismError
         If something moves that has neither mass nor stiffness.
     LinearizationError
-        If the state is not an equilibrium (says by how much and where), another point of the
-        certificate fails, or nothing in the machine can move or is left free to.
+        If the state is not an equilibrium (says by how much and where), rigid parts drawn in line have come
+        apart there, another point of the certificate fails, or nothing in the machine can move or is left free to.
     EquilibriumError
         If none was given and none is found.
     """
@@ -69,6 +69,8 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     rest = equilibrium(model, inputs=inputs) if at is None else at
     state = (rest.state if isinstance(rest, Rest) else rest).loose
     check_state(model, state, "linearize: at")
+    if apart := model.apart(state):
+        raise LinearizationError(f"linearize: {apart}")
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
     free = _free(model, rest)
     if not free.size:

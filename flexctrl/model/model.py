@@ -368,6 +368,20 @@ class Model:
         """
         return self.equations.advance(state, step, v, t)
 
+    def apart(self, state: State) -> str:
+        """Say which joint of rigid parts has come apart, as one in line does where they move far.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        str
+            By how much, and what helps; empty if none has.
+        """
+        return self.motion.apart(state) if self.large else ""
+
     def rates(self, state: State) -> np.ndarray:
         """Return the raw rates of a state: velocities and spins of all nodes, then the speeds of the motors.
 

@@ -22,7 +22,7 @@ from flexctrl.model.linkages.linkage import Linkage, reciprocal_condition
 from flexctrl.model.linkages.twists import Twists
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Drive, RotaryDrive
-from flexctrl.structure.relations import Track
+from flexctrl.structure.relations import Fit, Track
 
 DENSE_UP_TO = 60
 """Degrees of freedom up to which matrices are worked as plain arrays."""
@@ -31,6 +31,9 @@ _DEAD = 200.0
 _FULL = 0.1
 _UNEXPLAINED = 5.0
 _BRANCHES = 1e-9
+
+APART = 1e-6
+"""How far what is only watched may be open: round-off is less, even where loops have just branched."""
 
 FAST = 0.5
 """Steps of freedoms above which driven angles may turn by more than half a turn [rad]."""
@@ -64,6 +67,8 @@ class Motion:
         Number of each inner freedom's degree of freedom; ``n`` for those that have only a phase.
     effects : tuple of Inner
         What the inner freedoms are.
+    spare : tuple of str
+        What the linkage only watches, in words.
     twists : Twists
         The angles that outputs show.
     """
@@ -81,6 +86,7 @@ class Motion:
     twists: Twists
     inner: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     effects: tuple[Inner, ...] = ()
+    spare: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:
@@ -395,10 +401,31 @@ class Motion:
         return bool((back & (change > most) & (change > explained)).any())
 
     def closure_error(self, state: State) -> float:
-        """Return how far the conditions that close rigid loops are violated [rad, or shares of what they span]."""
+        """Return how far conditions on rigid parts are open, watched ones too [rad, or shares of what they span]."""
         if not self.linkage.loops:
-            return 0.0
-        return float(np.abs(self.linkage.gaps(self._pose(state.x, state.R))).max())
+            return self._apart(state)[0]
+        return max(float(np.abs(self.linkage.gaps(self._pose(state.x, state.R))).max()), self._apart(state)[0])
+
+    def apart(self, state: State) -> str:
+        """Say which joint of rigid parts has come apart, held by nothing but their lengths; empty if none has."""
+        gap, which = self._apart(state)
+        if gap <= APART:
+            return ""
+        loop = self.linkage.spare[which]
+        turns = loop.axis is not None if isinstance(loop, Fit) else loop.freedom >= 3
+        size = f"{gap:.3g} rad" if turns else f"{gap * self.linkage.span:.3g} m"
+        return (
+            f"{self.spare[which]} has come apart by {size}: as drawn, in line, rigid parts hold it to first order "
+            "only. Draw them off that line, leave one of them flexible (BeamFlexibility, RopeStretch), or free the end "
+            "along it"
+        )
+
+    def _apart(self, state: State) -> tuple[float, int]:
+        """How far the worst of the conditions that are only watched is open, and which one it is."""
+        if not self.linkage.spare:
+            return 0.0, 0
+        gaps = np.abs(self.linkage.play(self._pose(state.x, state.R)))
+        return float(gaps.max()), int(gaps.argmax())
 
 
 def _select(numbers: np.ndarray, n: int) -> sp.csr_matrix:

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexctrl.kernels.kernel import Kernel
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.flat.flat import Flat, clear, drive
 from flexctrl.model.flat.layout import Flattened
 from flexctrl.model.laws.kinds import NODE_SLOT
+from flexctrl.model.motion import APART
 
 __all__ = ["Closing", "closing_of", "in_doubt", "settled"]
 
@@ -30,49 +32,65 @@ class Closing:
 
     Attributes
     ----------
-    loops, free, rates : int
-        Loops; freedoms of the linkage that do not follow from others; raw rates.
+    looks, loops, spare, free, rates : int
+        All conditions; those that close loops; those only watched; freedoms of the linkage that do not follow from
+        others; raw rates.
     look : Runs
         The kernel of the gaps of the loops, and how fast they open with the freedoms, by columns.
     found, work : Reals
         What it finds; room for the elimination.
+    watch : Runs
+        The kernel of the gaps of what is only watched.
+    gaps : Reals
+        What it finds.
     cells : Wholes
         The raw rates in the workspace.
     speeds : Reals
         Their values at the start of the step.
-    most : float
-        How far a loop may be open [rad, or shares of what it spans].
+    most, play : float
+        How far a loop may be open, and what is only watched [rad, or shares of what it spans].
     open : float
         How far any has been.
     """
 
-    LASTING = ("loops",)
+    LASTING = ("looks", "loops", "spare")
 
+    looks: int
     loops: int
+    spare: int
     free: int
     rates: int
     look: Runs
     found: Reals
     work: Reals
+    watch: Runs
+    gaps: Reals
     cells: Wholes
     speeds: Reals
     most: float
+    play: float
     open: float = 0.0
 
 
 def closing_of(F: Flattened) -> Closing:
     """Return the loops of a model."""
     motion, base = F.model.motion, F.model.motion.linkage
-    loops, free = len(base.loops) if F.model.large else 0, base.free
-    if not loops or base.idle:
-        empty, none = np.zeros(0), np.zeros(0, dtype=int)
-        return Closing(0, 0, 0, (), empty, empty, none, empty, 0.0)
-    pose = (NODE_SLOT * motion.nodes[:, None] + np.arange(12)).ravel()
-    found = np.zeros(loops * (1 + free + loops))
-    look = F.model.backend.bind(base.gauge, pose[None], np.zeros((1, 0)), np.arange(found.size)[None])
-    cells = (NODE_SLOT * motion.nodes[:, None] + 12 + np.arange(6)).ravel()
-    work = np.zeros(loops * (free + loops))
-    return Closing(loops, free, cells.size, (look,), found, work, cells, np.zeros(cells.size), _OPEN)
+    loops = len(base.loops) if F.model.large and not base.idle else 0
+    spare, free = len(base.spare) if F.model.large else 0, base.free if loops else 0
+    nodes = NODE_SLOT * motion.nodes[:, None]
+    pose = (nodes + np.arange(12)).ravel()[None]
+    cells = (nodes + 12 + np.arange(6)).ravel() if loops else np.zeros(0, dtype=int)
+    found, gaps = np.zeros(loops * (1 + free + loops)), np.zeros(spare)
+
+    def bound(kernel: Kernel, size: int) -> Runs:
+        return (F.model.backend.bind(kernel, pose, np.zeros((1, 0)), np.arange(size)[None]),)
+
+    look = bound(base.gauge, found.size) if loops else ()
+    watch = bound(base.playing, spare) if spare else ()
+    work, speeds = np.zeros(loops * (free + loops)), np.zeros(cells.size)
+    return Closing(
+        loops + spare, loops, spare, free, cells.size, look, found, work, watch, gaps, cells, speeds, _OPEN, APART
+    )
 
 
 @seldom
@@ -85,7 +103,11 @@ def settled(c: Closing, f: Flat) -> None:
 
 @seldom
 def in_doubt(c: Closing, f: Flat, h: float) -> bool:
-    """Tell whether a loop may be at a dead point after the step under way, or is not closed; take up its rates."""
+    """Tell whether a loop may be at a dead point after the step under way, or something is open; take up its rates."""
+    if c.spare > 0 and comes_apart(c, f):
+        return True
+    if c.loops == 0:
+        return False
     clear(c.loops * (1 + c.free + c.loops), c.found)
     c.look[0](f.z, c.found)
     for i in range(c.loops):
@@ -99,6 +121,18 @@ def in_doubt(c: Closing, f: Flat, h: float) -> bool:
     for i in range(c.rates):
         c.speeds[i] = f.z[c.cells[i]]
     return doubt
+
+
+@seldom
+def comes_apart(c: Closing, f: Flat) -> bool:
+    """Tell whether something that is only watched is open after the step under way."""
+    clear(c.spare, c.gaps)
+    c.watch[0](f.z, c.gaps)
+    for i in range(c.spare):
+        if not abs(c.gaps[i]) <= c.play:
+            return True
+        c.open = max(c.open, abs(c.gaps[i]))
+    return False
 
 
 @seldom

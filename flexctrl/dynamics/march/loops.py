@@ -162,7 +162,7 @@ def fixed(m: March) -> int:
             if m.leaping == 1:
                 back(m)
             return turn_corner(m, m.h)
-        if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
+        if m.closing.looks > 0 and in_doubt(m.closing, m.flat, m.h):
             return CORNER
         if m.contacts.count > 0 and lets_go(m):
             return CORNER
@@ -227,7 +227,7 @@ def controlled(m: March) -> int:
         if m.watching == 1 and passes(m.corners, m.flat):
             status = turn_corner(m, grown)
             return unmarched(m) if status == CORNER else status
-        if m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h):
+        if m.closing.looks > 0 and in_doubt(m.closing, m.flat, m.h):
             return unmarched(m)
         if m.contacts.count > 0 and lets_go(m):
             return unmarched(m)

@@ -73,7 +73,7 @@ def in_the_way(m: March) -> bool:
     """Tell whether something other than a corner may happen over the step under way."""
     if comes_through(m.corners, m.flat):
         return True
-    return m.closing.loops > 0 and in_doubt(m.closing, m.flat, m.h)
+    return m.closing.looks > 0 and in_doubt(m.closing, m.flat, m.h)
 
 
 # -- where

@@ -105,7 +105,8 @@ class Chart:
         Raises
         ------
         ChartError
-            About a full turn away from the reference (half a turn for a rigid rope).
+            About a full turn away from the reference (half a turn for a rigid rope), or where rigid parts that were
+            drawn in line come apart.
         """
         if not self.model.large:
             return self.model.advance(self.reference, xi, v, t)
@@ -113,6 +114,8 @@ class Chart:
         moved = self.motion.advance(self.reference, xi, xi, t)
         for _ in range(_CLOSINGS if self.motion.linkage.loops else 0):
             moved = self.motion.advance(moved, np.zeros_like(xi), xi, t)
+        if apart := self.motion.apart(moved):
+            raise ChartError(apart)
         driven = self.motion.unwound(moved.x, moved.R, self.reference.driven + self._turning @ xi)
         return State(moved.x, moved.R, moved.q[: self.model.n], v, driven, t, moved.dry, moved.shown)
 

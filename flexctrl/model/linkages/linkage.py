@@ -177,7 +177,17 @@ class Linkage(OpenLinkage):
     @cached_property
     def gaps(self) -> Callable[..., np.ndarray]:
         """Pose → how far loops are open [rad, or shares of the span]."""
-        return _callable("gaps", [self._pose], self._gaps(self._pose))
+        return _callable("gaps", [self._pose], self._gaps(self._pose, self.loops))
+
+    @cached_property
+    def play(self) -> Callable[..., np.ndarray]:
+        """Pose → how far conditions are open that are only watched [rad, or shares of the span]."""
+        return _callable("play", [self._pose], self._gaps(self._pose, self.spare))
+
+    @cached_property
+    def playing(self) -> Kernel:
+        """`play` as a kernel of one item."""
+        return _kernel("play", [self._pose], self._gaps(self._pose, self.spare))
 
     @cached_property
     def gauge(self) -> Kernel:
@@ -185,7 +195,7 @@ class Linkage(OpenLinkage):
         import casadi as ca
 
         slopes = ca.vec(ca.densify(ca.horzcat(*self._loop_slopes(self._pose))))
-        return _kernel("loops", [self._pose], ca.vertcat(self._gaps(self._pose), slopes))
+        return _kernel("loops", [self._pose], ca.vertcat(self._gaps(self._pose, self.loops), slopes))
 
     def _moved(self, d: ca.SX) -> ca.SX:
         """Return the pose after a small raw motion of the nodes, shape (6, count), to first order."""
@@ -313,7 +323,8 @@ class Linkage(OpenLinkage):
             return self._open_place(old, ca.vertcat(step, dependent))
         _, within = self._loop_slopes(ca.reshape(self._open_place(old, ca.vertcat(step, dependent)), 12, self.count))
         for _ in range(_CLOSING):
-            dependent = dependent - ca.solve(within, self._gaps(self._open_place(old, ca.vertcat(step, dependent))))
+            reached = self._open_place(old, ca.vertcat(step, dependent))
+            dependent = dependent - ca.solve(within, self._gaps(reached, self.loops))
         return self._open_place(old, ca.vertcat(step, dependent))
 
 

@@ -25,6 +25,12 @@ from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import tie
 
 _INDEPENDENT = 1e-9
+_PROBE, _OPENS = 1e-4, 1e-5
+_HARMLESS = "it is one condition too many, which is harmless: where they can move they do not open it"
+_LOCKS = (
+    "it is left free to second order, as parts in line are: a run or an equilibrium that opens it fails. Draw them off "
+    "that line, leave one flexible, or free the end along it"
+)
 
 
 def motion_of(
@@ -57,7 +63,7 @@ def motion_of(
         If rigid parts are asked of a machine that is tied by a table of numbers.
     """
     ties = _ties(structure, rigid)
-    open_loop = _motion(structure, ties, elastic, inner, backend, _Loops((), (), ()))
+    open_loop = _motion(structure, ties, elastic, inner, backend, _Loops())
     if not ties.closures:
         return open_loop
     return _motion(structure, ties, elastic, inner, backend, _loops(structure, open_loop, ties))
@@ -77,11 +83,12 @@ def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
 
 @dataclass(frozen=True)
 class _Loops:
-    """Independent closures, the degrees of freedom that depend on the others through them, and what to say of it."""
+    """Independent closures, the degrees of freedom that depend on others through them, closures left out, and notes."""
 
-    closures: tuple[Closure | Fit, ...]
-    dependent: tuple[int, ...]
-    notes: tuple[str, ...]
+    closures: tuple[Closure | Fit, ...] = ()
+    dependent: tuple[int, ...] = ()
+    spare: tuple[Closure | Fit, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def _motion(
@@ -123,6 +130,7 @@ def _motion(
         twists=twists,
         inner=number[np.array([next(last) if i.name else len(names) for i in inner], dtype=int)],
         effects=inner,
+        spare=tuple(_label(structure, c) for c in loops.spare),
     )
 
 
@@ -135,7 +143,7 @@ def _linkage(
     used = {n for f in ties.follows for n in _involved(f)} | {n for n, _ in ties.lines}
     used |= {n for pair in sides for n in pair}
     used |= set(np.flatnonzero(np.isin(place, loops.dependent).any(axis=1)).tolist())
-    used |= {n for c in loops.closures for n in _sides(c) if n >= 0}
+    used |= {n for c in (*loops.closures, *loops.spare) for n in _sides(c) if n >= 0}
     nodes = sorted(used)
     local = {n: i for i, n in enumerate(nodes)}
     owns = {f.own - 1 for f in ties.follows if isinstance(f, Ride | Turn) and f.own}
@@ -154,6 +162,7 @@ def _linkage(
         ),
         loops=tuple(_local(c, local) for c in loops.closures),
         free=len(independent),
+        spare=tuple(_local(c, local) for c in loops.spare),
     )
     return linkage, np.array(nodes, dtype=int), np.array(independent, dtype=int)
 
@@ -213,16 +222,31 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
     kept = np.abs(rows).max(axis=1, initial=0.0) + np.abs(turned).max(axis=1, initial=0.0) > 0.0
     chosen = _independent(rows.T, _INDEPENDENT)
     dependent = _independent(rows[chosen], _INDEPENDENT)
+    spare = [i for i in range(len(rows)) if kept[i] and i not in chosen]
+    opens = _opens(motion, ties.closures, rows, chosen)
     labels = [_label(structure, c) for c in ties.closures]
-    notes = [
-        f"{label} is held by rigid parts already; it is left free to second order"
-        for i, label in enumerate(labels)
-        if kept[i] and i not in chosen
-    ]
+    notes = [f"{labels[i]} is held by rigid parts already; {_LOCKS if opens[i] else _HARMLESS}" for i in spare]
     if chosen:
         tied = ", ".join(motion.names[i] for i in dependent)
         notes.append(f"{tied} given by the others through " + ", ".join(labels[i] for i in chosen))
-    return _Loops(tuple(ties.closures[i] for i in chosen), tuple(dependent), tuple(notes))
+    closures, left = ([ties.closures[i] for i in some] for some in (chosen, spare))
+    return _Loops(tuple(closures), tuple(dependent), tuple(left), tuple(notes))
+
+
+def _opens(motion: Motion, closures: tuple[Closure | Fit, ...], rows: np.ndarray, chosen: list[int]) -> np.ndarray:
+    """Tell which closures open to second order as the machine moves, the chosen ones closed.
+
+    With J q̇ = 0 and J_s = Λ J at rest, gap_s'' = (J_s' − Λ J') q̇: what the accelerations do cancels.
+    """
+    J = rows[chosen]
+    way = np.cos(1.0 + np.arange(motion.n))
+    way = way - np.linalg.lstsq(J, J @ way, rcond=_INDEPENDENT)[0] if chosen else way
+    unit = np.where([name.endswith(TURNS) for name in motion.names], 1.0, span_of(motion.rest.x))
+    ahead, behind = (motion.advance(motion.rest, s * _PROBE * unit * way, motion.rest.v, 0.0) for s in (1.0, -1.0))
+    change = (_openings(motion, ahead, closures) - _openings(motion, behind, closures)) * unit @ way / (2.0 * _PROBE)
+    if chosen:
+        change = change - np.linalg.lstsq(J.T, rows.T, rcond=_INDEPENDENT)[0].T @ change[chosen]
+    return np.abs(change) > _OPENS
 
 
 def _openings(motion: Motion, state: State, closures: tuple[Closure | Fit, ...]) -> np.ndarray:

@@ -83,6 +83,8 @@ class OpenLinkage:
         Independent conditions.
     free : int
         Independent freedoms.
+    spare : tuple of Loop or Fit
+        Conditions that say nothing more where the machine is drawn: they are watched, not met.
     """
 
     cells: np.ndarray
@@ -92,6 +94,7 @@ class OpenLinkage:
     links: tuple[Link, ...]
     loops: tuple[Loop | Fit, ...]
     free: int
+    spare: tuple[Loop | Fit, ...] = ()
 
     @property
     def count(self) -> int:
@@ -187,12 +190,12 @@ class OpenLinkage:
             return v, mw
         return ca.vertcat(*[mv[k] if k == f.freedom else v[k] for k in range(3)]), w
 
-    def _gaps(self, pose: ca.SX) -> ca.SX:
-        """Return how far loops are open [rad, or shares of the span]."""
+    def _gaps(self, pose: ca.SX, conditions: Sequence[Loop | Fit]) -> ca.SX:
+        """Return how far conditions are open [rad, or shares of the span]."""
         import casadi as ca
 
         shaped = ca.reshape(pose, 12, self.count)
-        return ca.vertcat(*[self._gap(loop, shaped) / self._yardstick(loop) for loop in self.loops])
+        return ca.vertcat(*[self._gap(c, shaped) / self._yardstick(c) for c in conditions])
 
     def _yardstick(self, loop: Loop | Fit) -> float:
         turns = loop.axis is not None if isinstance(loop, Fit) else loop.freedom >= 3
