@@ -208,13 +208,14 @@ class Books:
         """What is to be said of lines so stiff that the last digits of places are felt in a motion that is seen."""
         if not self.lawful:
             return ()
-        unsure, size = noise(self.model), self.model.structure.size
-        if unsure * size <= _FELT * self.sums.turnover or not self._seen:
+        unsure, gone = noise(self.model), float((self.sums.moved / self.reach).max(initial=0.0))
+        way = self.model.structure.size * min(gone, 1.0)
+        if unsure * way <= _FELT * self.sums.turnover or not self._seen:
             return ()
         name, stiffness = stiffest(self.model)
         return (
             f"{name} is so stiff ({stiffness:.3g} N/m) that the last digits of places make forces of {unsure:.2g} N in "
-            f"it, beside about {self.sums.turnover / size:.2g} N that move the machine: its tension is no better than "
+            f"it, beside about {self.sums.turnover / way:.2g} N that move the machine: its tension is no better than "
             "that, nor whether it is slack; make it softer, or rigid",
         )
 

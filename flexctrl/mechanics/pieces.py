@@ -83,7 +83,7 @@ def unilateral(m: LineMotion, pull: ca.SX) -> ca.SX:
     """
     import casadi as ca
 
-    slight = 1e-12 * m.p["length"]
+    slight = 1e-14 * m.p["length"]
     return ca.if_else(m.length > m.p["length"] - slight, ca.fmax(pull, -slight * m.p["stiffness"]), 0.0)
 
 

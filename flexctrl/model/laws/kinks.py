@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Kinks"]
 
 _ROUND_OFF = 1e-12
+_DIGITS = 16.0 * float(np.finfo(float).eps)
 _BESIDE = 0.05
 _TINY = 1e-300
 
@@ -109,7 +110,7 @@ class Kinks:
     def _winch(self, i: int, d: Winch) -> list[Turn]:
         """Where a rope that stretches goes slack, and where there is hardly any left."""
         least, dust = d.shortest - d.length, _ROUND_OFF * d.length
-        slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, dust)
+        slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, _DIGITS * (d.length + self._reach))
         return [slack, Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, _down(d))]
 
     @cached_property
@@ -172,9 +173,14 @@ class Kinks:
 
     @cached_property
     def dust(self) -> np.ndarray:
-        """Values below these are zero but for round-off."""
+        """Values below these are zero but for round-off: a stiff rope that is taut by more bears a load."""
         longest = [_ROUND_OFF * track.places[-1] for track in self.model.structure.tracks for _ in range(2)]
-        return np.concatenate([_ROUND_OFF * self.lines[1], [turn.dust for turn in self._turns], longest])
+        return np.concatenate([_DIGITS * (self.lines[1] + self._reach), [turn.dust for turn in self._turns], longest])
+
+    @cached_property
+    def _reach(self) -> float:
+        """How far from the origin places are [m]."""
+        return float(np.abs(self.model.rest.x).max(initial=0.0))
 
     def values(self, state: State, before: State) -> np.ndarray:
         """Return what changes its sign at the corners: stretch of ropes, strains from flanks, rope or rail left.
@@ -228,9 +234,14 @@ class Kinks:
         tuple of str
             Each part with what to do about it. Empty where all laws of force have a derivative.
         """
-        on = np.flatnonzero(np.abs(self.values(state, state)) <= self.dust)
+        on = np.flatnonzero(np.abs(self.values(state, state)) <= np.maximum(self.dust, self._near))
         moved = np.concatenate([self._leaving(state, free), np.ones(len(self._turns), dtype=bool), self._rolling(free)])
         return tuple(dict.fromkeys(self._words(i) for i in on.tolist() if moved[i]))
+
+    @property
+    def _near(self) -> np.ndarray:
+        """Values below these are zero for all that an equilibrium tells."""
+        return np.concatenate([_ROUND_OFF * self.lines[1], np.zeros(len(self._turns) + len(self._rails))])
 
     def _rolling(self, free: np.ndarray) -> np.ndarray:
         """Whether each trolley can travel with some coordinates."""
