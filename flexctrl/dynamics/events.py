@@ -273,6 +273,10 @@ class Watch:
         """What counts as zero of events of some sizes."""
         return _DUST * sizes
 
+    def dust_of(self, size: float) -> float:
+        """What counts as zero of an event of a size."""
+        return _DUST * size
+
     def switched(self) -> None:
         """Note that every switching law of force holds."""
         first = len(self.events)

@@ -261,7 +261,7 @@ class Journey:
             self.point = self.stepper.renew(held, fresh, self.mark.size)
             self.books.jump(held, self.point)
         if not self.watch.idle and not np.array_equal(fresh.u, before.u):
-            self._leapt()
+            self.leapt()
         self.rows.here(self.point, 1e-6 * self.mark.size)
 
     def under(self, u: np.ndarray) -> State:
@@ -273,7 +273,7 @@ class Journey:
             self._tell(Crossing(state.t, len(self.watch.events) + int(switch), True), state, u)
         return torn
 
-    def _leapt(self) -> None:
+    def leapt(self) -> None:
         """Note the events that a jump of the inputs has brought about; one of them may end the run."""
         watch, point = self.watch, self.point
         for crossing in watch.leaps(point):

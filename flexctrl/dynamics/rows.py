@@ -93,10 +93,9 @@ class Rows:
             Whether inputs are about to jump at the end of the last one.
         """
         times, every = table[:, 0], self.every
-        assert every is not None
         weaver.times(times)
         near = _NEAR * np.diff(times, prepend=weaver.t) + _ROUND_OFF * times
-        due = every * np.arange(self.count, int((times[-1] + near[-1]) / every) + 2)
+        due = times if every is None else every * np.arange(self.count, int((times[-1] + near[-1]) / every) + 2)
         due = due[due <= times[-1] + near[-1]]
         steps = np.searchsorted(times + near, due)
         ends = np.abs(times[steps] - due) <= near[steps]

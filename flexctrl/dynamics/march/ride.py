@@ -20,6 +20,7 @@ from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.foresight import calm_steps
 from flexctrl.dynamics.march.law import Sampling
 from flexctrl.dynamics.march.legs import Held, Leg, Legs, Opened, Told, same
+from flexctrl.dynamics.march.lookout import Lookout
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT, TURN, TURNED
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
@@ -55,7 +56,7 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
     stepper, plan = journey.stepper, journey.plan
     if not isinstance(stepper, MarchingStepper):
         return False
-    if journey.watch.events and _near_stop(journey):
+    if journey.watch.events and _near_stop(journey) and (most is not None or not _looked_out(journey)):
         return False
     if plan.feed.sample_time and weightless(plan.model).size:
         return False
@@ -65,6 +66,11 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
 def _near_stop(journey: Journey) -> bool:
     """Tell whether there are so few steps to the next stop that events are better looked for in each of them."""
     return journey.stops.next - journey.point.state.t < _FEWEST * journey.mark.size
+
+
+def _looked_out(journey: Journey) -> bool:
+    """Tell whether events can be looked for from sample to sample of a controller."""
+    return bool(journey.plan.feed.sample_time) and not isinstance(journey.stepper, Dense)
 
 
 class Begun(NamedTuple):
@@ -96,11 +102,14 @@ class _Ride:
         self.marcher.go_on(sums)
         self.marcher.watch(j.watch.corner_sides, j.point.state)
         self.marcher.follow(j.mark)
-        self.marcher.keep(not self._on_steps, *j.rows.due())
+        guarded = bool(j.watch.events) and most is None and _looked_out(j)
+        self.marcher.keep(guarded or not self._on_steps, *j.rows.due())
         self.weaver: Weaver | None = None
         if self.marcher.march.keeping and not isinstance(stepper, Dense):
             self.weaver = self.marcher.weaver
             self.weaver.set_out(j.point.state)
+        self.lookout = Lookout(j.watch, self.weaver, j.point.state) if guarded and self.weaver is not None else None
+        self.near = self.leapt = False
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
@@ -113,12 +122,13 @@ class _Ride:
         well = True
         while well and m.t < self.until - self.tick:
             stop = self.journey.stops.next
-            if not self.wary and stop - m.t <= self.tick:  # not the clock's business: samples are taken here
+            # samples are not the clock's business: they are taken here
+            if (self.lookout is not None or not self.wary) and stop - m.t <= self.tick:
                 well = self._renew(stop)
                 continue
             if self.legs.parts and time.perf_counter() >= deadline:
                 break
-            if self.wary or self.most:
+            if self.lookout is None and (self.wary or self.most):
                 well = stop - m.t > self.tick and self._leg(stop)
                 break
             if self._lowered(stop):
@@ -126,6 +136,8 @@ class _Ride:
             elif self._even(stop):
                 well = self._samples(deadline)
             else:
+                well = self._leg(stop)
+            if self.near and not self.legs.parts:  # up to the very step
                 well = self._leg(stop)
         some = self._end()
         if self.faults:
@@ -135,15 +147,35 @@ class _Ride:
     def _leg(self, stop: float) -> bool:
         """Go on towards a stop; tell whether all is well."""
         t = self.marcher.march.t
-        pacing, count = self._paced(t, stop, _FAR * self.until if self.wary else self.until)
+        far = self.wary and self.lookout is None
+        pacing, count = self._paced(t, stop, _FAR * self.until if far else self.until)
         if not count:
             return False
-        status, done = self._wary(pacing, count) if self.wary else self.marcher.travel(pacing, self._limited(count))
+        status, done = self._travel(pacing, count)
         if isinstance(pacing, Pacing):
             self.journey.mark.size = self.marcher.march.size
         if done:
             self._passed(Leg(self.supply, t, pacing, done), stop)
         return self._well(status) and done > 0
+
+    def _travel(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
+        """Take steps; return how they ended, and how many there were."""
+        if self.lookout is not None:
+            return self._guarded(self.lookout, pacing, count)
+        return self._wary(pacing, count) if self.wary else self.marcher.travel(pacing, self._limited(count))
+
+    def _guarded(self, lookout: Lookout, pacing: float | Pacing, count: int) -> tuple[int, int]:
+        """Take steps up to the first one in which an event may happen, whatever there is beyond that."""
+        begun, u = self._begun(), self.supply.u
+        status, done = self.marcher.travel(pacing, count)
+        if done < _FEWEST and lookout.passes(0, done, begun.point.state.t, self.marcher.rows, u.tolist()):
+            return status, done
+        calm, _ = lookout.calm(self.marcher.rows[:done], np.tile(u, (done + 1, 1)))
+        if calm < done:
+            self._back(begun)
+            status, done = _EVENT, self.marcher.travel(pacing, calm)[1] if calm else 0
+        lookout.pass_by(self.marcher.rows[:done], np.tile(u, (done + 1, 1)))
+        return status, done
 
     def _limited(self, count: int) -> int:
         return count if self.most is None else min(count, self.most)
@@ -242,18 +274,47 @@ class _Ride:
                 law.first, law.samples = sampling.ahead(stops.passed, self.until)
             sampling.state[:] = self.supply.x
             began = time.perf_counter()
-            status = marcher.sampled(pacing and pacing._replace(size=mark.size))
+            status = self._asked(law, sampling, pacing and pacing._replace(size=mark.size))
             took = max(time.perf_counter() - began, 1e-9)
             wanted = max(1, int(wanted * min(_MORE, _SHARE * _SECONDS / took)))
             done = m.done
             self._enter_told(law, sampling, pacing)
-            if mark.left or time.perf_counter() >= deadline:
+            if mark.left or self.lookout is not None or time.perf_counter() >= deadline:
                 break
         self.mute = status == SILENT
         if m.jumping:
             self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
             m.jumping = 0
-        return self.mute or (self._well(status) and self.jumped and done > 0)
+        return self.mute or (self._well(status) and self.jumped and done > 0 and not self.near)
+
+    def _asked(self, law: Packed, sampling: Sampling, pacing: Pacing | None) -> int:
+        """Go from sample to sample, no farther than where the leg starts in which an event may happen."""
+        if self.lookout is None:
+            return self.marcher.sampled(pacing)
+        watch, begun, m = self.journey.watch, self._begun(), self.marcher.march
+        law.wanted = min(watch.span, law.room)
+        status = self.marcher.sampled(pacing)
+        table, inputs = self._looked_at(law)
+        calm, jump = self.lookout.calm(table, inputs)
+        width = 3 + law.inputs + law.states
+        ends = np.cumsum(law.told[: law.legs * width].reshape(law.legs, width)[:, 2])
+        legs = int(np.searchsorted(ends, min(calm, jump), "right"))
+        self.near = calm < len(table) or jump <= len(table)
+        self.leapt = bool(legs) and int(ends[legs - 1]) == jump
+        watch.span = max(_FEWEST, 2 * legs) if self.near else min(_WIDEST, 2 * watch.span)
+        if legs < law.legs or calm < len(table):
+            self._back(begun)
+            law.passed, law.legs, law.wanted, law.away = self.journey.stops.passed, 0, legs, 0
+            sampling.state[:], m.jumping, m.done, m.kept = self.supply.x, 0, 0, 0
+            status = self.marcher.sampled(pacing) if legs else DONE
+        self.lookout.pass_by(*self._looked_at(law))
+        return status
+
+    def _looked_at(self, law: Packed) -> tuple[np.ndarray, np.ndarray]:
+        """Rows after steps under a law in the loops; inputs before and after each of them."""
+        done, inputs = self.marcher.march.done, law.inputs
+        commands = law.rows[: done * inputs].reshape(done, inputs)
+        return self.marcher.rows[:done], np.vstack([self.supply.u, commands])
 
     def _enter_told(self, law: Packed, sampling: Sampling, pacing: Pacing | None) -> None:
         """Enter samples in marks and rows."""
@@ -297,6 +358,7 @@ class _Ride:
         clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.readings
         held, first = Held(self.supply.rate, []), self.supply.u
         t, h, u, x, done, status = clock[0], mark.size, self.supply.u.tolist(), self.supply.x, 0, DONE
+        begun, lookout = None if self.lookout is None else self._begun(), self.lookout
         marcher.begin()
         while True:
             stop = (stops.passed + 1) * sample
@@ -307,6 +369,10 @@ class _Ride:
             h, start = (stop - t) / count, done
             status = marcher.on(h, wanted)
             done = steps[0]
+            if lookout is not None and not lookout.passes(start, done, t, marcher.rows, u):
+                assert begun is not None
+                self.near, status, done = True, self._again(begun, held, u), start
+                break
             if done > start:
                 held.samples.append((t, h, done - start, u, x))
             if status != DONE or done < wanted or stop >= nearly:
@@ -322,8 +388,12 @@ class _Ride:
                 break
             if u != before:
                 marcher.jumps(u)
+            if lookout is not None and lookout.leaps(marcher.rows[done - 1], u):
+                self.near = self.leapt = True
+                break
             if time.perf_counter() >= deadline:
                 break
+        h = held.samples[-1][1] if self.near and held.samples else mark.size if self.near else h
         mark.size, self.supply = h, Supply(np.array(u), x, held.rate)
         return self._sampled(held, first, done, status)
 
@@ -338,7 +408,28 @@ class _Ride:
             self.jumped = status == DONE and marcher.jump(self.supply.u) == DONE
             m.jumping = 0
             mark.left = 0
-        return self._well(status) and self.jumped and not self.faults
+        return self._well(status) and self.jumped and not self.faults and not self.near
+
+    def _again(self, begun: Begun, held: Held, u: list[float]) -> int:
+        """Take the steps of samples again, up to where others inputs ``u`` are in force; return how that ended."""
+        marcher, wanted, status, now = self.marcher, 0, DONE, self.supply.u.tolist()
+        self._back(begun)
+        marcher.march.jumping = 0
+        marcher.begin()
+        for t, h, steps, told, _ in held.samples:
+            if wanted:
+                marcher.clock[0] = marcher.times[wanted - 1] = t
+            if told != now:
+                marcher.jumps(told)
+            wanted, now = wanted + steps, told
+            status = marcher.on(h, wanted)
+            if status != DONE:
+                return status
+        if wanted:
+            marcher.clock[0] = marcher.times[wanted - 1] = self.journey.stops.passed * self.journey.stops.sample
+        if u != now:
+            marcher.jumps(u)
+        return status
 
     def _paced(self, t: float, stop: float, until: float) -> tuple[float | Pacing, int]:
         """How steps are taken from here, and how many at most."""
@@ -392,7 +483,8 @@ class _Ride:
         elif written and abs(self.last.t - stop) < self.tick:
             j.rows.frame(self.last)
         self.jumped = same(u, before.u) or self.marcher.jump(u) == DONE
-        return self.jumped
+        self.leapt = self.lookout is not None and self.lookout.leaps(self.marcher.rows[m.done - 1], u.tolist())
+        return self.jumped and not self.leapt
 
     def _end(self) -> bool:
         """Hand over to the journey; tell whether there were any steps."""
@@ -407,10 +499,12 @@ class _Ride:
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)
-        if not j.watch.idle:
+        if not j.watch.idle and not self.leapt:
             j.watch.settle(j.point)
         if self.turn is not None:
             j.point = beyond(j, j.point, self.turn)
+        if self.leapt:
+            j.leapt()
         if not self.jumped:
             held = replace(j.point, state=j.under(self.supply.u))
             j.point = self.stepper.plain.renew(held, self.supply, j.mark.size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -43,6 +44,7 @@ class Weaver:
         self.columns = 1 + len(model.outputs)
         self.weave = Packed(_woven(self.flattened, chart, spare, places, kept, self.width))
         self._run = self.weave.bound(weave)
+        self._wanted = self.weave.cell("wanted")
 
     def set_out(self, state: State) -> None:
         """Take up the state that the next steps start from."""
@@ -93,6 +95,14 @@ class Weaver:
                     Later(len(table), float(table[-1, -1]), partial(states_of, self.flattened, table, self.dry))
                 )
         return found, drawn
+
+    def reading(self, step: int, t: float) -> list[float]:
+        """Return the outputs at an instant within a step; no state is due for drawing."""
+        w = self.weave
+        w.steps[0], w.times[0], w.ends[0], self._wanted[0] = step, t, 0, 1
+        w.due = math.inf
+        self._run()
+        return w.rows[1 : self.columns].tolist()
 
     def times(self, times: np.ndarray) -> None:
         """Put right when the steps of the last call end, where a clock has been set."""
