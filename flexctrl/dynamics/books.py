@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flexctrl.dynamics.dense import Booked, Curve
+from flexctrl.dynamics.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.local import Local
 from flexctrl.dynamics.march.record import OFTEN
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
@@ -23,10 +24,11 @@ _ABSURD, _UNRESOLVED, _DOUBTFUL = 0.5, 0.2, 0.05
 _MOSTLY = 0.9
 _VISIBLE = 1e-3
 _FELT = 3e-3
-_SLIGHT = 10.0
+_SLIGHT, _RESTING = 10.0, 1e-2
 _ROUND_OFF = 1e-6
 _LOBATTO = ((0.5 * (1.0 - (3.0 / 7.0) ** 0.5), 49.0 / 180.0), (0.5, 64.0 / 180.0))
 _ENDS = 1.0 / 20.0
+_OVERSHOT = 2.0
 
 
 @dataclass
@@ -138,12 +140,20 @@ class Books:
             return
         t, h = before.state.t, after.state.t - before.state.t
         first, last = self._powers(before.state, before.supply.u), self._powers(after.state, after.supply.u)
-        total = _ENDS * (first + last)
-        for share, weight in (*_LOBATTO, (1.0 - _LOBATTO[0][0], _LOBATTO[0][1])):
-            state = curve.at(t + share * h)
-            total = total + weight * self._powers(
-                state, self.feed.between(before.supply, after.supply, (share, h), state).u
-            )
+
+        def within(share: float, state: State) -> np.ndarray:
+            return self._powers(state, self.feed.between(before.supply, after.supply, (share, h), state).u)
+
+        def mean(curve: Curve) -> np.ndarray:
+            inner = (*_LOBATTO, (1.0 - _LOBATTO[0][0], _LOBATTO[0][1]))
+            return sum((w * within(share, curve.at(t + share * h)) for share, w in inner), _ENDS * (first + last))
+
+        total = mean(curve)
+        if total[1] > _OVERSHOT * 0.5 * (
+            first[1] + last[1]
+        ):  # a polynomial swings where it does not resolve the damping
+            calm = Hermite(Local(self.model), before.state, after.state)
+            total = within(0.5, calm.secant()) if total[1] > _OVERSHOT * mean(calm)[1] else total
         self.sums.work += h * float(total[0])
         self.sums.lost += h * float(total[1])
         self.sums.power = float(last[1])
@@ -244,5 +254,6 @@ class Books:
 
     @property
     def residual(self) -> float:
-        """The largest gap over the largest energy turned over."""
-        return self.sums.gap / self.sums.turnover if self.sums.turnover > 0.0 else 0.0
+        """The largest gap over the largest energy turned over; 0 where nothing moves by a tenth of the tolerance."""
+        resting = (self.sums.moved < _RESTING * self.slight).all()
+        return self.sums.gap / self.sums.turnover if self.sums.turnover > 0.0 and not resting else 0.0

@@ -70,6 +70,12 @@ class Hermite:
         rate = (first + s * (2.0 * bend + s * 3.0 * twist))[: len(turning)] / h
         return self.local.place(self.start, place, rate + s * s * turning, t)
 
+    def secant(self) -> State:
+        """Return the middle of the step with its mean rates, which noise in the rates at its ends does not touch."""
+        h = self.end.t - self.start.t
+        middle = self.at(self.start.t + 0.5 * h)
+        return middle.with_(v=self._ends[0][: len(middle.v)] / h)
+
 
 @runtime_checkable
 class Booked(Protocol):
