@@ -23,6 +23,9 @@ __all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs
 
 _SLOW = 6  # poles that are compared, each with any of twice as many
 _SURELY, _PARTED, _LOOKS = 1e-6, 30.0, 3
+_TURN = 0.01
+"""By how much a pole must turn or decay over the run not to count as at the origin: |s| times its length."""
+_GROWS = 1e-6  # of a pole's magnitude; of an undamped one rounding leaves less
 _ROUNDING = 1e-12  # of the machine's size; thousands of roundings
 
 
@@ -63,13 +66,17 @@ class Answer:
     run : Run
     poles : numpy.ndarray of complex
         Poles off the origin with Im ≥ 0 [1/s], the slowest first, of the closed loop if the scene has a linear law.
+        One that turns or decays by less than 0.01 over the run is not told from one at the origin.
     margins : mapping of str to (float, float)
         Gain margin (factor) and phase margin [rad] at each commanded input, the loop cut there.
+    growing : complex
+        The pole that grows fastest [1/s]; 0 if none does.
     """
 
     run: Run
     poles: np.ndarray
     margins: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    growing: complex = 0j
 
 
 @dataclass(frozen=True)
@@ -113,13 +120,11 @@ def answer_of(scene: Subject, run: Run) -> Answer:
     -------
     Answer
     """
-    law = _linear_law(scene)
+    law, seconds = _linear_law(scene), float(run.t[-1] - run.t[0])
     try:
-        if law is None:
-            return Answer(run, _slow(scene.linear.damped_poles()))
-        return Answer(
-            run, _slow(_closed(scene.linear, law)), {name: _margins(scene, law, name) for name in law.outputs}
-        )
+        poles = _moving(scene.linear.damped_poles() if law is None else _closed(scene.linear, law), seconds)
+        cuts = {} if law is None else {name: _margins(scene, law, name) for name in law.outputs}
+        return Answer(run, poles[: 2 * _SLOW], cuts, _growing(poles))
     except FlexctrlError:  # no equilibrium, say: the curves still count
         return Answer(run, np.zeros(0, complex))
 
@@ -152,8 +157,8 @@ def _closed(linear: LinearModel, law: LinearController) -> np.ndarray:
     return np.concatenate([np.array(closed, complex), np.linalg.eigvals(plant.A[np.ix_(others, others)])])
 
 
-def _slow(poles: np.ndarray) -> np.ndarray:
-    """The poles that are neither at rest nor the lower half of a pair, the slowest first.
+def _moving(poles: np.ndarray, seconds: float = np.inf) -> np.ndarray:
+    """The poles that are neither at rest over so long a run nor the lower half of a pair, the slowest first.
 
     Rounding ε parts two poles at rest by about √(ε |s|max |s|), |s| of the slowest poles that move.
     """
@@ -163,8 +168,13 @@ def _slow(poles: np.ndarray) -> np.ndarray:
     for _ in range(_LOOKS):  # a slower pole that moves sets the limit lower
         slowest = float(size[size > rest].min(initial=fastest))
         rest = min(rest, _PARTED * np.sqrt(np.finfo(float).eps * fastest * slowest))
-    moving = poles[(size > rest) & (poles.imag >= 0.0)]
-    return moving[np.argsort(np.abs(moving))][: 2 * _SLOW]
+    moving = poles[(size > max(rest, _TURN / seconds)) & (poles.imag >= 0.0)]
+    return moving[np.argsort(np.abs(moving))]
+
+
+def _growing(poles: np.ndarray) -> complex:
+    growing = poles[poles.real > _GROWS * np.abs(poles)]
+    return complex(growing[growing.real.argmax()]) if growing.size else 0j
 
 
 def _margins(scene: Subject, law: LinearController, name: str) -> tuple[float, float]:

@@ -152,7 +152,15 @@ class Ledger:
     @property
     def notes(self) -> tuple[str, ...]:
         """What stands against the numbers."""
-        return (self.accuracy.note,) if self.accuracy.note else ()
+        return tuple(note for note in (self.accuracy.note, self._instability) if note)
+
+    @property
+    def _instability(self) -> str:
+        pole = self.full.growing
+        if not pole:
+            return ""
+        what, then = ("closed loop", ", so margins say nothing of it") if self.full.margins else ("machine", "")
+        return f"the {what} of the full scene is unstable: its pole at {pole:.3g} 1/s grows{then}"
 
     @property
     def minimal_set(self) -> tuple[str, ...]:

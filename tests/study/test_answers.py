@@ -1,13 +1,16 @@
 """How far two answers are apart: what is real counts, what rounding leaves does not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
 import flexctrl as fc
-from flexctrl.study.answers import Curves, _slow, outputs_apart
+from flexctrl.study.answers import Curves, _growing, _moving, answer_of, outputs_apart
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def sideways(push: float, *, linear: bool = False) -> fc.Run:
@@ -75,6 +78,22 @@ def test_slow_poles_of_stiff_machines_are_seen_and_poles_at_rest_are_not(fastest
         [[0.0, 1.0], [0.0, 0.0]], [[-0.01]], [[0.0, 10.0], [-10.0, -1.0]], [[0.0, fastest], [-fastest, -1.0]]
     )
     turned = np.linalg.qr(np.random.default_rng(5).normal(size=A.shape))[0]
-    poles = _slow(np.linalg.eigvals(turned @ A @ turned.T))
+    poles = _moving(np.linalg.eigvals(turned @ A @ turned.T))
     assert len(poles) == 3
     assert np.abs(poles[0] + 0.01) < 1e-3
+
+
+def test_poles_that_a_run_cannot_tell_from_free_motion_are_at_the_origin():
+    """A round girder spins freely; the mesh turns it back in an hour, which a run of 0.05 s does not see."""
+    scene = fc.load_scene(str(EXAMPLES / "ceiling_crane.toml"))
+    poles = scene.linear.damped_poles()
+    spin = np.abs(poles[np.abs(poles) > 1e-4]).min()
+    assert spin < 0.01  # a period of ten minutes and more
+    assert np.abs(_moving(poles, 3600.0)[0]) == pytest.approx(spin)
+    answer = answer_of(scene, scene.with_(simulation=replace(scene.simulation, rigid_twin=False)).run())
+    assert np.abs(answer.poles[0]) == pytest.approx(2.18, rel=0.01)  # the links sway
+
+
+def test_the_pole_that_grows_is_told():
+    assert _growing(np.array([-1 + 3j, 0.2 + 5j, 0.1 + 0j])) == 0.2 + 5j
+    assert _growing(np.array([1e-12 + 3j, -1.0 + 0j])) == 0.0

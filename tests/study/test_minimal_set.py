@@ -83,6 +83,20 @@ def test_it_is_not_slower_and_is_what_it_says(scene, whole, curves):
         assert found.minimal_size.work <= found.size.work
 
 
+@pytest.mark.parametrize(("kd", "unstable"), [(2.0, False), (-0.5, True)])
+def test_an_unstable_loop_is_noted(kd, unstable):
+    """A servo that damps, and one that feeds the swing of the shaft."""
+    law = fc.Sampled(
+        fc.design.pid(3.0, 0.0, kd, measured="phi", rate=fc.design.FilteredRate(0.02), command="torque"), 0.002
+    )
+    scene = rotor().with_(controller=law, simulation=fc.Simulation(until=0.05, every=0.01))
+    found = fc.ledger(scene, fc.Within(margins=0.5))
+    notes = [note for note in found.notes if "unstable" in note]
+    assert len(notes) == unstable
+    assert (found.full.growing.real > 0.0) == unstable
+    assert ("margins say nothing" in str(found)) == unstable
+
+
 @pytest.mark.slow
 def test_what_went_with_others_is_not_called_kept():
     """A hoist that nothing balances: small motion about an equilibrium cannot be tried, as if unloaded it can."""
