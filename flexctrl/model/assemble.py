@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -32,6 +33,9 @@ from flexctrl.structure.relations import Group
 from flexctrl.structure.structure import Structure
 from flexctrl.structure.trolleys import Trolley
 
+_SAME = 1e-6
+"""Shares of its length to which a rope may be drawn at another: digits that drawings leave out."""
+
 
 def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend | None = None) -> Model:
     """Put a structure under some effects.
@@ -42,7 +46,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     effects : sequence of Effect
         What the scene asks for, e.g. ``[Gravity(), Flexible(), LargeRotation()]``. What no effect
         bends is rigid; an effect left out costs nothing. The tension of a rigid rope is not an output
-        of the model (`Model.notes` says so).
+        of the model, and one drawn stretched keeps the distance drawn (`Model.notes` says so).
     backend : Backend, optional
         How the kernels run; default: compiled if the extra ``[fast]`` is installed.
 
@@ -53,11 +57,14 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     Raises
     ------
     StructureError
-        For something that is no effect, an effect given twice, or effects that make no sense together.
+        For something that is no effect, an effect given twice, effects that make no sense together, or a rope that is
+        drawn slack and does not stretch.
     """
     if not isinstance(structure, Structure):
         raise StructureError(f"assemble: {shortened(structure)} is no Structure; give Structure(elements=…, joints=…)")
     parts = checked_effects(structure, effects)
+    ropes = [p for p in structure.elements if isinstance(p, Rope) and not any(e.bends(p) for e in parts)]
+    stretched = tuple(note for rope in ropes if (note := _drawn(rope)))
     structure, parts = _heavy(structure, parts)
     _check_trolleys(structure, parts)
     if any(isinstance(e, GeometricStiffness) for e in parts):
@@ -78,6 +85,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
         motion,
         notes=motion.notes
         + left_out
+        + stretched
         + idle_gusts(structure, parts)
         + tuple(note for e in parts for note in e.left_out(structure, parts)),
     )
@@ -128,6 +136,23 @@ def _check_trolleys(structure: Structure, parts: tuple[Effect, ...]) -> None:
                     f"assemble: Trolley {trolley.name!r} rolls on the cubics of its rail's elements; ComponentModes "
                     f"bends {beam.name!r} otherwise: name other beams in of=, or give the rail more elements"
                 )
+
+
+def _drawn(rope: Rope) -> str:
+    """Say at what length a rope is kept that does not stretch; refuse one that is drawn slack."""
+    drawn = math.dist(rope.start.position, rope.end.position)
+    if abs(rope.length - drawn) <= _SAME * drawn:
+        return ""
+    if rope.length > drawn:
+        raise StructureError(
+            f"assemble: rope {rope.name!r} is {rope.length:g} m long, but drawn over {drawn:g} m, slack, and one that "
+            "does not stretch is a rod between its ends: add RopeStretch() (rigid twins have none), or draw it over "
+            "all its length"
+        )
+    return (
+        f"rope {rope.name} is drawn over {drawn:.6g} m, stretched from {rope.length:.6g} m: without RopeStretch it "
+        "keeps the distance drawn"
+    )
 
 
 def _heavy(structure: Structure, parts: tuple[Effect, ...]) -> tuple[Structure, tuple[Effect, ...]]:

@@ -24,7 +24,8 @@ class Rope:
     EA : float
         Axial stiffness [N], > 0.
     length : float, optional
-        Unstretched length ℓ₀ [m]; default: the distance of the ends.
+        Unstretched length ℓ₀ [m]; default: the distance of the ends. Without `RopeStretch` these keep their distance
+        as drawn, which may then not be shorter than ℓ₀.
     damping : float
         Axial damping [N s/m], ≥ 0, acting while the rope is taut.
     rhoA : float

@@ -156,3 +156,23 @@ def test_a_rope_without_mass_per_length_is_named():
     [note] = model.notes
     assert "mass of rope light is left out" in note
     assert "rhoA=…" in note
+
+
+@pytest.mark.parametrize("effects", [[LARGE, HEAVY], [LARGE], [HEAVY], []], ids=["large", "bare", "small", "none"])
+def test_a_rope_drawn_slack_is_refused_where_it_does_not_stretch(effects):
+    rope = fc.Rope("sling", (0, 0, 0), (100, 0, 0), EA=1.0, length=110.0, rhoA=5.0, elements=20)
+    structure = fc.Structure([rope], [fc.Support(rope.start), fc.Support(rope.end)])
+    with pytest.raises(StructureError, match="rope 'sling' is 110 m long, but drawn over 100 m, slack"):
+        fc.assemble(structure, [fc.Gravity(), *effects], fc.CasadiVM())
+    fc.assemble(structure, [fc.Gravity(), *effects, fc.RopeStretch()], fc.CasadiVM())
+
+
+def test_a_rope_drawn_stretched_says_that_it_keeps_the_distance_drawn():
+    """Small oscillations with the period of the drawn length, 1 m, not of the unstretched one, 0.9 m."""
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -1), EA=1e4, length=0.9)
+    load = fc.PointMass("load", rope.end, 2.0)
+    structure = fc.Structure([rope, load], [fc.Support(rope.start), fc.Pin(rope.end, load.node)])
+    model = fc.assemble(structure, [LARGE, fc.Gravity()], fc.CasadiVM())
+    assert "rope rope is drawn over 1 m, stretched from 0.9 m: without RopeStretch it keeps" in model.notes[0]
+    assert fc.linearize(model).modes().omega == pytest.approx(np.sqrt(9.81) * np.ones(2), rel=1e-9)
+    assert not fc.assemble(structure, [LARGE, fc.Gravity(), fc.RopeStretch()], fc.CasadiVM()).notes
