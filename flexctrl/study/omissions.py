@@ -23,12 +23,10 @@ from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Part
 from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
+from flexctrl.study.sections import WAYS
 from flexctrl.study.subject import Subject
 
 __all__ = ["Omission", "omissions"]
-
-_STIFF = 1e3
-_RIGIDITIES = {"stretch": ("EA",), "torsion": ("GJ",), "bending": ("EI_y", "EI_z")}
 
 _DASHPOTS: dict[str, tuple[type, ...]] = {
     "drive_damping": (RotaryDrive, LinearDrive),
@@ -79,9 +77,10 @@ class Omission:
 def omissions(scene: Subject) -> tuple[Omission, ...]:
     """Return everything that can be left out of a scene, each once.
 
-    Effects; flexibility part by part; stretch, torsion and bending of the beams (made a thousand times stiffer);
-    large rotation (small motion about the loaded equilibrium instead) and geometric stiffness; each kind of
-    damping, of effects and of parts; the hardware round the controller.
+    Effects; flexibility part by part; stretch, torsion and bending of the beams (made a thousand times stiffer),
+    and their shear and rotary inertia where they have them; large rotation (small motion about the loaded
+    equilibrium instead) and geometric stiffness; each kind of damping, of effects and of parts; the hardware round
+    the controller.
 
     Parameters
     ----------
@@ -130,7 +129,7 @@ def _of_effect(effect: Effect, structure: Structure) -> list[Omission]:
 
 
 def _of_deforming(effect: Deforming, structure: Structure) -> list[Omission]:
-    """Part by part where there are several; a beam's stretch and torsion also by themselves."""
+    """Part by part where there are several; ways in which beams give, and rotary inertia, also by themselves."""
     parts = [p for p in (*structure.elements, *structure.drives) if effect.bends(p)]
     kind = type(effect)
     if not parts:
@@ -139,7 +138,9 @@ def _of_deforming(effect: Deforming, structure: Structure) -> list[Omission]:
     if len(parts) > 1:
         found = [Omission(f"{snake(kind)}_{p.name}", partial(_stiffened_part, kind, p.name)) for p in parts]
     if isinstance(effect, BeamFlexibility):
-        found += [Omission(f"beam_{name}", partial(_stiffened_section, name), spares=False) for name in _RIGIDITIES]
+        sections = [p.section for p in structure.elements if isinstance(p, Beam)]
+        ways = [name for name, without in WAYS.items() if any(without(s) is not s for s in sections)]
+        found += [Omission(name, partial(_with_sections, name), spares=False) for name in ways]
     return found
 
 
@@ -157,17 +158,15 @@ def _stiffened_part(kind: type[Deforming], name: str, scene: Subject) -> Subject
     return _with_effects(scene, [fewer if type(e) is kind else e for e in _flat(scene)])
 
 
-def _stiffened_section(name: str, scene: Subject) -> Subject:
-    """All beams that bend hardly give in one way: they keep their freedoms, so nothing is saved."""
-    effects = _flat(scene)
-    if not any(e.bends(p) for e in effects for p in scene.structure.elements if isinstance(p, Beam)):
+def _with_sections(name: str, scene: Subject) -> Subject:
+    """All beams without one way to give, or without rotary inertia: they keep their freedoms, so little is saved."""
+    beams = [e for e in scene.structure.elements if isinstance(e, Beam)]
+    if not any(e.bends(b) for e in _flat(scene) for b in beams):
         return scene
-    elements = [
-        replace(e, section=replace(e.section, **{k: _STIFF * getattr(e.section, k) for k in _RIGIDITIES[name]}))
-        if isinstance(e, Beam)
-        else e
-        for e in scene.structure.elements
-    ]
+    sections = {b.name: WAYS[name](b.section) for b in beams}
+    if all(sections[b.name] is b.section for b in beams):
+        return scene
+    elements = [replace(e, section=sections[e.name]) if isinstance(e, Beam) else e for e in scene.structure.elements]
     return scene.with_(structure=scene.structure.with_(elements=elements))
 
 

@@ -195,6 +195,7 @@ def test_every_effect_of_a_machine_that_has_them_all_has_a_line():
         "beam_bending",
         "beam_stretch",
         "beam_torsion",
+        "rotary_inertia",
         "shaft_elasticity",
         "rope_stretch_rope",
         "rope_stretch_winch",

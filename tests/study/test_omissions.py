@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
+import numpy as np
 import pytest
 
 import flexctrl as fc
@@ -11,6 +13,7 @@ from flexctrl.design import pd
 from flexctrl.errors import ControllerError
 from flexctrl.scene.physics import EFFECTS
 from flexctrl.study.omissions import omissions, snake
+from flexctrl.study.sections import WAYS
 
 HARDWARE = {
     "sampled": lambda law: fc.Sampled(law, 0.01),
@@ -78,3 +81,51 @@ def test_sampling_is_kept_under_what_counts_samples(hardware):
     assert next(o for o in omissions(scene) if o.name == "sampled").is_in(found.scene)
     chosen = scene.with_(effects=[*scene.effects, fc.Automatic(1e-6)]).settled
     assert chosen.law.sample_time == 0.01
+
+
+def deep(section: fc.Section) -> fc.Scene:
+    """A cantilever of 2 m under a load that grows so slowly that it is still."""
+    beam = fc.Beam("beam", (0, 0, 0), (2, 0, 0), section, elements=4)
+    push, tip = fc.Force("push", beam.end, "z"), fc.Position("tip", beam.end, "z")
+    structure = fc.Structure([beam], [fc.Support(beam.start)], inputs=[push], outputs=[tip])
+    plan = fc.Simulation(until=1.0, every=0.1, method=fc.GeneralizedAlpha(0.01))
+    return fc.Scene(structure, [fc.BeamFlexibility()], loads={"push": lambda t: 1e3 * t}, simulation=plan)
+
+
+SHEARING = fc.Section(1e9, 1e7, 1e7, 1e7, 80.0, 1.6, 0.8, 0.8, GA_y=5e6, GA_z=5e6)
+
+
+def test_shear_is_left_out_as_timoshenko_has_it():
+    """Of PL³/3EI + PL/κGA the second; a coupled law that is only diagonal says the same."""
+    bending, shearing = 8.0 / 3e7, 2.0 / 5e6
+    law = np.diag([1e9, 5e6, 5e6, 1e7, 1e7, 1e7])
+    for section in (SHEARING, fc.Section.coupled(law, 80.0, 1.6, 0.8, 0.8)):
+        scene = deep(section)
+        shear = next(o for o in omissions(scene) if o.name == "beam_shear")
+        tips = [s.run()["tip"][-1] for s in (scene, shear.without(scene))]
+        assert tips[0] == pytest.approx(1e3 * (bending + shearing), rel=5e-3)
+        assert tips[1] == pytest.approx(1e3 * bending, rel=5e-3)
+
+
+def test_shear_and_rotary_inertia_have_lines_where_sections_have_them():
+    found = fc.ledger(deep(SHEARING), fc.Within(outputs=0.05))
+    assert found["beam_shear"].change.outputs_worst == pytest.approx(0.6, abs=0.01)
+    assert found["beam_shear"].keep
+    assert found["rotary_inertia"].change.outputs_worst < 0.01
+    slowest = [np.abs(deep(s).linear.damped_poles()).min() for s in (SHEARING, replace(SHEARING, rhoI_y=0, rhoI_z=0))]
+    assert found["rotary_inertia"].change.poles >= 1.0 - slowest[0] / slowest[1] > 1e-4  # inertia slows
+    plain = deep(fc.Section(1e9, 1e7, 1e7, 1e7, 80.0, 1.6))
+    names = [o.name for o in omissions(plain)]
+    assert names == ["beam_flexibility", "beam_stretch", "beam_torsion", "beam_bending"]
+
+
+def test_a_coupled_section_is_stiffened_in_the_way_that_goes():
+    """A twist that bends it does so no more when it bends no more; what stays gives as before."""
+    law = np.diag([1e9, 5e6, 5e6, 1e7, 1e7, 1e7])
+    law[3, 4] = law[4, 3] = 5e6
+    section = fc.Section.coupled(law, 80.0, 1.6)
+    stiffer = np.array(WAYS["beam_bending"](section).stiffness)
+    given, left = np.linalg.inv(law), np.linalg.inv(stiffer)
+    assert np.abs(left[4:, :]).max() < 2e-3 * np.abs(given[3:, 3:]).max()
+    assert left[3, 3] == pytest.approx(1.0 / law[3, 3], rel=1e-3)  # and no longer its compliance with bending free
+    assert np.allclose(left[:3, :3], given[:3, :3])
