@@ -159,7 +159,7 @@ class Autosave:
     Raises
     ------
     StructureError
-        If ``path`` names no file or ``seconds`` is not positive.
+        If ``path`` names no file, its folder is not there, or ``seconds`` is not positive.
     """
 
     path: str | Path

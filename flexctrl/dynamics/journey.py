@@ -21,6 +21,7 @@ from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.landing import SHORTEST, SMALLEST, Missed, landed
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.midpoint import ConservingMidpoint
+from flexctrl.dynamics.record import Unwritten, writing
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper
@@ -123,12 +124,16 @@ class Journey:
             self.stepper.counts.worst = error.worst
             worst = self.plan.model.coordinates[error.worst]
             self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
-        except (ControllerError, EventError) as error:
-            self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
-            self.fault = error.__cause__
+        except (ControllerError, EventError, Unwritten) as error:
+            self.fail(error)
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
         self._judge()
+
+    def fail(self, error: Exception) -> None:
+        """End as failed, for what is no fault of the step."""
+        self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
+        self.fault = error.__cause__
 
     def _judge(self) -> None:
         """Hold an end by the clock or by an event against the books; others are told what these say beside."""
@@ -204,7 +209,8 @@ class Journey:
         if autosave is not None and now - self._kept > autosave.seconds:
             self._kept = now
             self.rows.recorder.flush()
-            (self.saved or self.snapshot()).save(autosave.path)
+            with writing(autosave.path):
+                (self.saved or self.snapshot()).save(autosave.path)
 
     def _foresee(self) -> None:
         """Raise StepError if the run would take more steps than it may, at the pace of the latter half of them."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from io import TextIOBase
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -13,7 +14,20 @@ import numpy as np
 from flexctrl.errors import StructureError
 from flexctrl.structure.freedoms import check_number, check_path, check_seconds
 
-__all__ = ["CsvStream", "InMemory", "Record", "Recorder"]
+__all__ = ["CsvStream", "InMemory", "Record", "Recorder", "Unwritten", "writing"]
+
+
+class Unwritten(Exception):
+    """What a run records cannot be written; caused by the system's own error."""
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Tell what cannot be written, and why, by `Unwritten`."""
+    try:
+        yield
+    except OSError as error:
+        raise Unwritten(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 class Recorder(Protocol):
@@ -96,7 +110,8 @@ class CsvStream:
     Raises
     ------
     StructureError
-        If ``path`` names no file or ``every`` is not positive.
+        If ``path`` names no file, its folder is not there, or ``every`` is not positive; by `simulate`, if it cannot
+        be opened. A run that cannot go on writing ends as failed.
     """
 
     path: str | Path
@@ -113,11 +128,14 @@ class CsvStream:
 
     def start(self, signals: Sequence[str], after: int = 0) -> _Stream:
         path, header = Path(self.path), ",".join(["t", *signals]) + "\n"
-        if not (after and path.exists()):
-            file = path.open("w", encoding="utf-8")
+        going_on = bool(after) and path.exists()
+        try:
+            file = path.open("r+" if going_on else "w", encoding="utf-8")
+        except OSError as error:
+            raise StructureError(f"CsvStream: {path} cannot be opened: {error.strerror}") from error
+        if not going_on:
             file.write(header)
             return _Stream(file, 1 + len(signals))
-        file = path.open("r+", encoding="utf-8")
         found, ends = file.readline(), ["", ""]
         for _ in range(after):
             line = file.readline()
@@ -171,14 +189,15 @@ class _Table:
 class _Stream:
     """Lines of a file; numbers are written so that they read back the same."""
 
-    def __init__(self, file: TextIOBase, width: int, ends: Sequence[list[float]] = ()) -> None:
+    def __init__(self, file: TextIOWrapper, width: int, ends: Sequence[list[float]] = ()) -> None:
         self.file, self.width = file, width
         self.ends = list(ends)
 
     def row(self, t: float, y: np.ndarray, u: np.ndarray) -> None:
         values = [float(t), *y.tolist(), *u.tolist()]
-        self.file.write(",".join(map(repr, values)) + "\n")
         self.ends = [self.ends[0] if self.ends else values, values]
+        with writing(self.file.name):
+            self.file.write(",".join(map(repr, values)) + "\n")
 
     def rows(self, table: np.ndarray, u: np.ndarray) -> None:
         for row, now in zip(table, np.broadcast_to(u, (len(table), u.shape[-1])), strict=True):
@@ -188,7 +207,9 @@ class _Stream:
         return np.array(self.ends).reshape(-1, self.width)
 
     def flush(self) -> None:
-        self.file.flush()
+        with writing(self.file.name):
+            self.file.flush()
 
     def close(self) -> None:
-        self.file.close()
+        with suppress(OSError):  # told when it was flushed
+            self.file.close()

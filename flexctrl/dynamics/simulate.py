@@ -18,7 +18,7 @@ from flexctrl.dynamics.events import Event, Watch
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_plant import LinearPlant
-from flexctrl.dynamics.record import InMemory, Record
+from flexctrl.dynamics.record import InMemory, Record, Unwritten
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
 from flexctrl.dynamics.settling import quasistatic
@@ -87,8 +87,8 @@ def simulate(
     Returns
     -------
     Run
-        Whatever happens once it has begun: a step that fails, an exception in the controller and Ctrl-C end the run
-        with their status, and all that was computed until then.
+        Whatever happens once it has begun: a step that fails, an exception in the controller, a full disk and Ctrl-C
+        end the run with their status, and all that was computed until then.
 
     Raises
     ------
@@ -243,7 +243,12 @@ def _result(journey: Journey) -> Run:
     assert checkpoint is not None
     if abs(state.t - plan.until) <= 1e-9 * plan.until:
         state = state.with_(t=plan.until)
-    rows = journey.rows.finish(state, supply.u)
+    try:
+        rows = journey.rows.finish(state, supply.u)
+        journey.rows.recorder.flush()
+    except Unwritten as error:
+        journey.fail(error)
+        rows = journey.rows.recorder.table()
     width = len(plan.model.outputs)
     return Run(
         rows[:, 0],

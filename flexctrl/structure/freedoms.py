@@ -142,9 +142,12 @@ def check_seconds(value: float, what: str, owner: str, *, endless: bool = False)
 
 
 def check_path(path: str | os.PathLike[str], owner: str) -> None:
-    """Raise unless ``path`` names a file."""
+    """Raise unless ``path`` names a file in a folder that is there."""
     if not isinstance(path, str | os.PathLike) or not str(path):
         raise StructureError(f"{owner}: path = {path!r}; expected the name of a file")
+    folder = os.path.dirname(os.fspath(path)) or "."
+    if not os.path.isdir(folder):
+        raise StructureError(f"{owner}: path = {str(path)!r}: there is no folder {folder!r}; make it first")
 
 
 def check_whole(value: int, what: str, owner: str, *, least: int, most: int = 2**31) -> int:

@@ -267,7 +267,7 @@ class Marcher:
         way = farthest(self.model, moved)
         m.reached = float(way.max(initial=0.0))
         m.farthest[components(self.model)] = way
-        m.losing, m.drawing, m.gained, m.lost = int(losing), 0, 0.0, 0.0
+        m.losing, m.drawing, m.gained, m.lost, m.closing.open = int(losing), 0, 0.0, 0.0, 0.0
         self._do(SETTLE)
 
     def go_on(self, sums: Sums) -> None:
@@ -459,6 +459,7 @@ class Marcher:
 def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
     flat, c = F.flat, method.coefficients
     v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
+    closing: Any = Packed(closing_of(F))
     state, part, probes = width_of(F), components(F.model), probes_of(F, method.weight)
     cones = F.plan.position[coning_of(F.model).triples]
     shelf = int(min(_SHELF, max(1, _BYTES // (8 * state))))
@@ -466,7 +467,7 @@ def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
         flat=flat,
         gauges=F.gauges,
         corners=Packed(corners_of(F)),  # type: ignore[arg-type]
-        closing=closing_of(F),
+        closing=closing,
         flows=flows_of(F),
         contacts=contacts,
         law=no_law(),
