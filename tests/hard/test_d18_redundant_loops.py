@@ -172,3 +172,19 @@ def test_a_condition_too_many_is_harmless_and_stays_closed():
 def test_in_small_motion_bars_in_line_are_as_free_as_linear_theory_says():
     model = fc.assemble(bars(), [fc.Gravity()], fc.CasadiVM())
     assert fc.simulate(model, until=0.5).status is fc.Status.FINISHED
+
+
+def test_a_path_of_equilibria_ends_where_bars_in_line_would_come_apart():
+    """A spring in the middle carries all of the load that the bars seem to give way to."""
+    plain = bars()
+    middle = plain.elements[0].end
+    stay = fc.Spring("stay", (1, 0, -1), middle.position, stiffness=100.0)
+    side = fc.Spring("side", (1, -1, 0), middle.position, stiffness=100.0)
+    joints = [*plain.joints, *(fc.Support(s.start) for s in (stay, side))]
+    joints += [fc.Pin(middle, s.end) for s in (stay, side)]
+    push = fc.Force("push", middle, "-z")
+    structure = fc.Structure([*plain.elements, stay, side], joints, inputs=[push], outputs=plain.outputs)
+    path = fc.equilibrium_path(fc.assemble(structure, [fc.LargeRotation()], fc.CasadiVM()), {"push": 1.0}, until=10.0)
+    assert path.end is fc.PathEnd.STUCK
+    assert abs(path["mid"][-1]) < 2e-3
+    assert np.abs(path["wall"] - 2.0).max() < 4e-6

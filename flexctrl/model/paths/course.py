@@ -140,7 +140,7 @@ class Course:
         return Station(state, factor, self.tangent(state, factor, along), turned(K), iterations)
 
     def step(self, start: Station, along: Direction, length: float, most: int = 12) -> Station | None:
-        """Return the equilibrium at a distance along a direction, or none if the corrections do not shrink."""
+        """Return the equilibrium at a distance along a direction; none without convergence, or if parts come apart."""
         state, factor = start.state, start.factor
         delta, excess, before = along * length, None, np.inf
         for iteration in range(1, most + 1):
@@ -159,6 +159,8 @@ class Course:
                 return None
             if size <= _SETTLED * max(1.0, length) or (iteration > 3 and size < 1e-7 and size > 0.3 * before):
                 state, _ = self._predicted(state, delta)
+                if self.balance.model.apart(state):
+                    return None
                 return self.station(state, factor + delta.factor, along, iteration)
             before = size
         return None
