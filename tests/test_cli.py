@@ -374,3 +374,15 @@ def test_cost_tells_the_cheapest_setting(told, tmp_path):
     assert (tmp_path / "cost.png").stat().st_size > 10_000
     kept = [json.loads(line) for line in (tmp_path / "cost.jsonl").read_text().splitlines()]
     assert len({line["key"][1] for line in kept if line["key"][0] == "point"}) == len(data["points"])
+
+
+@pytest.mark.parametrize("scene", ["flexible_arm", "bridge_crane"])
+def test_the_bode_plot_holds_the_resonance_that_is_told(scene, tmp_path, call):
+    code, out, _ = call("bode", EXAMPLES / f"{scene}.toml", "--out", tmp_path, "--json")
+    peak, table = (
+        json.loads(out)["flexible"]["resonance"],
+        np.loadtxt(tmp_path / "bode_flexible.csv", delimiter=",", skiprows=1),
+    )
+    assert code == 0
+    assert table[0, 1] < peak["hz"] < table[-1, 1]
+    assert table[:, 2].max() == pytest.approx(peak["magnitude"], rel=0.01)

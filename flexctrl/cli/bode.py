@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
-from flexctrl.cli.loops import Cut, cut_of
+from flexctrl.cli.loops import DRIFT, Cut, cut_of
 from flexctrl.cli.program import Request
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.response import FrequencyResponse
@@ -56,7 +56,7 @@ def _peak(cut: Cut, linear: LinearModel) -> dict[str, float | None]:
     """The highest resonance: |H| at the damped frequencies of the modes; nothing where none is damped."""
     modes = linear.modes()
     omega, damping = modes.omega[modes.flexible], modes.damping[modes.flexible]
-    heard = (omega > 1e-6 * omega.max(initial=0.0)) & (damping > 1e-9) & (damping < 1.0)
+    heard = (omega > DRIFT * omega.max(initial=0.0)) & (damping > 1e-9) & (damping < 1.0)
     if not heard.any():
         return {"hz": None, "magnitude": None}
     damped = omega[heard] * np.sqrt(1.0 - damping[heard] ** 2)

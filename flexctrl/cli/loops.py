@@ -13,6 +13,9 @@ from flexctrl.scene import Scene
 from flexctrl.study.broken_loop import broken_loop
 from flexctrl.study.loop import Loop, open_loop
 
+DRIFT = 1e-6
+"""Modes slower than this share of the fastest are free motion, but for rounding."""
+
 
 @dataclass(frozen=True)
 class Cut:
@@ -55,7 +58,7 @@ class Cut:
     def span(self) -> tuple[float, float]:
         """Angular frequencies worth showing of both machines: a decade below the slowest mode to above the fastest."""
         omega = np.concatenate([m.omega[m.flexible] for m in (linear.modes() for linear in self.machines.values())])
-        omega = omega[omega > 1e-5 * omega.max(initial=0.0)]
+        omega = omega[omega > DRIFT * omega.max(initial=0.0)]
         return (0.1 * float(omega.min()), 3.0 * float(omega.max())) if omega.size else (0.1, 1e3)
 
     def responds(self, linear: LinearModel) -> bool:
