@@ -11,10 +11,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from flexctrl.dynamics.dense import Curve
+from flexctrl.dynamics.dense import Curve, Hermite
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.steps import Point
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite
 
@@ -23,6 +25,10 @@ __all__ = ["Direction", "Event", "EventError", "Occurrence", "Watch"]
 _DUST = 1e-13
 _SLOPE = 1e-2
 _HALVINGS = 20
+_BENT = 0.25
+_TURN = 0.5  # rad between probes
+_PARTS, _FINE = 4, 8  # of a step with a cubic for its motion, and with a polynomial of higher degree
+_NEAR = 1e-9
 
 
 class EventError(StructureError):
@@ -62,9 +68,14 @@ class Event:
 
     Notes
     -----
-    Each step is looked at in its middle and at its end. What crosses and comes back within half a step goes unseen
-    unless its parabola through those points shows it. What only touches the value counts where it does so just as an
-    input jumps (a speed that comes to zero at the end of a braking torque).
+    Within a step the motion is known at all times (the method's own polynomial, or a cubic). It is looked at closely
+    wherever something may happen: in four places of a step at least (eight for `ExplicitRungeKutta` and `Exact`), so
+    densely that no node turns by more than half a radian between two, at all rows that ``every`` asks for, and where
+    the parabola through three such values bends to zero. What a run's rows show to have crossed is found so, and what
+    crosses and comes back where it shows in such a parabola. Steps in which signals stay clear of their values, by
+    twice what they bend, are not looked at closely. What crosses twice between two places and bends otherwise goes
+    unseen (a function with a kink or a narrow peak); take shorter steps for that. What only touches the value counts
+    where it does so just as an input jumps (a speed that comes to zero at the end of a braking torque).
     """
 
     name: str
@@ -136,11 +147,13 @@ class Occurrence:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A gauge goes through zero."""
+    """A gauge goes through zero; nothing else does so with it between ``low`` and ``high`` [s]."""
 
     t: float
     gauge: int
     rising: bool
+    low: float = -math.inf
+    high: float = math.inf
 
 
 @dataclass
@@ -243,9 +256,10 @@ class Watch:
         switches = self.switches(state, u) if self.names else np.zeros(0)
         return np.concatenate([found, switches, self.corners(state, before or state)])
 
-    def left(self, after: Point, before: Point, gauge: int) -> float:
-        """Return how far a gauge is from zero after a step, on the side where it was: below zero it has passed it."""
-        return float(self.sides[gauge]) * self.value(after.state, after.supply.u, before.state, gauge)
+    def left(self, after: Point, before: Point, crossing: Crossing) -> float:
+        """Return how far a gauge is from zero after a step, on the side it comes from: below zero it has passed it."""
+        gauge = crossing.gauge
+        return (-1.0 if crossing.rising else 1.0) * self.value(after.state, after.supply.u, before.state, gauge)
 
     def value(self, state: State, u: np.ndarray, before: State, gauge: int) -> float:
         """Return one gauge's value, of a state that came from one before."""
@@ -286,8 +300,11 @@ class Watch:
         """Note that a switching law of force is kept from switching over the next step."""
         self.sides[len(self.events) + switch] = 0.0
 
-    def crossings(self, curve: Curve, before: Point, after: Point) -> list[Crossing]:
-        """Return where gauges cross zero over a step, in order; sides stay as they are."""
+    def crossings(self, curve: Curve, before: Point, after: Point, every: float | None = None) -> list[Crossing]:
+        """Return where gauges cross zero over a step, in order; sides stay as they are.
+
+        Events are looked for at the rows that are ``every`` so many seconds too.
+        """
         if self.quiet and self._calm(after.state, before.state):
             return []
         t, h = before.state.t, after.state.t - before.state.t
@@ -295,29 +312,61 @@ class Watch:
         last = self.values(before.state, before.supply.u)
         ends = [(t + 0.5 * h, value(t + 0.5 * h)), (t + h, self.values(after.state, after.supply.u, before.state))]
         self.sizes = np.maximum(self.sizes, np.abs([last, *(v for _, v in ends)]).max(axis=0))
-        found = []
+        found, number = [], len(self.events)
+        clear = self._clear(np.array([last, *(v for _, v in ends)])[:, :number])
+        probes = self._probes(curve, before, after, every, clear) if number else []
+        seen: list[tuple[float, Sequence[float] | np.ndarray]] = [*ends, *((at, value.events(at)) for at in probes)]
         for gauge in range(len(last)):
-            corners = [(t, last[gauge]), *((at, v[gauge]) for at, v in ends)]
-            found += self._through(gauge, self._with_vertex(corners, gauge, value), value)
+            corners = [(t, last[gauge]), *((at, v[gauge]) for at, v in (seen if gauge < number else ends))]
+            found += self._through(gauge, self._with_vertices(sorted(corners), gauge, value), value)
         return sorted(found, key=lambda c: c.t)
 
-    def _with_vertex(self, corners: list[tuple[float, float]], gauge: int, value: _Along) -> list[tuple[float, float]]:
-        """Add the vertex of the parabola through three points where it may lie across zero and they do not."""
-        (a, fa), (b, fb), (_, fc) = corners
-        bend = fa - 2.0 * fb + fc
-        if not (fa * fb > 0.0 and fb * fc > 0.0 and bend * fb > 0.0):
-            return corners
-        s = 0.5 * (fa - fc) / bend
-        if not (abs(s) < 1.0 and (fb - 0.125 * (fa - fc) ** 2 / bend) * fb < 0.1 * fb * fb):
-            return corners
-        at = b + s * (b - a)
-        return sorted([*corners, (at, value(at)[gauge])])
+    def _clear(self, values: np.ndarray) -> bool:
+        """Tell whether events stay on their sides by more than twice what they bend over a step."""
+        ahead = self.sides[: values.shape[1]] * values
+        bend = np.abs(values[0] - 2.0 * values[1] + values[2])
+        return bool((ahead.min(axis=0) > _BENT * bend).all() and (ahead > 0.0).all())
+
+    def _probes(self, curve: Curve, before: Point, after: Point, every: float | None, clear: bool) -> list[float]:
+        """Return where within a step, beside its middle, events are looked for."""
+        t, h = before.state.t, after.state.t - before.state.t
+        fastest = np.maximum(np.abs(before.state.v), np.abs(after.state.v))
+        turned = h * float((fastest * self._turns).max(initial=0.0))
+        if clear and turned <= _TURN and isinstance(curve, Hermite):
+            return []
+        parts = 2 * math.ceil(0.5 * max(_PARTS if isinstance(curve, Hermite) else _FINE, turned / _TURN))
+        found = t + h / parts * np.arange(1, parts)
+        if every is not None:
+            found = np.append(found, every * np.arange(math.ceil(t / every), math.floor((t + h) / every) + 1))
+        taken = np.sort(np.append(found, (t, t + h)))
+        apart = taken[1:][np.diff(taken) > _NEAR * h]
+        return apart[(np.abs(apart - t - 0.5 * h) > _NEAR * h) & (apart < t + (1.0 - _NEAR) * h)].tolist()
+
+    @cached_property
+    def _turns(self) -> np.ndarray:
+        return _turns(self.feed.model)
+
+    def _with_vertices(self, points: list[tuple[float, float]], gauge: int, value: _Along) -> list[tuple[float, float]]:
+        """Add the vertices of parabolas through three points where they may lie across zero and these do not."""
+        found = list(points)
+        for (a, fa), (b, fb), (c, fc) in zip(points, points[1:], points[2:], strict=False):
+            if not (fa * fb > 0.0 and fb * fc > 0.0 and a < b < c):
+                continue
+            before, after = (fb - fa) / (b - a), (fc - fb) / (c - b)
+            bend = (after - before) / (c - a)
+            if not bend * fb > 0.0:
+                continue
+            slope = before + bend * (b - a)
+            at = b - 0.5 * slope / bend
+            if a < at < c and (fb - 0.25 * slope * slope / bend) * fb < 0.1 * fb * fb:
+                found.append((at, value(at)[gauge]))
+        return sorted(found)
 
     def _through(self, gauge: int, corners: Sequence[tuple[float, float]], value: _Along) -> list[Crossing]:
         side, found = self.sides[gauge], []
         dust = self.dusts[gauge]
         direction = self._directions[gauge]
-        for (a, fa), (b, fb) in pairwise(corners):
+        for i, ((a, fa), (b, fb)) in enumerate(pairwise(corners)):
             if abs(fb) <= dust or np.sign(fb) == side:
                 continue
             rising = fb > 0.0
@@ -329,7 +378,8 @@ class Watch:
                     at = _nearly(corners, a)
                 else:
                     at = _root(own, (a, fa), (b, fb))
-                found.append(Crossing(at, gauge, rising))
+                low, high = corners[max(i - 1, 0)][0], corners[min(i + 2, len(corners) - 1)][0]
+                found.append(Crossing(at, gauge, rising, low, high))
             side = np.sign(fb)
         return found
 
@@ -408,10 +458,21 @@ class _Along:
         state = self.curve.at(t)
         return self.watch.values(state, self.supply(state).u, self.before.state)
 
+    def events(self, t: float) -> list[float]:
+        """Those of the events asked for."""
+        state = self.curve.at(t)
+        signals = self.watch.signals(state, self.supply(state).u)
+        return [event.value(signals) for event in self.watch.events]
+
     def one(self, gauge: int, t: float) -> float:
         """One of them."""
         state = self.curve.at(t)
         return self.watch.value(state, self.supply(state).u, self.before.state, gauge)
+
+
+def _turns(model: Model) -> np.ndarray:
+    """Return how far a unit of each degree of freedom turns what it turns [rad]; nothing turns in a linear model."""
+    return turning(model) / yardsticks(model) if isinstance(model, Model) else np.zeros(model.n)
 
 
 def _nearly(points: Sequence[tuple[float, float]], first: float) -> float:

@@ -398,7 +398,7 @@ class Journey:
     def _watched(self, before: Point, after: Point) -> tuple[Point, Crossing | None]:
         """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
         watch, curve = self.watch, self.track.curve(before, after)
-        crossings = watch.crossings(curve, before, after)
+        crossings = watch.crossings(curve, before, after, self.rows.every)
         landing = next((c for c in crossings if watch.stops(c.gauge) and not self.is_over(c)), None)
         switch = -1 if landing is None else landing.gauge - len(watch.events)
         if 0 <= switch < len(watch.names) and self.mark.stuck >= _CHATTER:
@@ -413,7 +413,8 @@ class Journey:
         after, landing = landed(self, before, after, landing)
         switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
         brief = 0 <= switch < len(watch.names) and is_brief(self, before, after, slid, switch)
-        there = [c for c in crossings if c.gauge != landing.gauge and self._is_there(c, before, after, slid)]
+        closest = {c.gauge: c for c in sorted(crossings, key=lambda c: -abs(c.t - landing.t))}.values()
+        there = [c for c in closest if c.gauge != landing.gauge and self._is_there(c, before, after, slid)]
         self._note([c for c in earlier if c not in there], curve, before)
         watch.settle(after)
         for c in sorted((*there, landing), key=lambda c: c.gauge):

@@ -52,7 +52,7 @@ def _land(journey: Journey, before: Point, after: Point, crossing: Crossing) -> 
     if corner and not journey.watch.last_word(crossing.gauge):
         return _short_of(journey, before, after, crossing)
     t, h, gauge, watch = before.state.t, after.state.t - before.state.t, crossing.gauge, journey.watch
-    bracket, at, last = _Bracket(t, t + h), crossing.t, None
+    bracket, at, last = _Bracket(max(t, crossing.low), min(t + h, crossing.high)), crossing.t, None
     for _ in range(_LANDINGS):
         if at - t <= SMALLEST * h:
             return before, replace(crossing, t=t)
@@ -60,7 +60,7 @@ def _land(journey: Journey, before: Point, after: Point, crossing: Crossing) -> 
             after = journey.stepper.step(before, at - t)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
-        left = watch.left(after, before, gauge)
+        left = watch.left(after, before, crossing)
         if last is None:
             off = watch.offset(journey.track.curve(before, after), before, after, gauge)
         else:
@@ -124,7 +124,7 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
         curve, end = journey.track.curve(before, after), after.state.t
-        left = watch.left(after, before, gauge)
+        left = watch.left(after, before, crossing)
         above = left - dust
         off = watch.offset(curve, before, after, gauge) if above > 0.0 or last is None else 0.0
         on = _to_zero(last, (end, above)) if last else off

@@ -31,6 +31,7 @@ def accept(m: March) -> None:
     far = zero
     steady = zero
     pull = zero
+    spun = zero
     for i in range(0, f.padded, 8):
         rate = eight(f.rate[i:])
         change = rate - eight(m.rate[i:])
@@ -49,12 +50,14 @@ def accept(m: March) -> None:
         put(m.trend[i:], change)
         put(m.algorithmic[i:], blended(m, rate, eight(m.rate[i:]), eight(m.algorithmic[i:])))
         put(m.rate[i:], rate)
+        spun = larger(spun, abs(eight(f.v[i:])) * eight(m.turns[i:]) * eight(m.weight[i:]))
         put(m.v[i:], eight(f.v[i:]))
     m.reached = max(m.reached, largest(far))
     if m.parts > 1:
         follow(m)
     lean(m, total(shared), total(square))
     tighten(m, total(onward) / max(total(still), _TINY), 0.5 * largest(steady), largest(pull))
+    m.turned = max(m.turned, m.h * largest(spun))
     m.t = later(m.t, m.h)
     enter(m)
     note(m)

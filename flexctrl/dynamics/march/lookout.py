@@ -13,7 +13,10 @@ from flexctrl.dynamics.events import Event, EventError, Watch
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.model.state import State
 
-__all__ = ["Lookout"]
+__all__ = ["FAR", "Lookout"]
+
+FAR = 1.5
+"""What turns farther within a step [rad] is left to a plain one, which looks at it in many places."""
 
 _DOUBT = 0.25  # twice what the parabola through both ends and the middle may lie below the least of them
 
@@ -28,9 +31,12 @@ class Lookout:
         Knows the states after the steps.
     state : State
         Where they start.
+    turns : numpy.ndarray
+        How far a unit of each degree of freedom, in the order of elimination, turns what it turns [rad].
     """
 
-    def __init__(self, watch: Watch, weaver: Weaver, state: State) -> None:
+    def __init__(self, watch: Watch, weaver: Weaver, state: State, turns: np.ndarray) -> None:
+        self.turns = turns
         self.watch, self.weaver = watch, weaver
         model = watch.feed.model
         self.last = model.measure(state)
@@ -65,7 +71,8 @@ class Lookout:
         sizes = np.fmax.accumulate(np.fmax(np.abs(found).max(axis=0), watch.sizes[:number]))
         clear = self._clear(found, sides, watch.dusts_of(sizes))
         held = (sides * after > watch.dusts_of(sizes)) | (sides == 0.0)
-        doubtful, jumpy = ~clear.all(axis=1), ~held.all(axis=1)
+        turned = np.diff(times) * (np.abs(self.weaver.rates(count)) * self.turns).max(axis=1, initial=0.0)
+        doubtful, jumpy = ~clear.all(axis=1) | (turned > FAR), ~held.all(axis=1)
         quiet = int(np.argmax(doubtful)) if doubtful.any() else count
         jumps = int(np.argmax(jumpy)) + 1 if jumpy.any() else count + 1
         return quiet, jumps

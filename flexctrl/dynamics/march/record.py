@@ -222,6 +222,8 @@ class March:
         Rotations that turn all ways, and their degrees of freedom, three each; see `flexctrl.dynamics.coning`.
     fastest : float
         The largest rate of what turns at the start of the step.
+    turned : float
+        The farthest that anything has turned within a step since this was set to zero [rad].
     reach, first : Reals
         Largest distance of each degree of freedom from where it was first.
     rows : Reals
@@ -306,6 +308,7 @@ class March:
     contraction: float = 0.0
     strayed: float = 0.0
     fastest: float = 0.0
+    turned: float = 0.0
     habit: float = 0.0
     trusted: int = 0
     spent: float = 0.0

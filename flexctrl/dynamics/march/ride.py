@@ -20,7 +20,7 @@ from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.foresight import calm_steps
 from flexctrl.dynamics.march.law import Sampling
 from flexctrl.dynamics.march.legs import Held, Leg, Legs, Opened, Told, same
-from flexctrl.dynamics.march.lookout import Lookout
+from flexctrl.dynamics.march.lookout import FAR, Lookout
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT, TURN, TURNED
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
@@ -108,7 +108,10 @@ class _Ride:
         if self.marcher.march.keeping and not isinstance(stepper, Dense):
             self.weaver = self.marcher.weaver
             self.weaver.set_out(j.point.state)
-        self.lookout = Lookout(j.watch, self.weaver, j.point.state) if guarded and self.weaver is not None else None
+        turns = self.marcher.march.turns * self.marcher.march.weight
+        self.lookout = (
+            Lookout(j.watch, self.weaver, j.point.state, turns) if guarded and self.weaver is not None else None
+        )
         self.near = self.leapt = False
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
@@ -167,8 +170,10 @@ class _Ride:
     def _guarded(self, lookout: Lookout, pacing: float | Pacing, count: int) -> tuple[int, int]:
         """Take steps up to the first one in which an event may happen, whatever there is beyond that."""
         begun, u = self._begun(), self.supply.u
+        self.marcher.march.turned = 0.0
         status, done = self.marcher.travel(pacing, count)
-        if done < _FEWEST and lookout.passes(0, done, begun.point.state.t, self.marcher.rows, u.tolist()):
+        few = done < _FEWEST and self.marcher.march.turned <= FAR
+        if few and lookout.passes(0, done, begun.point.state.t, self.marcher.rows, u.tolist()):
             return status, done
         calm, _ = lookout.calm(self.marcher.rows[:done], np.tile(u, (done + 1, 1)))
         if calm < done:
@@ -209,8 +214,10 @@ class _Ride:
         """
         j, watch, begun = self.journey, self.journey.watch, self._begun()
         sizes, span = watch.sizes.copy(), watch.span
+        self.marcher.march.turned = 0.0
         status, done = self.marcher.travel(pacing, min(count, span))
-        calm = calm_steps(watch, begun.point, self.marcher.rows[:done], self.supply.u)
+        far = self.marcher.march.turned > FAR
+        calm = 0 if far else calm_steps(watch, begun.point, self.marcher.rows[:done], self.supply.u)
         watch.span = min(_WIDEST, 2 * span) if calm == done else max(_FEWEST, 2 * calm)
         fitting = int(np.searchsorted(self.marcher.rows[:done, 0], self.until + self.tick, "right"))
         if fitting < calm and j.saved is None:
@@ -358,6 +365,7 @@ class _Ride:
         clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.readings
         held, first = Held(self.supply.rate, []), self.supply.u
         t, h, u, x, done, status = clock[0], mark.size, self.supply.u.tolist(), self.supply.x, 0, DONE
+        turned = marcher.march.cell("turned")
         begun, lookout = None if self.lookout is None else self._begun(), self.lookout
         marcher.begin()
         while True:
@@ -367,9 +375,11 @@ class _Ride:
             if wanted > room or stop > last:
                 break
             h, start = (stop - t) / count, done
+            turned[0] = 0.0
             status = marcher.on(h, wanted)
             done = steps[0]
-            if lookout is not None and not lookout.passes(start, done, t, marcher.rows, u):
+            far = lookout is not None and turned[0] > FAR
+            if lookout is not None and (far or not lookout.passes(start, done, t, marcher.rows, u)):
                 assert begun is not None
                 self.near, status, done = True, self._again(begun, held, u), start
                 break

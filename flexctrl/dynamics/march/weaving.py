@@ -104,6 +104,12 @@ class Weaver:
         self._run()
         return w.rows[1 : self.columns].tolist()
 
+    def rates(self, count: int) -> np.ndarray:
+        """Return the rates of the degrees of freedom after so many steps, in the order of elimination."""
+        f, states = self.flattened.flat, self.weave.states[: self.width * count].reshape(count, self.width)
+        first = 12 * f.nodes + f.padded
+        return states[:, first : first + f.padded]
+
     def times(self, times: np.ndarray) -> None:
         """Put right when the steps of the last call end, where a clock has been set."""
         self.weave.states[: self.width * len(times)].reshape(-1, self.width)[:, -1] = times
