@@ -39,7 +39,7 @@ class Lookout:
         self.turns = turns
         self.watch, self.weaver = watch, weaver
         model = watch.feed.model
-        self.last = model.measure(state)
+        self.last = model.measure(state).tolist()
         self.names = (*model.outputs, *model.inputs)
         self.sides = watch.sides[: len(watch.events)].tolist()
         self.steady = [isinstance(e.of, str) and e.of in model.outputs for e in watch.events]
@@ -89,22 +89,29 @@ class Lookout:
         if len(table):
             sizes, most = self.watch.sizes, np.abs(self._values(table[:, 1:], inputs[:-1])).max(axis=0)
             sizes[: len(most)] = np.maximum(sizes[: len(most)], most)
-            self.last = table[-1, 1:].copy()
+            self.last = table[-1, 1:].tolist()
 
     def passes(self, first: int, last: int, begun: float, rows: np.ndarray, u: list[float]) -> bool:
         """Tell whether nothing happens in some steps under the same inputs that start at a time; note them then."""
-        before, sizes = self.last.tolist(), self.watch.sizes.tolist()
+        before, sizes, grown = self.last, self.watch.sizes.tolist(), False
         for step in range(first, last):
             t, *now = rows[step].tolist()
             middle = self.weaver.reading(step, 0.5 * (begun + t))
             for i, event in enumerate(self.watch.events):
-                three = [self._value(event, self.places[i], (*y, *u)) for y in (before, middle, now)]
-                sizes[i] = max(sizes[i], abs(three[0]), abs(three[2]))
+                place = self.places[i]
+                if self.steady[i]:
+                    three = [before[place] - event.at, middle[place] - event.at, now[place] - event.at]
+                else:
+                    three = [self._value(event, place, (*y, *u)) for y in (before, middle, now)]
+                size = max(abs(three[0]), abs(three[2]))
+                if size > sizes[i]:
+                    sizes[i], grown = size, True
                 if not _is_clear(three, self.sides[i], self.watch.dust_of(sizes[i])):
                     return False
             before, begun = now, t
-        self.last = rows[last - 1, 1:].copy() if last > first else self.last
-        self.watch.sizes[:] = sizes
+        self.last = before
+        if grown:
+            self.watch.sizes[:] = sizes
         return True
 
     def leaps(self, row: np.ndarray, u: list[float]) -> bool:
