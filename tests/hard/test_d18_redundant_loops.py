@@ -109,7 +109,7 @@ def test_bars_in_line_between_walls_come_apart_in_no_run(method, backend):
     assert "leave one of them flexible" in run.report.message
     assert 0.0 < run.t[-1] < 0.05
     assert abs(run["wall"][-1] - 2.0) < 1e-4
-    assert 1e-6 * 0.5 < run.report.closure_error < 1e-4
+    assert 1e-6 < run.report.closure_error < 1e-4
     assert any("left free to second order" in note for note in run.report.notes)
 
 
@@ -186,5 +186,5 @@ def test_a_path_of_equilibria_ends_where_bars_in_line_would_come_apart():
     structure = fc.Structure([*plain.elements, stay, side], joints, inputs=[push], outputs=plain.outputs)
     path = fc.equilibrium_path(fc.assemble(structure, [fc.LargeRotation()], fc.CasadiVM()), {"push": 1.0}, until=10.0)
     assert path.end is fc.PathEnd.STUCK
-    assert abs(path["mid"][-1]) < 2e-3
-    assert np.abs(path["wall"] - 2.0).max() < 4e-6
+    assert abs(path["mid"][-1]) < 6e-3
+    assert np.abs(path["wall"] - 2.0).max() < 4e-5
