@@ -149,9 +149,8 @@ class Books:
             return sum((w * within(share, curve.at(t + share * h)) for share, w in inner), _ENDS * (first + last))
 
         total = mean(curve)
-        if total[1] > _OVERSHOT * 0.5 * (
-            first[1] + last[1]
-        ):  # a polynomial swings where it does not resolve the damping
+        ends = 0.5 * (first[1] + last[1])
+        if min(first[1], last[1]) > 0.0 and total[1] > _OVERSHOT * ends:  # it swings where damping is too stiff for it
             calm = Hermite(Local(self.model), before.state, after.state)
             total = within(0.5, calm.secant()) if total[1] > _OVERSHOT * mean(calm)[1] else total
         self.sums.work += h * float(total[0])

@@ -235,7 +235,7 @@ def test_an_hour_of_closed_loop_stays_within_300_megabytes(kind, tmp_path):
     assert status == "FINISHED"
     growth = (float(after) - float(before)) / (float(end) - float(t))
     assert float(after) + 3600.0 * max(growth, 0.0) < 300.0
-    assert float(peak) < 500.0  # compiling, where no code is kept yet
+    assert float(peak) < 550.0  # compiling, where no code is kept yet
 
 
 @pytest.mark.slow

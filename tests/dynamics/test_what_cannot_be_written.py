@@ -48,6 +48,6 @@ def test_a_checkpoint_that_cannot_be_written_ends_the_run(tmp_path):
     folder.mkdir()
     autosave = fc.Autosave(folder / "run.npz", seconds=1e-9)
     folder.rmdir()
-    run = fc.simulate(falling(), until=30.0, method=fc.GeneralizedAlpha(1e-4), autosave=autosave)
+    run = fc.simulate(falling(), until=3e4, every=1e3, method=fc.GeneralizedAlpha(1e-4), autosave=autosave)
     assert run.status is fc.Status.FAILED
     assert "run.npz cannot be written: No such file" in run.report.message
