@@ -261,14 +261,29 @@ class _Tying:
         for f in freedoms:
             cell = self.cell(node, f)
             if self.held(node, f):
-                self.closures.append(Closure(node, f, -1))
+                self.closures.append(Closure(node, f, self._turns_with(node) if f >= 3 else -1))
             elif cell in self.definer or cell in self.anchored:
-                other = self.definer.get(cell, -2)
-                if other == -2:
-                    other = next(i for i in range(len(self.nodes)) if i != node and self.cell(i, f) == cell)
-                self.closures.append(Closure(node, f, other))
+                self.closures.append(Closure(node, f, self._first(node, f)))
             else:
                 self.definer[cell] = node
+
+    def _first(self, node: int, f: int) -> int:
+        """The node that says what a freedom does which another node shares."""
+        cell = self.cell(node, f)
+        return self.definer.get(
+            cell, next((i for i in range(len(self.nodes)) if i != node and self.cell(i, f) == cell), -1)
+        )
+
+    def _turns_with(self, node: int) -> int:
+        """The node that a node turns with in all ways; -1 for none.
+
+        A held turn is held against it: of what else turns, the ground would be told the angle, and the hold the rate.
+        """
+        turns = [self.cell(node, f) for f in range(3, 6)]
+        shared = [f for f in range(3, 6) if self.cell(node, f) in self.definer or self.cell(node, f) in self.anchored]
+        firsts = [self._first(node, f) for f in shared if not self.held(node, f)]
+        alike = (i for i in firsts if i not in (node, -1) and turns == [self.cell(i, f) for f in range(3, 6)])
+        return next(alike, -1)
 
     def _number(self) -> Ties:
         """Number the own freedoms in the order of the nodes; what a follower computes is marked -1."""
