@@ -18,9 +18,10 @@ from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
 from flexctrl.dynamics.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
-from flexctrl.dynamics.landing import SHORTEST, SMALLEST, Missed, landed
+from flexctrl.dynamics.landing import Missed, landed
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.midpoint import ConservingMidpoint
+from flexctrl.dynamics.nearing import SHORTEST, SMALLEST
 from flexctrl.dynamics.record import Unwritten, writing
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance

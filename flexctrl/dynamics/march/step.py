@@ -1,7 +1,7 @@
 """Generalised alpha in compiled loops: one step.
 
 The method, its Newton iterations and its tests are those of `alpha`, but for the tangent, which is kept longer
-(see `march_axes`), and for Newton's tolerance, which is a share of the method's own error.
+(see `march.axes`), and for Newton's tolerance, which is a share of the method's own error.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
 from flexctrl.model.flat.fronts import factor
 
-__all__ = ["blended", "refactored", "sloped", "step", "to_rate", "to_v"]
+__all__ = ["blended", "press_all", "refactored", "sloped", "step", "to_rate", "to_v"]
 
 _TURNED = 0.03
 _POOR = 0.25
@@ -114,30 +114,16 @@ def blended(m: March, rate: Eight, before: Eight, own: Eight) -> Eight:
 
 def newton(m: March) -> int:
     """Iterate until the step is solved."""
-    f = m.flat
     while m.iteration < _ITERATIONS:
         if m.swift == 1:
             lag(m)
         elif m.phase == EVALUATE:
-            if m.whole == 1:
-                press_entire(f)
-            else:
-                place(f)
-                drive(f)
-                if m.contacts.count > 0 and m.contacts.stuck > 0:
-                    feel(m.contacts, f)
-                push(f)
+            press_all(m)
             m.phase = CORRECT
             if m.attempt == 1 or wary(m) or m.contraction > _POOR or (m.iteration == 0 and stale(m)):
-                m.last = m.last if wary(m) else math.inf
-                if m.whole == 1:
-                    place(f)
-                    drive(f)
-                if m.asking == 1:
-                    return WANTS_TANGENT
-                sloped(m, 1.0, to_v(m), to_rate(m))
-                if refactored(m) != DONE:
-                    return SINGULAR
+                status = sloped_here(m)
+                if status != DONE:
+                    return status
         m.phase = EVALUATE
         size = correct(m)
         if not math.isfinite(size) or m.strayed > _ASTRAY:
@@ -157,6 +143,31 @@ def newton(m: March) -> int:
             return DONE
         m.iteration += 1
     return FAILED
+
+
+def press_all(m: March) -> None:
+    """Sum up the forces of the motion under way."""
+    f = m.flat
+    if m.whole == 1:
+        press_entire(f)
+        return
+    place(f)
+    drive(f)
+    if m.contacts.count > 0 and m.contacts.stuck > 0:
+        feel(m.contacts, f)
+    push(f)
+
+
+def sloped_here(m: March) -> int:
+    """Make the tangent anew where the iteration stands, or ask for it."""
+    m.last = m.last if wary(m) else math.inf
+    if m.whole == 1:
+        place(m.flat)
+        drive(m.flat)
+    if m.asking == 1:
+        return WANTS_TANGENT
+    sloped(m, 1.0, to_v(m), to_rate(m))
+    return refactored(m)
 
 
 def lag(m: March) -> None:
