@@ -10,7 +10,9 @@ import numpy as np
 from flexctrl.dynamics import alpha
 from flexctrl.dynamics.alpha import AlphaPoint
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.march.marching import Marcher, Method, Remembered
+from flexctrl.dynamics.march.calling import Remembered
+from flexctrl.dynamics.march.making import Method
+from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
