@@ -94,7 +94,8 @@ def _line_geometric(
 
 
 _BEAM, _LINE = _Elastic(6, _beam_stress, _beam_geometric), _Elastic(1, _line_stress, _line_geometric)
-_ELASTIC = {part_kinds.BEAM.physics: _BEAM, part_kinds.SPRING.physics: _LINE, part_kinds.ROPE.physics: _LINE}
+_ROPES = (part_kinds.ROPE, part_kinds.HEAVY_ROPE)
+_ELASTIC = {part_kinds.BEAM.physics: _BEAM, **{kind.physics: _LINE for kind in (part_kinds.SPRING, *_ROPES)}}
 """The physics of pieces that strain."""
 
 
@@ -192,7 +193,7 @@ class Mixed:
     @cached_property
     def _ropes(self) -> np.ndarray:
         ropes = [
-            np.full(places.size, f.kernels.kind is part_kinds.ROPE)
+            np.full(places.size, f.kernels.kind in _ROPES)
             for f, places in zip(self._families, self._places, strict=True)
         ]
         return np.concatenate([np.zeros(0, dtype=bool), *ropes])
