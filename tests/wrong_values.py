@@ -78,6 +78,7 @@ STRUCTURE: dict[str, Call] = {
     ),
     "BeamChain": (fc.BeamChain, {"name": "c", "points": [(0, 0, 0), (1, 0, 0)], "section": SECTION, "up": "z"}),
     "arc": (fc.arc, {"center": (0, 0, 0), "start": (1, 0, 0), "axis": "z", "angle": 1.0, "elements": 3}),
+    "polygon": (fc.polygon, {"points": [(0, 0, 0), (1, 0, 0)]}),
     "Hinge": (fc.Hinge, {**NODES, "axis": "z"}),
     "Pin": (fc.Pin, NODES),
     "Weld": (fc.Weld, NODES),
