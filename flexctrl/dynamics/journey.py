@@ -12,9 +12,10 @@ import numpy as np
 
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
+from flexctrl.dynamics.crossings import crossings, offset
 from flexctrl.dynamics.dense import Curve, Track
 from flexctrl.dynamics.ending import ends_before
-from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
+from flexctrl.dynamics.events import EventError, Occurrence
 from flexctrl.dynamics.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
@@ -28,6 +29,7 @@ from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.switching import anew, beyond, is_brief, lead, withheld
+from flexctrl.dynamics.watch import Crossing, Watch
 from flexctrl.errors import ControllerError
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.model import Model
@@ -399,22 +401,22 @@ class Journey:
     def _watched(self, before: Point, after: Point) -> tuple[Point, Crossing | None]:
         """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
         watch, curve = self.watch, self.track.curve(before, after)
-        crossings = watch.crossings(curve, before, after, self.rows.every)
-        landing = next((c for c in crossings if watch.stops(c.gauge) and not self.is_over(c)), None)
+        met = crossings(watch, curve, before, after, self.rows.every)
+        landing = next((c for c in met if watch.stops(c.gauge) and not self.is_over(c)), None)
         switch = -1 if landing is None else landing.gauge - len(watch.events)
         if 0 <= switch < len(watch.names) and self.mark.stuck >= _CHATTER:
             name = watch.names[switch]
             raise StepError(self.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
         if landing is None or self.mark.stuck >= _CHATTER:
-            self._note(crossings, curve, before)
+            self._note(met, curve, before)
             watch.settle(after)
             self.mark.stuck = 0
             return after, None
-        earlier, slid = [c for c in crossings if c.t < landing.t], after
+        earlier, slid = [c for c in met if c.t < landing.t], after
         after, landing = landed(self, before, after, landing)
         switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
         brief = 0 <= switch < len(watch.names) and is_brief(self, before, after, slid, switch)
-        closest = {c.gauge: c for c in sorted(crossings, key=lambda c: -abs(c.t - landing.t))}.values()
+        closest = {c.gauge: c for c in sorted(met, key=lambda c: -abs(c.t - landing.t))}.values()
         there = [c for c in closest if c.gauge != landing.gauge and self._is_there(c, before, after, slid)]
         self._note([c for c in earlier if c not in there], curve, before)
         watch.settle(after)
@@ -438,7 +440,7 @@ class Journey:
             return False
         if after.state.t == t:
             return crossing.t - t <= _TOGETHER * whole
-        off = watch.offset(self.track.curve(before, after), before, after, crossing.gauge)
+        off = offset(watch, self.track.curve(before, after), before, after, crossing.gauge)
         return abs(off) <= _TOGETHER * whole
 
     def _switched(self, at: Point, landing: Crossing, switch: int, brief: bool) -> Point:

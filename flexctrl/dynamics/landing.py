@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from flexctrl.dynamics.events import Crossing
+from flexctrl.dynamics.crossings import crossings, offset
 from flexctrl.dynamics.nearing import (
     LANDINGS,
     LEAD,
@@ -22,6 +22,7 @@ from flexctrl.dynamics.nearing import (
     to_zero,
 )
 from flexctrl.dynamics.steps import Point, StepError
+from flexctrl.dynamics.watch import Crossing
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -41,7 +42,7 @@ def landed(journey: Journey, before: Point, after: Point, crossing: Crossing) ->
         after, crossing = _land(journey, before, after, crossing)
         if after is before:
             break
-        passed = journey.watch.crossings(journey.track.curve(before, after), before, after)
+        passed = crossings(journey.watch, journey.track.curve(before, after), before, after)
         ends = (
             c for c in passed if c.gauge != crossing.gauge and journey.watch.stops(c.gauge) and not journey.is_over(c)
         )
@@ -71,7 +72,7 @@ def _land(journey: Journey, before: Point, after: Point, crossing: Crossing) -> 
             raise Missed(error.worst, str(error)) from error
         left = watch.left(after, before, crossing)
         if last is None:
-            off = watch.offset(journey.track.curve(before, after), before, after, gauge)
+            off = offset(watch, journey.track.curve(before, after), before, after, gauge)
         else:
             off = to_zero(*last, at, left) if abs(left) > watch.dusts[gauge] else 0.0
         if abs(off) <= _NEAR * h:
@@ -102,7 +103,7 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
         curve, end = journey.track.curve(before, after), after.state.t
         left = watch.left(after, before, crossing)
         above = left - dust
-        off = watch.offset(curve, before, after, gauge) if above > 0.0 or last is None else 0.0
+        off = offset(watch, curve, before, after, gauge) if above > 0.0 or last is None else 0.0
         on = to_zero(*last, end, above) if last else off
         missed = above > 0.0 and end < at - lead  # no step ends there
         narrow(bracket, end if above > 0.0 else at, above)

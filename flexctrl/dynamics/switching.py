@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexctrl.dynamics.events import Crossing
 from flexctrl.dynamics.impact import LASTING, lasts
 from flexctrl.dynamics.landing import Missed
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.nearing import LEAST, NUDGES
 from flexctrl.dynamics.scales import farthest
 from flexctrl.dynamics.steps import Controlled, Joining, Point, Stepper
+from flexctrl.dynamics.watch import Crossing
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.state import State
 

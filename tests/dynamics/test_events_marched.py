@@ -154,7 +154,7 @@ def test_every_touch_of_zero_is_in_doubt():
         def values(self, state, u):
             return np.array([self.first])
 
-        def dusts_of(self, sizes):
+        def dust_of(self, sizes):
             return 1e-13 * sizes
 
     for _ in range(200):

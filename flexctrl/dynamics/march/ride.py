@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.dense import Dense
-from flexctrl.dynamics.events import Crossing
 from flexctrl.dynamics.march.guarding import EVENT, FEWEST, guarded, warily
 from flexctrl.dynamics.march.law_inside import told
 from flexctrl.dynamics.march.law_outside import samples
@@ -27,6 +26,7 @@ from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.settling import weightless
 from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.dynamics.switching import beyond
+from flexctrl.dynamics.watch import Crossing
 from flexctrl.errors import ControllerError
 
 if TYPE_CHECKING:
