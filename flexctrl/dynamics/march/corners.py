@@ -11,7 +11,7 @@ from flexctrl.dynamics.nearing import Bracket
 from flexctrl.dynamics.settling import weightless
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.flat import Flat
-from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = ["Corners", "comes_through", "corners_of", "crossed", "passes", "value", "within"]

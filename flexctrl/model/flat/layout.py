@@ -2,105 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.kernels.kernel import Backend, Kernel, Run
-from flexctrl.mechanics.rotation import turn_kernel
+from flexctrl.kernels.kernel import Backend
+from flexctrl.model.flat import binding
 from flexctrl.model.flat.axes import Axes, axes_of
 from flexctrl.model.flat.entire import Entire, entire_of
-from flexctrl.model.flat.entries import entry, entry_energy, entry_slope
 from flexctrl.model.flat.flat import Flat
+from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.fronts import Plan, plan_of
 from flexctrl.model.gauges import Gauges, gauges_of
-from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.model import Model
-from flexctrl.model.state import Dry, State
 
-__all__ = ["Flattened", "Layout"]
+__all__ = ["Layout"]
 
 _ALIGNED = 64
-_ROUND_OFF = 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class Flattened:
-    """A model on flat vectors, and how to bring states there and back.
-
-    Attributes
-    ----------
-    model : Model
-    flat : Flat
-    gauges : Gauges
-        Its outputs.
-    axes : Axes
-        Of its tangents.
-    plan : Plan
-        How its tangents are eliminated; degrees of freedom stand in that order.
-    pattern : tuple of numpy.ndarray
-        Rows and columns of their entries (with repeats).
-    constants : tuple of int and numpy.ndarray
-        What the workspace holds from some place on that never changes.
-    entire : Entire
-        Kernels of the whole machine, where it has few freedoms.
-    """
-
-    model: Model
-    flat: Flat
-    gauges: Gauges
-    axes: Axes
-    plan: Plan
-    pattern: tuple[np.ndarray, np.ndarray]
-    constants: tuple[int, np.ndarray]
-    entire: Entire
-
-    def ordered(self, x: np.ndarray) -> np.ndarray:
-        """Return values of the degrees of freedom in the order of elimination, padded with zeros."""
-        out = np.zeros(self.flat.padded)
-        out[: self.flat.n] = x[self.plan.order]
-        return out
-
-    def own(self, x: np.ndarray) -> np.ndarray:
-        """Return values of the degrees of freedom in the model's order."""
-        out = np.empty(self.flat.n)
-        out[self.plan.order] = x[: self.flat.n]
-        return out
-
-    def enter(self, state: State) -> None:
-        """Put a state at the start of a step."""
-        f, forces, (first, values) = self.flat, self.model.forces, self.constants
-        still = np.zeros(f.n)
-        f.z[first : first + values.size] = values
-        f.z[: forces.slot_count] = forces.slots(state, state.v, still)
-        f.pose.reshape(-1, 12)[:] = np.hstack([state.x, state.R.reshape(-1, 9)])
-        f.q[:], f.driven[:] = self.ordered(state.q), state.driven
-        self.gauges.shown[:], self.gauges.summed[:] = state.shown, self.model.motion.winding @ state.q
-        f.step[:], f.v[:], f.rate[:] = 0.0, self.ordered(state.v), 0.0
-
-    @property
-    def keeps_shape(self) -> bool:
-        """Whether what never changes in poses is as the kernels of the whole machine take it to be."""
-        return bool((abs(self.flat.z[self.entire.cells] - self.entire.values) <= _ROUND_OFF).all())
-
-    def state(self, v: np.ndarray, t: float, dry: Dry) -> State:
-        """Return the state at the start of the step, with rates ``v`` in the order of elimination.
-
-        Its outputs have been read.
-        """
-        found = self.pose_state(self.flat.pose, self.flat.q, v, self.flat.driven, t, dry)
-        return replace(found, shown=self.gauges.shown.copy())
-
-    def pose_state(
-        self, pose: np.ndarray, q: np.ndarray, v: np.ndarray, driven: np.ndarray, t: float, dry: Dry
-    ) -> State:
-        """Return the state of a pose (12 a node) and values in the order of elimination."""
-        rows = pose.reshape(-1, 12)
-        x, R = rows[:, :3].copy(), rows[:, 3:].reshape(-1, 3, 3).copy()
-        return State(x, R, self.own(q), self.own(v), driven.copy(), t, dry)
 
 
 class Layout:
@@ -299,127 +221,30 @@ class Layout:
         own_tangents = m.plain and not self.model.signals.follows
         damped = bool(self.model.viscous.nnz)
         return {
-            "turn": (self._turn(turned),) if len(turned) else (),
-            "linkage": () if m.plain else self._linkage(),
-            "winding": self._winding("pose") if m.drives else (),
-            "forces": (*self._forces(), *([self._entry_forces()] if damped else [])),
-            "tangents": (*([self._entry_slopes()] if damped else []), *self._tangents()) if own_tangents else (),
-            "energies": (*self._energies(), *([self._entry_energies()] if damped else [])),
+            "turn": (binding.turn(self, turned),) if len(turned) else (),
+            "linkage": () if m.plain else binding.linkage(self),
+            "winding": binding.winding(self, "pose") if m.drives else (),
+            "forces": (*binding.forces(self), *([binding.entry_forces(self)] if damped else [])),
+            "tangents": (*([binding.entry_slopes(self)] if damped else []), *binding.tangents(self))
+            if own_tangents
+            else (),
+            "energies": (*binding.energies(self), *([binding.entry_energies(self)] if damped else [])),
             "shifts": (),
-            "gusts": (self._gusts(),) if self.model.gusts else (),
+            "gusts": (binding.gusts(self),) if self.model.gusts else (),
         }
 
     @property
-    def _coordinates(self) -> tuple[str, ...]:
+    def coordinates(self) -> tuple[str, ...]:
         """What adds up to the coordinates at the start of a step, as the equations count them."""
         return ("q",)
-
-    def _entry_forces(self) -> Run:
-        rows, columns, values = self.entries
-        at = self.position[columns]
-        place = (*self._coordinates, "step")
-        gather = np.column_stack([self.starts[name] + at for name in (*place, "v", "rate")])
-        scatter = self.starts["force"] + self.position[rows][:, None]
-        return self.backend.bind(entry(len(place)), gather, values, scatter)
-
-    def _entry_slopes(self) -> Run:
-        rows, columns, values = self.entries
-        seeds = np.tile(self.starts["seeds"] + np.arange(3), (len(rows), 1))
-        return self.backend.bind(entry_slope(), seeds, values, self.plan.places(rows, columns)[:, None])
-
-    def _entry_energies(self) -> Run:
-        rows, columns, values = self.entries
-        place = self._coordinates
-        ends = [self.starts[name] + self.position[cells] for cells in (rows, columns) for name in (*place, "v")]
-        books = np.tile(np.arange(3), (len(rows), 1))
-        return self.backend.bind(entry_energy(len(place)), np.column_stack(ends), values, books)
 
     def _follows(self) -> np.ndarray:
         follows = self.model.signals.follows
         return np.array([w for f in follows for w in (f.input, f.node, *self.targets[f.cell : f.cell + 3])], dtype=int)
 
-    def _bind(self, kernel: Kernel, gather: np.ndarray, scatter: np.ndarray) -> Run:
-        """One item."""
-        return self.backend.bind(kernel, gather[None], np.zeros((1, 0)), scatter[None])
-
-    def _turn(self, nodes: np.ndarray) -> Run:
-        old = self.starts["pose"] + 12 * nodes[:, None] + 3 + np.arange(9)
-        theta = self.starts["step"] + self.position[self.motion.place[nodes, 3:]]
-        new = NODE_SLOT * nodes[:, None] + 3 + np.arange(9)
-        return self.backend.bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(nodes), 0)), new)
-
-    def _linkage(self) -> tuple[Run, ...]:
-        m, starts = self.motion, self.starts
-        place, rates, accelerations, collect = m.linkage.kernels[:4]
-        rigid = self.forces.drive_base + DRIVE_SLOT * np.flatnonzero(m.rigid)
-        slot = NODE_SLOT * m.nodes[:, None]
-        pose, own = (slot + np.arange(12)).ravel(), self.position[m.linked]
-        before = (starts["pose"] + 12 * m.nodes[:, None] + np.arange(12)).ravel()
-        v, a = starts["v"] + own, starts["rate"] + own
-        speeds, changes = ((slot + k + np.arange(6)).ravel() for k in (12, 18))
-        raw = starts["force"] + self.padded + np.arange(len(self.linked))
-        return (
-            self._bind(place, np.concatenate([before, starts["step"] + own]), pose),
-            self._bind(rates, np.concatenate([pose, v]), np.concatenate([speeds, rigid + 1])),
-            self._bind(accelerations, np.concatenate([pose, v, a]), np.concatenate([changes, rigid + 2])),
-            self._bind(collect, np.concatenate([pose, raw]), starts["force"] + own),
-        )
-
     @cached_property
     def _spun(self) -> np.ndarray:
         return self.position[self.motion.linked] if self.motion.rotary.any() else np.zeros(0, dtype=int)
-
-    def _winding(self, levers: str) -> tuple[Run, Run]:
-        """Driven coordinates, and what a step adds to them with levers of some pose."""
-        m, drives = self.motion, np.arange(len(self.motion.drives))
-        pose = (NODE_SLOT * m.nodes[:, None] + np.arange(12)).ravel()
-        before = (self.starts[levers] + 12 * m.nodes[:, None] + np.arange(12)).ravel()
-        step = self.starts["step"] + self.position[m.linked]
-        return (
-            self._bind(m.linkage.kernels[4], pose, self.starts["found"] + drives),
-            self._bind(m.linkage.kernels[5], np.concatenate([before, step]), self.starts["about"] + drives),
-        )
-
-    def _forces(self) -> list[Run]:
-        base, sources = self.forces.drive_base, self.motion.source_base
-        goal = self.starts["force"] + self.targets
-        bind = self.backend.bind
-        return [
-            bind(f.kernels.force, f.gather(base), f.parameters, goal[f.scatter(sources)]) for f in self.forces.families
-        ]
-
-    def _gusts(self) -> Run:
-        gusts, goal = self.model.gusts, self.starts["force"] + self.targets
-        gather = gusts.gather(self.starts["u"])
-        return self.backend.bind(gusts.kernels.force, gather, gusts.parameters, goal[gusts.scatter])
-
-    def _gust_slopes(self, places: np.ndarray) -> Run:
-        """Into the blocks of the nodes in the wind."""
-        gusts, bind = self.model.gusts, self.backend.bind
-        seeds = np.tile(self.starts["seeds"] + np.arange(3), (len(gusts.nodes), 1))
-        gather = np.hstack([gusts.gather(self.starts["u"]), seeds])
-        scatter = places[self.forces.wind_blocks].reshape(-1, 9)
-        return bind(gusts.kernels.tangent, gather, gusts.parameters, scatter)
-
-    def _energies(self) -> list[Run]:
-        base, bind = self.forces.drive_base, self.backend.bind
-        return [
-            bind(f.kernels.energy, f.gather(base), f.parameters, np.tile(np.arange(3), (f.count, 1)))
-            for f in self.forces.families
-        ]
-
-    def _tangents(self) -> list[Run]:
-        rows, columns, kept = self.pattern
-        places = np.full(self.forces.entries, self.plan.length)
-        places[kept] = self.plan.places(rows, columns)
-        runs = []
-        for f, start in zip(self.forces.families, self.forces.block_starts, strict=True):
-            size = f.kernels.kind.width**2
-            seeds = np.tile(self.starts["seeds"] + np.arange(3), (f.count, 1))
-            gather = np.hstack([f.gather(self.forces.drive_base), seeds])
-            scatter = places[start : start + f.count * size].reshape(f.count, size)
-            runs.append(self.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
-        return [*runs, self._gust_slopes(places)] if self.model.gusts else runs
 
 
 def _aligned(size: int) -> np.ndarray:

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.rotation import turned_rows
+from flexctrl.model.flat import binding
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.layout import Layout
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
@@ -44,7 +45,7 @@ class SmallLayout(Layout):
         return first, values
 
     @property
-    def _coordinates(self) -> tuple[str, ...]:
+    def coordinates(self) -> tuple[str, ...]:
         """From where it rests on: what is small, and nothing of which is lost to what is not."""
         return ("q", "back") if self.model.about else ("q",)
 
@@ -106,11 +107,11 @@ class SmallLayout(Layout):
         return {
             "turn": (),
             "linkage": self._linkage(),
-            "winding": self._winding("drawn") if self.motion.drives else (),
-            "forces": (self._entry_forces(),),
-            "tangents": (self._entry_slopes(),),
-            "energies": (self._entry_energies(),),
-            "shifts": (self._along((*self._coordinates, "step"), cells, self.starts["shift"]),),
+            "winding": binding.winding(self, "drawn") if self.motion.drives else (),
+            "forces": (binding.entry_forces(self),),
+            "tangents": (binding.entry_slopes(self),),
+            "energies": (binding.entry_energies(self),),
+            "shifts": (self._along((*self.coordinates, "step"), cells, self.starts["shift"]),),
             "gusts": (),
         }
 

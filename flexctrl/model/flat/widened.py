@@ -10,8 +10,9 @@ import numpy as np
 from flexctrl.kernels.kernel import Run
 from flexctrl.mechanics.rotation import turn_kernel
 from flexctrl.model.flat.flat import Flat
+from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.flattening import layout_of
-from flexctrl.model.flat.layout import Flattened, Layout
+from flexctrl.model.flat.layout import Layout
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.linkages.chart import Chart
 from flexctrl.model.model import Model
