@@ -1,4 +1,4 @@
-"""Accelerations beyond a corner of a law of force, in compiled loops; as `alpha.Stepper.join` finds them."""
+"""Accelerations beyond a corner of a law of force, in compiled loops; as `outset.join` finds them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _FIRM = 1e30
 def start_anew(m: March) -> int:
     """Find the accelerations under the law of force that holds from now on, and the method's own.
 
-    The lead of these on the true ones is (α_m − α_f) h times the rate of the accelerations; see `alpha.Stepper.join`.
+    The lead of these on the true ones is (α_m − α_f) h times the rate of the accelerations; see `outset.join`.
     """
     f = m.flat
     m.made_for = -1.0

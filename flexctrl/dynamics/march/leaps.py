@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
+from flexctrl.dynamics.alpha_point import AlphaPoint, Coefficients
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.exact import ExactStepper, ModalPoint
 from flexctrl.dynamics.feed import Supply

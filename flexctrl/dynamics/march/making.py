@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import Coefficients
+from flexctrl.dynamics.alpha_point import Coefficients
 from flexctrl.dynamics.coning import coning_of
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AlphaPoint
+from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.frames import Later
