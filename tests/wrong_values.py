@@ -125,7 +125,7 @@ EFFECT: dict[str, Call] = {
     "Within": (fc.Within, {"outputs": 0.1, "poles": 0.1, "margins": 0.1}),
     "GeometricStiffness": (fc.GeometricStiffness, {"hold": {"motor_source": 0.0}, "inputs": {"push": 0.0}}),
     "Gravity": (fc.Gravity, {"g": (0, 0, -9.81)}),
-    "ComponentModes": (fc.ComponentModes, {"count": 2, "of": ("bar",)}),
+    "ComponentModes": (fc.ComponentModes, {"count": 2, "of": ("bar",), "along": 1}),
     "BeamFlexibility": (fc.BeamFlexibility, {"of": ("bar",)}),
     "RopeStretch": (fc.RopeStretch, {"of": ("rope",)}),
     "RopeMass": (fc.RopeMass, {"of": ("rope",)}),
