@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.dynamics.newton import small_enough
 from flexctrl.dynamics.scales import once
 from flexctrl.model.model import Model
 from flexctrl.model.rounding import DIGITS
@@ -29,6 +28,8 @@ SURE = 1e-11
 TURNING, SHORT = 0.5, 1.0 / 64.0
 """Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
 shortened by that share from then on."""
+
+_POOR, _ROUND_OFF = 0.25, 1e-13
 
 Line = Rope | Spring | Winch
 
@@ -53,7 +54,7 @@ class Caution:
 
         What goes back and forth between a slack rope and a taut one goes a little less far from then on.
         """
-        if small_enough(size, contraction, self.enough):
+        if size <= self.enough or (contraction > _POOR and size <= _ROUND_OFF):
             last = not self.short
             self.short = 0.0
             return last

@@ -64,14 +64,13 @@ def modal_blocks(
     for effect in effects:
         for part in s.elements:
             if isinstance(effect, ComponentModes) and isinstance(part, Beam) and effect.modes(part):
-                mass, stiffness = modal_matrices(part.section, part.length / part.elements, effect.count, effect.along)
-                own_count = len(mass) - 12
+                mass, stiffness = modal_matrices(part.section, part.length / part.elements, effect.count)
                 turn = np.eye(len(mass))
                 turn[:12, :12] = np.kron(np.eye(4), part.axes)
                 for i, places in enumerate(_elements(s, part)):
-                    own = place + own_count * i + np.arange(own_count)
+                    own = place + 2 * effect.count * i + np.arange(2 * effect.count)
                     yield part.name, (np.append(places, own), turn @ mass @ turn.T, stiffness)
-                place += own_count * part.elements
+                place += 2 * effect.count * part.elements
         if not isinstance(effect, ComponentModes):
             place += len(effect.inner(s))
 

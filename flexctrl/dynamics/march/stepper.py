@@ -7,12 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from flexctrl.dynamics import alpha_steps
-from flexctrl.dynamics.alpha_point import AlphaPoint
+from flexctrl.dynamics import alpha
+from flexctrl.dynamics.alpha import AlphaPoint
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.march.calling import Remembered
-from flexctrl.dynamics.march.making import Method
-from flexctrl.dynamics.march.marching import Marcher
+from flexctrl.dynamics.march.marching import Marcher, Method, Remembered
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
@@ -25,7 +23,7 @@ __all__ = ["MarchingStepper", "Memory"]
 class Memory:
     """The tangents in use: of the plain steps and of the march."""
 
-    plain: alpha_steps.Tangent | None
+    plain: alpha.Tangent | None
     march: Remembered
 
 
@@ -40,7 +38,7 @@ class MarchingStepper:
     plain : Stepper
     """
 
-    plain: alpha_steps.Stepper
+    plain: alpha.Stepper
     _here: AlphaPoint | None = None
     _made: int = 0
 
