@@ -211,18 +211,12 @@ def controlled(m: March) -> int:
         if status == DONE:
             judge(m)
             error = compared(m)
-        if status != DONE or error > 1.0:
+        again = status != DONE or error > 1.0
+        if again:
             m.rejected += 1
             m.size = 0.25 * m.h if status != DONE else m.h * max(0.2, 0.9 * growth(error))
-            again = True
             continue
-        again = False
-        factor = 0.9 * growth(error)
-        grown = m.size
-        if factor > 1.3 and m.h > 0.5 * m.size:
-            grown = m.h * min(2.5, factor)
-        elif factor < 1.0:
-            grown = m.h * factor
+        grown = grown_by(m, 0.9 * growth(error))
         reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
             status = turn_corner(m, grown)
@@ -236,6 +230,13 @@ def controlled(m: March) -> int:
         m.follow = max(0, m.follow - 1)
         accept(m)
     return DONE
+
+
+def grown_by(m: March, factor: float) -> float:
+    """Return the length of the next step where the error of this one would let it grow by a factor."""
+    if factor > 1.3 and m.h > 0.5 * m.size:
+        return m.h * min(2.5, factor)
+    return m.h * factor if factor < 1.0 else m.size
 
 
 def unmarched(m: March) -> int:
