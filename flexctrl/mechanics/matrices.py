@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexctrl.structure.drives import Drive
 from flexctrl.structure.sections import Section
 
 
@@ -172,14 +171,3 @@ def to_space(matrix: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Turn a 12 × 12 element matrix from the element's axes (columns of ``axes``) to space axes."""
     T = np.kron(np.eye(4), axes)
     return T @ matrix @ T.T
-
-
-def drive_stiffness(drive: Drive) -> np.ndarray:
-    """Return the matrix of eq. 4, k_θ [[R², −R², −R], [−R², R², R], [−R, R, 1]].
-
-    Its rows are the driven freedom of ``node``, that of ``against`` (left out to ground: eq. 5) and θ_d. For a
-    linear drive R is the ratio over the wheel radius.
-    """
-    row = np.array([drive.effective_ratio, -drive.effective_ratio, -1.0])
-    matrix = drive.stiffness * np.outer(row, row)
-    return matrix if drive.against is not None else matrix[np.ix_([0, 2], [0, 2])]

@@ -10,7 +10,7 @@ from numpy.polynomial.legendre import leggauss
 from scipy.linalg import eigvals
 
 import flexctrl as fc
-from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, drive_stiffness, to_space
+from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, to_space
 
 L = 1.7
 SECTION = fc.Section(EA=900.0, EI_y=40.0, EI_z=70.0, GJ=30.0, rhoA=1.3, rhoJ=0.05, rhoI_y=0.02, rhoI_z=0.03)
@@ -106,27 +106,6 @@ def test_to_space_keeps_energies():
     local = np.concatenate([axes.T @ d[k : k + 3] for k in range(0, 12, 3)])
     K = beam_stiffness(SHEAR, L)
     assert d @ to_space(K, axes) @ d == pytest.approx(local @ K @ local)
-
-
-BEAM = fc.Beam("b", (0, 0, 0), (1, 0, 0), SECTION)
-
-
-def test_drive_matrix_between_elements_is_eq_4_sign_for_sign():
-    k, R = 50.0, 3.0
-    drive = fc.RotaryDrive("d", BEAM.end, BEAM.start, stiffness=k, ratio=R)
-    expected = k * np.array([[R**2, -(R**2), -R], [-(R**2), R**2, R], [-R, R, 1]])
-    assert np.array_equal(drive_stiffness(drive), expected)
-
-
-def test_drive_matrix_to_ground_is_eq_5_sign_for_sign():
-    k, R = 50.0, 3.0
-    drive = fc.RotaryDrive("d", BEAM.end, stiffness=k, ratio=R)
-    assert np.array_equal(drive_stiffness(drive), k * np.array([[R**2, -R], [-R, 1]]))
-
-
-def test_drive_matrix_of_a_wheel_has_the_ratio_over_the_radius():
-    drive = fc.LinearDrive("d", BEAM.end, stiffness=50.0, ratio=3.0, radius=0.25)
-    assert np.allclose(drive_stiffness(drive), 50.0 * np.array([[144.0, -12.0], [-12.0, 1.0]]))
 
 
 def test_infinite_shear_stiffness_is_euler_bernoulli():
