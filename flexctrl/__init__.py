@@ -17,7 +17,7 @@ _HOMES = {
     "flexctrl.structure.beams": ("Beam",),
     "flexctrl.structure.lines": ("Rope", "Spring"),
     "flexctrl.structure.bodies": ("PointMass", "RigidBody"),
-    "flexctrl.structure.chains": ("BeamChain", "arc"),
+    "flexctrl.structure.chains": ("BeamChain", "arc", "polygon"),
     "flexctrl.structure.joints": ("Hinge", "Pin", "Slide", "Support", "Weld"),
     "flexctrl.structure.drives": ("LinearDrive", "RotaryDrive", "Winch"),
     "flexctrl.structure.inputs": ("FollowerForce", "FollowerTorque", "Force", "MotorTorque", "Torque", "WindSpeed"),

@@ -25,7 +25,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
 
-_FORMAT = 5
+_FORMAT = 6
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.dynamics.alpha import AlphaPoint
+from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.run import Tolerance

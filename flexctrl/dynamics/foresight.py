@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexctrl.dynamics.events import Event, EventError, Watch
+from flexctrl.dynamics.events import Event, EventError
 from flexctrl.dynamics.steps import Point
+from flexctrl.dynamics.watch import Watch
 
 __all__ = ["calm_steps"]
 
@@ -46,7 +47,7 @@ def calm_steps(watch: Watch, before: Point, table: np.ndarray, u: np.ndarray) ->
     t = np.append(before.state.t, table[: len(found), 0])
     ahead = watch.sides[: len(events)] * values
     sizes = np.maximum.accumulate(np.maximum(np.abs(values), watch.sizes[: len(events)]))
-    clear = (ahead > watch.dusts_of(sizes)) & (ahead > 0.0)
+    clear = (ahead > watch.dust_of(sizes)) & (ahead > 0.0)
     doubtful = ~(clear[:-1] & clear[1:] & (np.minimum(ahead[:-1], ahead[1:]) > _dips(t, ahead))).all(axis=1)
     calm = int(np.argmax(doubtful)) if doubtful.any() else len(found)
     watch.sizes[: len(events)] = sizes[calm]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,21 +12,22 @@ import numpy as np
 
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
-from flexctrl.dynamics.dense import Curve, Track
-from flexctrl.dynamics.ending import ends_before
-from flexctrl.dynamics.events import Crossing, EventError, Occurrence, Watch
+from flexctrl.dynamics.dense import Track
+from flexctrl.dynamics.events import EventError, Occurrence
 from flexctrl.dynamics.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
-from flexctrl.dynamics.landing import SHORTEST, SMALLEST, Missed, landed
 from flexctrl.dynamics.march.ride import ride
 from flexctrl.dynamics.midpoint import ConservingMidpoint
+from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.record import Unwritten, writing
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper
 from flexctrl.dynamics.stops import Stops
-from flexctrl.dynamics.switching import anew, beyond, is_brief, lead, withheld
+from flexctrl.dynamics.switching import beyond
+from flexctrl.dynamics.watch import Crossing, Watch
+from flexctrl.dynamics.watching import watched
 from flexctrl.errors import ControllerError
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.model import Model
@@ -34,9 +35,6 @@ from flexctrl.model.state import State
 
 __all__ = ["Journey", "Plan"]
 
-_NEAR = 1e-9
-_CHATTER = 20
-_TOGETHER = 1e-7
 _FORESEEN = 20_000
 
 
@@ -145,17 +143,18 @@ class Journey:
             self.notes += self.books.doubts
 
     @property
-    def _tick(self) -> float:
+    def tick(self) -> float:
+        """What times are told apart by [s]."""
         return 1e-12 * self.plan.until
 
     def _through_stops(self, interruption: Interruption) -> None:
-        end, self._told = self.plan.until - self._tick, time.perf_counter()
+        end, self._told = self.plan.until - self.tick, time.perf_counter()
         self._kept = self._told
         while self.status is Status.FINISHED:
             t, stop = self.point.state.t, self.stops.next
             if t >= end:
                 return
-            if stop - t <= self._tick:
+            if stop - t <= self.tick:
                 self._renew(stop)
                 self._pause()
                 continue
@@ -183,9 +182,9 @@ class Journey:
         if not self.balked and ride(self, until, most):
             return
         if isinstance(self.plan.method.pace, Fixed):
-            self._fixed(stop, until)
+            fixed(self, stop, until)
         else:
-            self._controlled(stop, until)
+            controlled(self, stop, until)
         self.balked = False
 
     @property
@@ -276,7 +275,7 @@ class Journey:
         torn = switches.under(state, u)
         loose = (switches.phases(state) == STUCK) & (switches.phases(torn) != STUCK)
         for switch in np.flatnonzero(loose):
-            self._tell(Crossing(state.t, len(self.watch.events) + int(switch), True), state, u)
+            self.happens(Crossing(state.t, len(self.watch.events) + int(switch), True), state, u)
         return torn
 
     def leapt(self) -> None:
@@ -286,103 +285,17 @@ class Journey:
             watch.reach(crossing)
             if self.is_over(crossing):
                 continue
-            self._tell(crossing, point.state, point.supply.u)
+            self.happens(crossing, point.state, point.supply.u)
             if watch.stops(crossing.gauge):
                 name = watch.last_word(crossing.gauge)
                 self.status, self.message = Status.STOPPED, f"{name} at t = {crossing.t:.6g} s"
         watch.settle(point)
 
-    # -- steps of fixed length
-
-    def _fixed(self, stop: float, until: float) -> None:
-        mark, t = self.mark, self.point.state.t
-        if not mark.left:
-            length = self.plan.method.pace.step  # type: ignore[union-attr]
-            count = max(1, math.ceil((stop - t) / length - 1e-6)) if math.isfinite(stop) else 0
-            mark.size, mark.left = (stop - t) / count if count else length, count or -1
-        room = math.floor((until - t) / mark.size + _NEAR)
-        if not room:
-            if not ends_before(self, stop):
-                self._take(until - t, stop)
-            return
-        self._take(mark.size, stop)
-        if mark.left > 0:
-            mark.left -= 1
-
-    def _take(self, h: float, stop: float) -> None:
-        """A step of fixed length; where it does not converge, in halves."""
-        try:
-            after = self.stepper.step(self.point, h)
-        except StepError as failure:
-            self.mark.rejected += 1
-            if h < 2e-3 * self.mark.size:
-                why = f"{failure}; steps up to {self.mark.size:.3g} s have failed too; take AdaptiveAlpha"
-                raise StepError(failure.worst, why) from failure
-            return self._halved(h, stop)
-        try:
-            self._accept(after, stop)
-        except Missed:
-            self.mark.rejected += 1
-            if h < 2e-3 * self.mark.size:
-                raise
-            self._halved(h, stop)
-
-    def _halved(self, h: float, stop: float) -> None:
-        """Take a step in two; what ends the first short of its half is made up by the second."""
-        end = self.point.state.t + h
-        self._take(0.5 * h, stop)
-        if self.status is Status.FINISHED and (left := end - self.point.state.t) > SMALLEST * h:
-            self._take(left, stop)
-
-    # -- steps of controlled length
-
-    def _controlled(self, stop: float, until: float) -> None:
-        pace, mark, t = self.plan.method.pace, self.mark, self.point.state.t
-        assert isinstance(pace, Controlled)
-        left, size = stop - t, mark.size
-        h = min(size, pace.largest)
-        h = min(h, mark.cap) if mark.follow else h
-        h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
-        if t + h > until + self._tick:
-            if ends_before(self, stop):
-                return
-            h = until - t
-        why = ""
-        while True:
-            if mark.led and h != mark.led:
-                lead(self, h)
-            if h < SMALLEST * max(SHORTEST * self.plan.until, t):
-                raise StepError(self.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
-            try:
-                after = self.stepper.step(self.point, h)
-            except StepError as failure:
-                why = f": {failure}"
-                mark.rejected += 1
-                size = h = 0.25 * h
-                continue
-            error = self.stepper.error(self.point, after, self.books.sums.moved, self.plan.tolerance)
-            factor = 0.9 * max(error, 1e-9) ** (-1.0 / pace.steepness)
-            if error <= 1.0:
-                break
-            mark.rejected += 1
-            size = h = h * max(0.2, factor)
-        if factor > 1.3 and h > 0.5 * size:
-            size = h * min(2.5, factor)
-        elif factor < 1.0:
-            size = h * factor
-        mark.size, mark.led, mark.follow = size, 0.0, max(0, mark.follow - 1)
-        try:
-            self._accept(after, stop)
-        except Missed:
-            mark.rejected += 1
-            mark.size = 0.25 * h
-
-    # -- what comes with every step
-
-    def _accept(self, after: Point, stop: float) -> None:
+    def accept(self, after: Point, stop: float) -> None:
+        """Enter a step in the books, rows and track, up to where something ended it."""
         before, corner = self.point, None
         if not self.watch.idle:
-            after, corner = self._watched(before, after)
+            after, corner = watched(self, before, after)
             if after.state.t == before.state.t:
                 self.point = after if corner is None else beyond(self, after, corner)
                 return
@@ -391,72 +304,15 @@ class Journey:
         self.point = after
         self.mark.steps += 1
         self.track.keep((after.state,), before, after)
-        self.rows.within(before, after, stop - after.state.t <= self._tick)
+        self.rows.within(before, after, stop - after.state.t <= self.tick)
         if corner is not None:
             self.point = beyond(self, after, corner)
-
-    def _watched(self, before: Point, after: Point) -> tuple[Point, Crossing | None]:
-        """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
-        watch, curve = self.watch, self.track.curve(before, after)
-        crossings = watch.crossings(curve, before, after, self.rows.every)
-        landing = next((c for c in crossings if watch.stops(c.gauge) and not self.is_over(c)), None)
-        switch = -1 if landing is None else landing.gauge - len(watch.events)
-        if 0 <= switch < len(watch.names) and self.mark.stuck >= _CHATTER:
-            name = watch.names[switch]
-            raise StepError(self.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
-        if landing is None or self.mark.stuck >= _CHATTER:
-            self._note(crossings, curve, before)
-            watch.settle(after)
-            self.mark.stuck = 0
-            return after, None
-        earlier, slid = [c for c in crossings if c.t < landing.t], after
-        after, landing = landed(self, before, after, landing)
-        switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
-        brief = 0 <= switch < len(watch.names) and is_brief(self, before, after, slid, switch)
-        closest = {c.gauge: c for c in sorted(crossings, key=lambda c: -abs(c.t - landing.t))}.values()
-        there = [c for c in closest if c.gauge != landing.gauge and self._is_there(c, before, after, slid)]
-        self._note([c for c in earlier if c not in there], curve, before)
-        watch.settle(after)
-        for c in sorted((*there, landing), key=lambda c: c.gauge):
-            watch.cross(c)
-            if not 0 <= c.gauge - len(watch.events) < len(watch.names):
-                self._tell(replace(c, t=landing.t), after.state, after.supply.u)
-        if end := watch.last_word(landing.gauge):
-            self.status, self.message = Status.STOPPED, f"{end} at t = {landing.t:.6g} s"
-            return after, None
-        short = landing.t - before.state.t < 1e-6 * self.mark.size
-        self.mark.stuck = self.mark.stuck + 1 if short else 0
-        if switch >= len(watch.names):
-            return after, landing
-        return self._switched(after, landing, switch, brief), None
-
-    def _is_there(self, crossing: Crossing, before: Point, after: Point, slid: Point) -> bool:
-        """Tell whether an event asked for, seen in a step, happens just where that ends now that it is cut short."""
-        watch, t, whole = self.watch, before.state.t, slid.state.t - before.state.t
-        if crossing.gauge >= len(watch.events):
-            return False
-        if after.state.t == t:
-            return crossing.t - t <= _TOGETHER * whole
-        off = watch.offset(self.track.curve(before, after), before, after, crossing.gauge)
-        return abs(off) <= _TOGETHER * whole
-
-    def _switched(self, at: Point, landing: Crossing, switch: int, brief: bool) -> Point:
-        """Go on under the law of force that holds from now on; note whether the contact slides under it."""
-        fresh = at if brief else anew(self, at, switch)
-        slides = not brief and self.plan.model.switches.phases(fresh.state)[switch] != STUCK
-        self._tell(replace(landing, rising=bool(slides)), at.state, at.supply.u)
-        return withheld(self, at, switch) if brief else fresh
 
     def is_over(self, crossing: Crossing) -> bool:
         """Tell whether an event asked for has been told, or is beyond the end."""
         return crossing.gauge < len(self.watch.events) and crossing.t <= self.told
 
-    def _note(self, crossings: Sequence[Crossing], curve: Curve, before: Point) -> None:
-        for c in crossings:
-            self.watch.cross(c)
-            self._tell(c, curve.at(c.t), before.supply.u)
-
-    def _tell(self, crossing: Crossing, state: State, u: np.ndarray) -> None:
+    def happens(self, crossing: Crossing, state: State, u: np.ndarray) -> None:
         """Note an event, unless that has been done."""
         if crossing.t > self.told:
             self.events.append(self.watch.occurrence(crossing, state, u))

@@ -20,6 +20,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.masses import Masses
 from flexctrl.dynamics.massless import massless
+from flexctrl.dynamics.newton import POOR
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import largest, turning, yardsticks
 from flexctrl.dynamics.settling import settled
@@ -36,7 +37,6 @@ __all__ = ["ConservingMidpoint"]
 _NEWTON = 1e-12
 _ITERATIONS = 15
 _TURNED = 0.02
-_POOR = 0.25
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class _Stepper:
             self.counts.newton += 1
             step = step + correction
             contraction = size / last if np.isfinite(last) else 0.0
-            poor = contraction > _POOR and size > 100.0 * _NEWTON
+            poor = contraction > POOR and size > 100.0 * _NEWTON
             settled = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * _NEWTON
             if size <= _NEWTON or settled or (contraction > 0.5 and size < 1e3 * _NEWTON):
                 self.counts.worst = worst

@@ -14,7 +14,7 @@ from flexctrl.dynamics.asked import check_arguments, check_times, events_of
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track, curves_of
-from flexctrl.dynamics.events import Event, Watch
+from flexctrl.dynamics.events import Event
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_plant import LinearPlant
@@ -24,6 +24,7 @@ from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
+from flexctrl.dynamics.watch import Watch
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.consistent import check_state

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.dynamics.newton import small_enough
 from flexctrl.dynamics.scales import once
 from flexctrl.model.model import Model
 from flexctrl.model.rounding import DIGITS
@@ -28,8 +29,6 @@ SURE = 1e-11
 TURNING, SHORT = 0.5, 1.0 / 64.0
 """Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
 shortened by that share from then on."""
-
-_POOR, _ROUND_OFF = 0.25, 1e-13
 
 Line = Rope | Spring | Winch
 
@@ -54,7 +53,7 @@ class Caution:
 
         What goes back and forth between a slack rope and a taut one goes a little less far from then on.
         """
-        if size <= self.enough or (contraction > _POOR and size <= _ROUND_OFF):
+        if small_enough(size, contraction, self.enough):
             last = not self.short
             self.short = 0.0
             return last

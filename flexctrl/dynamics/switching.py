@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexctrl.dynamics.events import Crossing
 from flexctrl.dynamics.impact import LASTING, lasts
 from flexctrl.dynamics.landing import Missed
 from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.nearing import LEAST, NUDGES
 from flexctrl.dynamics.scales import farthest
 from flexctrl.dynamics.steps import Controlled, Joining, Point, Stepper
+from flexctrl.dynamics.watch import Crossing
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.state import State
 
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
 __all__ = ["anew", "beyond", "is_brief", "lead", "withheld"]
-
-_LEAST = 1e-9
-_NUDGES = 8
 
 
 def anew(journey: Journey, at: Point, switch: int) -> Point:
@@ -64,9 +62,9 @@ def withheld(journey: Journey, at: Point, switch: int) -> Point:
 def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
     """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
     watch, sign = journey.watch, 1.0 if corner.rising else -1.0
-    span = max(_LEAST * journey.mark.size, corner.t - at.state.t)
+    span = max(LEAST * journey.mark.size, corner.t - at.state.t)
     state, v = at.state, at.state.v
-    for _ in range(_NUDGES):
+    for _ in range(NUDGES):
         moved = journey.plan.model.advance(at.state, span * v, v, at.state.t)
         if sign * watch.values(moved, at.supply.u)[corner.gauge] > watch.dusts[corner.gauge]:
             state = moved

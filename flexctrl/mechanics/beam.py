@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from flexctrl.mechanics import component_modes
 from flexctrl.mechanics.matrices import PlaneMass
@@ -101,6 +101,18 @@ def no_force() -> BeamForce:
     return BeamForce(ca.SX(7, 1), ca.SX(3, 1), ca.SX(12, 1))
 
 
+class OwnMotion(NamedTuple):
+    """Amplitudes of an element's own modes, their rates and accelerations, in the order of `component_modes`.
+
+    The last ``2 along`` of each are those of stretch and of twist.
+    """
+
+    amplitudes: ca.SX
+    rates: ca.SX
+    accelerations: ca.SX
+    along: int = 0
+
+
 @dataclass(frozen=True)
 class BeamMotion:
     """What the effects may use of a moving beam element; vectors in the element frame unless said.
@@ -125,8 +137,8 @@ class BeamMotion:
         Spin of the frame.
     rates, accelerations : tuple of four casadi.SX
         v₁, ω₁, v₂, ω₂ and their rates, absolute, resolved in the frame.
-    modal : tuple of three casadi.SX, or of none
-        Amplitudes of the element's own modes with their rates and accelerations (see `component_modes`).
+    modal : OwnMotion, or empty
+        That of the element's own modes.
     lean : casadi.SX or float
         The chord over the length of which ``stretch`` tells; 1 but over the middle of a step (see `reach`).
     """
@@ -142,7 +154,7 @@ class BeamMotion:
     spin: ca.SX
     rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
     accelerations: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
-    modal: tuple[ca.SX, ...] = ()
+    modal: OwnMotion | tuple[()] = ()
     lean: ca.SX | float = 1.0
 
 
@@ -170,7 +182,9 @@ def whole_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     return ca.vertcat(nodal, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else nodal
 
 
-def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal: tuple[ca.SX, ...] = ()) -> BeamMotion:
+def beam_motion(
+    first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal: OwnMotion | tuple[()] = ()
+) -> BeamMotion:
     """Return the motion of an element from that of its nodes.
 
     Parameters
@@ -178,8 +192,8 @@ def beam_motion(first: NodeMotion, second: NodeMotion, parameters: ca.SX, modal:
     first, second : NodeMotion
     parameters : casadi.SX
         In the order of `PARAMETERS`.
-    modal : tuple of casadi.SX
-        Amplitudes, rates and accelerations of the element's own modes; empty: it has none.
+    modal : OwnMotion, or empty
+        That of the element's own modes, where it has any.
 
     Returns
     -------
@@ -222,7 +236,7 @@ def framed_motion(
     theta: tuple[ca.SX, ...],
     rates: tuple[ca.SX, ...],
     accelerations: tuple[ca.SX, ...],
-    modal: tuple[ca.SX, ...] = (),
+    modal: OwnMotion | tuple[()] = (),
 ) -> BeamMotion:
     """Return the motion of an element from what is seen in its frame; ``sides`` are the nodes' second axes."""
     import casadi as ca
@@ -346,7 +360,7 @@ def seen_deformed(m: BeamMotion) -> tuple[ca.SX, BeamMotion]:
     import casadi as ca
 
     seen = ca.SX.sym("seen", 7 + sum(eta.numel() for eta in m.modal[:1]))
-    modal = (seen[7:], *m.modal[1:]) if m.modal else ()
+    modal = m.modal._replace(amplitudes=seen[7:]) if m.modal else ()
     return seen, replace(m, stretch=seen[0], theta=(seen[1:4], seen[4:7]), modal=modal)
 
 

@@ -66,7 +66,7 @@ def _momenta(m: BeamMotion, rates: tuple[ca.SX, ...], order: int) -> tuple[tuple
     blocks = momentum(m, rates)  # type: ignore[arg-type]
     if not m.modal:
         return blocks, 0.0
-    more, modal = component_modes.momenta(m, rates, m.modal[order])
+    more, modal = component_modes.momenta(m, rates, m.modal[:3][order])
     return tuple(a + b for a, b in zip(blocks, more, strict=True)), modal
 
 

@@ -12,7 +12,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, beam_motion, framed_motion, whole_force
+from flexctrl.mechanics.beam import (
+    BeamForce,
+    BeamMotion,
+    NodeMotion,
+    OwnMotion,
+    beam_motion,
+    framed_motion,
+    whole_force,
+)
 from flexctrl.mechanics.rotation import inverse_tangent
 
 if TYPE_CHECKING:
@@ -30,17 +38,18 @@ class _Seen:
     theta: tuple[ca.SX, ...]
     rates: tuple[ca.SX, ...]
     accelerations: tuple[ca.SX, ...]
-    modal: tuple[ca.SX, ...]
+    modal: OwnMotion | tuple[()]
 
     @classmethod
-    def symbols(cls, modes: int) -> _Seen:
+    def symbols(cls, own: OwnMotion | tuple[()]) -> _Seen:
         import casadi as ca
 
         def some(name: str, count: int) -> tuple[ca.SX, ...]:
             return tuple(ca.SX.sym(f"{name}{i}", 3) for i in range(count))
 
         frame, middle, chord = ca.SX.sym("frame", 3, 3), ca.SX.sym("middle", 3), ca.SX.sym("chord")
-        modal = tuple(ca.SX.sym(f"modal{i}", modes) for i in range(3)) if modes else ()
+        amplitudes, rates, accelerations = (ca.SX.sym(f"modal{i}", own[0].numel() if own else 0) for i in range(3))
+        modal = OwnMotion(amplitudes, rates, accelerations, own.along) if own else ()
         around = (some("side", 2), some("theta", 2), some("rate", 4), some("acceleration", 4))
         return cls(frame, middle, chord, *around, modal)
 
@@ -55,7 +64,7 @@ class _Seen:
         import casadi as ca
 
         nodal = (self.middle, self.chord, *self.sides, *self.theta, *self.rates, *self.accelerations)
-        return ca.vertcat(*nodal, *self.modal)
+        return ca.vertcat(*nodal, *self.modal[:3])
 
     def motion(self, p: dict[str, ca.SX], rates: tuple[ca.SX, ...] | None = None) -> BeamMotion:
         seen = (self.middle, self.chord, self.sides, self.theta, rates or self.rates, self.accelerations)
@@ -68,7 +77,7 @@ def beam_slope(
     parameters: ca.SX,
     seeds: ca.SX,
     force: Callable[[BeamMotion], BeamForce],
-    modal: tuple[ca.SX, ...] = (),
+    modal: OwnMotion | tuple[()] = (),
 ) -> ca.SX:
     """Return ∂force/∂(increment of both nodes and of the element's own modes), 12 × 12 and more, in space axes.
 
@@ -81,8 +90,8 @@ def beam_slope(
         What an increment adds to place, rates and accelerations.
     force : callable
         The force on the element of its motion.
-    modal : tuple of casadi.SX
-        Amplitudes, rates and accelerations of the modes; empty: it has none.
+    modal : OwnMotion, or empty
+        That of the element's own modes, where it has any.
 
     Returns
     -------
@@ -92,7 +101,7 @@ def beam_slope(
     import casadi as ca
 
     m, modes = beam_motion(first, second, parameters, modal), sum(eta.numel() for eta in modal[:1])
-    seen = _Seen.symbols(modes)
+    seen = _Seen.symbols(modal)
     local = seen.motion(m.p)
     push = ca.cse(whole_force(replace(local, frame=ca.SX.eye(3)), force(local)))
     on_seen, on_frame = ca.jacobian(push, seen.all), ca.jacobian(push, ca.vec(seen.frame))
@@ -121,5 +130,5 @@ def _change(seen: _Seen, increment: ca.SX, turn: ca.SX, seeds: ca.SX) -> ca.SX:
     place = ca.vertcat(0.5 * seen.frame @ (u[0] + u[2]), (u[2] - u[0])[0], *sides, *theta)
     rates = [seeds[1] * d - seeds[0] * ca.cross(turn, v) for d, v in zip(u, seen.rates, strict=True)]
     accelerations = [seeds[2] * d - seeds[0] * ca.cross(turn, a) for d, a in zip(u, seen.accelerations, strict=True)]
-    modal = [seeds[k] * increment[12:] for k in range(len(seen.modal))]
+    modal = [seeds[k] * increment[12:] for k in range(len(seen.modal[:3]))]
     return ca.vertcat(seeds[0] * place, *rates, *accelerations, *modal)

@@ -1,7 +1,8 @@
 """Modes of a beam clamped at both ends, and their integrals with the shapes that move its ends.
 
 Together with the cubic shapes of unit end motions they are the Craig–Bampton basis of a uniform beam (Craig & Bampton
-1968): static shapes have no elastic energy in common with them. Lengths are over that of the beam, s = x/L.
+1968): static shapes have no elastic energy in common with them. So have the shapes of stretch and twist, which are
+polynomials. Lengths are over that of the beam, s = x/L.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-__all__ = ["ClampedModes", "clamped_modes"]
+__all__ = ["ClampedModes", "HeldShapes", "clamped_modes", "held_shapes"]
 
 _POINTS = 200
 
@@ -61,7 +62,7 @@ def clamped_modes(count: int) -> ClampedModes:
     s, weights = np.polynomial.legendre.leggauss(_POINTS)
     s, weights = 0.5 * (s + 1.0), 0.5 * weights
     roots = np.array([_root(i) for i in range(1, count + 1)])
-    shapes, slopes = (np.array(rows).reshape(count, -1) for rows in zip(*(_shape(b, s) for b in roots), strict=True))
+    shapes, slopes = np.array([_shape(b, s) for b in roots]).reshape(count, 2, _POINTS).transpose(1, 0, 2)
     N = np.array([1 - 3 * s**2 + 2 * s**3, s - 2 * s**2 + s**3, 3 * s**2 - 2 * s**3, s**3 - s**2])
     dN = np.array([6 * s**2 - 6 * s, 1 - 4 * s + 3 * s**2, 6 * s - 6 * s**2, 3 * s**2 - 2 * s])
     from_middle = weights * (s - 0.5)
@@ -74,6 +75,52 @@ def clamped_modes(count: int) -> ClampedModes:
         bow=(dN[[1, 3]] * weights) @ slopes.T,
         drawn=(slopes * from_middle) @ slopes.T,
         drawn_ends=(dN[[1, 3]] * from_middle) @ slopes.T,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class HeldShapes:
+    """Integrals over s from 0 to 1 of shapes χᵢ of stretch or twist that are 0 at both ends.
+
+    They are the integrals of Legendre's polynomials with ∫χᵢ′χⱼ′ = δᵢⱼ (Szabó & Babuška 1991): with the straight lines
+    of the ends all polynomials of a degree, χ₁ the parabola.
+
+    Attributes
+    ----------
+    ends : numpy.ndarray, shape (2, m)
+        ∫(1 − s) χ and ∫s χ.
+    mass : numpy.ndarray, shape (m, m)
+        ∫χᵢ χⱼ.
+    mean : numpy.ndarray, shape (m,)
+        ∫χ.
+    """
+
+    ends: np.ndarray
+    mass: np.ndarray
+    mean: np.ndarray
+
+
+@cache
+def held_shapes(count: int) -> HeldShapes:
+    """Return the integrals of the first shapes.
+
+    Parameters
+    ----------
+    count : int
+
+    Returns
+    -------
+    HeldShapes
+    """
+    s, weights = np.polynomial.legendre.leggauss(count + 2)
+    s, weights = 0.5 * (s + 1.0), 0.5 * weights
+    P = np.polynomial.legendre.legvander(2.0 * s - 1.0, count + 1).T
+    k = np.arange(1, count + 1)
+    shapes = (P[:-2] - P[2:]) / (2.0 * np.sqrt(2.0 * k + 1.0))[:, None]
+    return HeldShapes(
+        ends=(np.array([1.0 - s, s]) * weights) @ shapes.T,
+        mass=(shapes * weights) @ shapes.T,
+        mean=shapes @ weights,
     )
 
 

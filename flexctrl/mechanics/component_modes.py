@@ -1,7 +1,8 @@
 """What component modes add to a beam element: shares of its axis, stiffness and momentum.
 
-Beside the cubics of its ends the axis of the element bends in its clamped modes, v = Σ φᵢ(s) ηᵢ in each plane. Their
-amplitudes stand one plane after the other: first along y, then along z of the element frame.
+Beside the cubics of its ends the axis of the element bends in its clamped modes, v = Σ φᵢ(s) ηᵢ in each plane, and it
+stretches and twists in shapes that are 0 at its ends, u = Σ χᵢ(s) ηᵢ beside what makes its strain uniform. Amplitudes
+stand one after the other: along y, along z of the element frame, of stretch, of twist.
 """
 
 from __future__ import annotations
@@ -10,27 +11,45 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.mechanics.clamped_modes import ClampedModes, clamped_modes
+from flexctrl.mechanics.clamped_modes import ClampedModes, HeldShapes, clamped_modes, held_shapes
 from flexctrl.mechanics.matrices import PlaneMass
 
 if TYPE_CHECKING:
     import casadi as ca
 
-    from flexctrl.mechanics.beam import BeamMotion
+    from flexctrl.mechanics.beam import BeamMotion, OwnMotion
 
 _PLANES = ((2, 1.0, "z"), (1, -1.0, "y"))
 """Of deflection along y and along z: the end rotation that goes with it, its sign, and the axis of bending."""
 
 
+def motion_of(m: BeamMotion) -> OwnMotion:
+    """Return the motion of the modes of an element that has any."""
+    assert m.modal
+    return m.modal
+
+
 def modes_of(m: BeamMotion) -> ClampedModes:
-    """Return the integrals of an element's modes."""
-    return clamped_modes(m.modal[0].numel() // 2)
+    """Return the integrals of an element's modes of bending."""
+    return clamped_modes(planes(m, motion_of(m).amplitudes)[0].numel())
 
 
-def planes(values: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return the two halves of a vector of modal values: along y, along z."""
-    half = values.numel() // 2
-    return values[:half], values[half:]
+def held_of(m: BeamMotion) -> HeldShapes:
+    """Return the integrals of an element's shapes of stretch, and of twist."""
+    return held_shapes(motion_of(m).along)
+
+
+def planes(m: BeamMotion, values: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return modal values of bending: along y, along z."""
+    count = values.numel() // 2 - motion_of(m).along
+    return values[:count], values[count : 2 * count]
+
+
+def lines(m: BeamMotion, values: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return modal values of stretch and of twist."""
+    along = motion_of(m).along
+    first = values.numel() - 2 * along
+    return values[first : first + along], values[first + along :]
 
 
 def bowing(m: BeamMotion) -> ca.SX:
@@ -49,26 +68,28 @@ def _slopes(m: BeamMotion, with_ends: np.ndarray, own: np.ndarray) -> ca.SX:
     import casadi as ca
 
     total = ca.SX(1, 1)
-    for eta, (axis, sign, _) in zip(planes(m.modal[0] / m.p["L"]), _PLANES, strict=True):
+    for eta, (axis, sign, _) in zip(planes(m, motion_of(m).amplitudes / m.p["L"]), _PLANES, strict=True):
         ends = sign * ca.vertcat(m.theta[0][axis], m.theta[1][axis])
         total += ca.dot(ends, ca.DM(with_ends) @ eta) + 0.5 * ca.dot(eta, ca.DM(own) @ eta)
     return total
 
 
 def deflection(m: BeamMotion) -> ca.SX:
-    """Return what modes add to the mean of the axis across the chord, in the frame [m]."""
+    """Return what modes add to the mean of the axis off the middle of the chord, in the frame [m]."""
     import casadi as ca
 
-    mean = ca.DM(modes_of(m).mean)
-    return ca.vertcat(0, *[ca.dot(mean, eta) for eta in planes(m.modal[0])])
+    mean, values = ca.DM(modes_of(m).mean), motion_of(m).amplitudes
+    stretch = ca.dot(ca.DM(held_of(m).mean), lines(m, values)[0])
+    return ca.vertcat(stretch, *[ca.dot(mean, eta) for eta in planes(m, values)])
 
 
 def stiffness(m: BeamMotion) -> ca.SX:
-    """Return the stiffness of each mode, EI β⁴/L³ [N/m]."""
+    """Return the stiffness of each mode, EI β⁴/L³ [N/m], EA/L [N/m], GJ/L [N m/rad]."""
     import casadi as ca
 
-    fourth = ca.DM(modes_of(m).stiffness)
-    return ca.vertcat(*[m.p[f"a_{about}"] / (4.0 * m.p["L"] ** 2) * fourth for _, _, about in _PLANES])
+    fourth, each = ca.DM(modes_of(m).stiffness), ca.DM.ones(motion_of(m).along)
+    bending = [m.p[f"a_{about}"] / (4.0 * m.p["L"] ** 2) * fourth for _, _, about in _PLANES]
+    return ca.vertcat(*bending, *(m.p[law] / m.p["L"] * each for law in ("EA", "GJ")))
 
 
 def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tuple[ca.SX, ...], ca.SX]:
@@ -86,8 +107,8 @@ def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tupl
 
     modes, L, mass = modes_of(m), m.p["L"], m.p["mass"]
     blocks = [ca.SX(3, 1) for _ in range(4)]
-    own: list[ca.SX] = []
-    for eta, across, (axis, sign, about) in zip(planes(modal), (1, 2), _PLANES, strict=True):
+    pushed_modes: list[ca.SX] = []
+    for eta, across, (axis, sign, about) in zip(planes(m, modal), (1, 2), _PLANES, strict=True):
         turning = _rotary(m, about) / L
         ends = ca.vertcat(rates[0][across], sign * L * rates[1][axis], rates[2][across], sign * L * rates[3][axis])
         coupling = mass * ca.DM(modes.mass) + turning * ca.DM(modes.rotary)
@@ -95,8 +116,15 @@ def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tupl
         for i in (0, 2):
             blocks[i][across] += pushed[i]
             blocks[i + 1][axis] += sign * L * pushed[i + 1]
-        own.append(coupling.T @ ends + mass * eta + turning * (ca.DM(modes.slope) @ eta))
-    return tuple(blocks), ca.vertcat(*own)
+        pushed_modes.append(coupling.T @ ends + mass * eta + turning * (ca.DM(modes.slope) @ eta))
+    held = held_of(m)
+    for eta, first, inertia in zip(lines(m, modal), (0, 1), (mass, m.p["polar"]), strict=True):
+        pushed = inertia * (ca.DM(held.ends) @ eta)
+        for i, push in zip((first, first + 2), (pushed[0], pushed[1]), strict=True):
+            blocks[i][0] += push
+        ends = ca.vertcat(rates[first][0], rates[first + 2][0])
+        pushed_modes.append(inertia * (ca.DM(held.ends).T @ ends + ca.DM(held.mass) @ eta))
+    return tuple(blocks), ca.vertcat(*pushed_modes)
 
 
 def _rotary(m: BeamMotion, about: str) -> ca.SX:

@@ -64,13 +64,14 @@ def modal_blocks(
     for effect in effects:
         for part in s.elements:
             if isinstance(effect, ComponentModes) and isinstance(part, Beam) and effect.modes(part):
-                mass, stiffness = modal_matrices(part.section, part.length / part.elements, effect.count)
+                mass, stiffness = modal_matrices(part.section, part.length / part.elements, effect.count, effect.along)
+                own_count = len(mass) - 12
                 turn = np.eye(len(mass))
                 turn[:12, :12] = np.kron(np.eye(4), part.axes)
                 for i, places in enumerate(_elements(s, part)):
-                    own = place + 2 * effect.count * i + np.arange(2 * effect.count)
+                    own = place + own_count * i + np.arange(own_count)
                     yield part.name, (np.append(places, own), turn @ mass @ turn.T, stiffness)
-                place += 2 * effect.count * part.elements
+                place += own_count * part.elements
         if not isinstance(effect, ComponentModes):
             place += len(effect.inner(s))
 

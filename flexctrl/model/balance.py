@@ -181,6 +181,14 @@ class Balance:
     def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
         return self.among_free(slope_terms(self.model, state, self.u, K))
 
+    def linear_step(self, state: State, K: sp.csr_matrix) -> np.ndarray:
+        """Return where the forces and the held coordinates would lead all coordinates, did K stay as it is."""
+        step = np.zeros(self.model.n)
+        step[self.fixed] = self.gap(state)
+        force = self.force(state) - (K[self.free] @ step if self.held else 0.0)
+        step[self.free] = factorise(self.among_free(K).tocsr())(force)
+        return step
+
     def settled(self, state: State, tolerance: float) -> bool:
         """Tell whether a state is an equilibrium, as far as round-off lets that be told.
 

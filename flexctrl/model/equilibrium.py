@@ -14,7 +14,7 @@ from flexctrl.errors import EquilibriumError, StructureError, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
-from flexctrl.model.search import Found, Newton, follow
+from flexctrl.model.search import SMALLEST_PART, Found, Newton, follow
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite, check_number
 
@@ -178,7 +178,7 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
         raise EquilibriumError("no equilibrium found: the start's own forces are not finite; start from another shape")
     if balance.idle(start):
         return Found(start, balance.residual(start), 0, True, True, True)
-    if balance.holds(start, balance.slope(start)):
+    if _stands(balance, start):
         straight = Newton(balance, tolerance).run(start, 60, watch=True)
         if straight.done and straight.steady:
             return straight
@@ -194,6 +194,15 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
     if not found.done:
         raise EquilibriumError(_complaint(balance, found), found.state, found.residual)
     return found
+
+
+def _stands(balance: Balance, start: State) -> bool:
+    """Whether a start stands by itself: it resists every displacement, and the smallest part of the loads in earnest.
+
+    A cable with next to no bending stiffness, drawn straight, would bend by a million times its length.
+    """
+    K = balance.slope(start)
+    return balance.holds(start, K) and SMALLEST_PART * balance.moved(balance.linear_step(start, K)) <= 1.0
 
 
 def _gave_way(balance: Balance, found: Found, share: float) -> str:
@@ -220,7 +229,6 @@ def _pushed_freely(balance: Balance, state: State) -> list[str]:
     model, scale, unit = balance.model, balance.scale(state), balance.unit[balance.free]
     force = unit * balance.force(state)
     K = sp.diags(unit) @ balance.among_free(balance.slope(state)) @ sp.diags(unit)
-    stiff = float(np.abs(K.data).max()) if K.nnz else 1.0
     names = tuple(model.coordinates[i] for i in balance.free)
     pushed = []
     from flexctrl.model.certify import whole_body  # brings all that modes need
@@ -228,7 +236,7 @@ def _pushed_freely(balance: Balance, state: State) -> list[str]:
     for name, motion in whole_body(names, model.motion, state):
         way = motion / unit
         size = float(np.abs(way).max())
-        resisted = np.abs(K @ way).max(initial=0.0) > 1e-6 * stiff * size
+        resisted = bool((np.abs(K @ way) > 1e-6 * (abs(K) @ np.abs(way))).any())
         if not resisted and abs(float(force @ way)) > 1e-6 * scale * size * balance.size:
             pushed.append(name)
     return pushed

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,7 @@ from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.mechanics import beam, pieces
 from flexctrl.mechanics.beam_tangent import beam_slope
 from flexctrl.model.laws import part_kinds
-from flexctrl.model.laws.kinds import NODE_SLOT, Kind, moved, symbols_of
+from flexctrl.model.laws.kinds import NODE_SLOT, Kind, Physics, moved, symbols_of
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -50,7 +50,9 @@ def _beam_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parame
     import casadi as ca
 
     first, second = moved(kind, symbols, ca.SX(kind.width, 1), ca.SX(3, 1))
-    m = beam.beam_motion(first, second, parameters, part_kinds.modes_in(symbols[NODE_SLOT * kind.nodes :]))
+    m = beam.beam_motion(
+        first, second, parameters, part_kinds.modes_in(symbols[NODE_SLOT * kind.nodes :], part_kinds.along_of(kind))
+    )
     seen, local = beam.seen_deformed(m)
     now = ca.vertcat(m.stretch, *m.theta, *m.modal[:1])
     stress = sum((e.beam_stress(local) for e in effects), ca.SX(6, 1))
@@ -64,8 +66,9 @@ def _beam_geometric(
     import casadi as ca
 
     first, second = _still(kind, symbols, ca.SX(kind.width, 1))
-    modes = part_kinds.modes_in(symbols[NODE_SLOT * kind.nodes :])
-    modal = (modes[0], *[ca.SX.zeros(eta.shape) for eta in modes[1:]]) if modes else ()
+    modal = part_kinds.modes_in(symbols[NODE_SLOT * kind.nodes :], part_kinds.along_of(kind))
+    if modal:
+        modal = modal._replace(rates=0.0 * modal.rates, accelerations=0.0 * modal.accelerations)
     slope = beam_slope(first, second, parameters, ca.SX([1, 0, 0]), lambda m: beam.stress_force(m, stress), modal)
     m = beam.beam_motion(first, second, parameters, modal)
     return slope, beam.whole_force(m, beam.stress_force(m, stress))
@@ -94,8 +97,14 @@ def _line_geometric(
 
 
 _BEAM, _LINE = _Elastic(6, _beam_stress, _beam_geometric), _Elastic(1, _line_stress, _line_geometric)
-_ELASTIC = {part_kinds.BEAM.physics: _BEAM, part_kinds.SPRING.physics: _LINE, part_kinds.ROPE.physics: _LINE}
+_ROPES = (part_kinds.ROPE, part_kinds.HEAVY_ROPE)
+_ELASTIC = {part_kinds.BEAM.physics: _BEAM, **{kind.physics: _LINE for kind in (part_kinds.SPRING, *_ROPES)}}
 """The physics of pieces that strain."""
+
+
+def _physics(kind: Kind) -> Physics:
+    """The physics of a kind, whatever modes it has along it."""
+    return kind.physics.func if isinstance(kind.physics, partial) else kind.physics
 
 
 @cache
@@ -103,7 +112,7 @@ def _stress_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     import casadi as ca
 
     symbols, parameters = symbols_of(kind)
-    outputs = _ELASTIC[kind.physics].stress(kind, effects, symbols, parameters)
+    outputs = _ELASTIC[_physics(kind)].stress(kind, effects, symbols, parameters)
     return Kernel(f"{kind.name}_stress", symbols, parameters, ca.cse(ca.densify(outputs)))
 
 
@@ -113,8 +122,8 @@ def _geometric_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     import casadi as ca
 
     symbols, parameters = symbols_of(kind)
-    stress = ca.SX.sym("stress", _ELASTIC[kind.physics].count)
-    slope, force = _ELASTIC[kind.physics].geometric(kind, effects, symbols, parameters, stress)
+    stress = ca.SX.sym("stress", _ELASTIC[_physics(kind)].count)
+    slope, force = _ELASTIC[_physics(kind)].geometric(kind, effects, symbols, parameters, stress)
     outputs = ca.cse(ca.vertcat(ca.vec(ca.densify(slope)), ca.densify(force)))
     return Kernel(f"{kind.name}_geometric", ca.vertcat(symbols, stress), parameters, outputs)
 
@@ -187,12 +196,12 @@ class Mixed:
 
     @cached_property
     def _families(self) -> tuple[Family, ...]:
-        return tuple(f for f in self.forces.families if f.kernels.kind.physics in _ELASTIC)
+        return tuple(f for f in self.forces.families if _physics(f.kernels.kind) in _ELASTIC)
 
     @cached_property
     def _ropes(self) -> np.ndarray:
         ropes = [
-            np.full(places.size, f.kernels.kind is part_kinds.ROPE)
+            np.full(places.size, f.kernels.kind in _ROPES)
             for f, places in zip(self._families, self._places, strict=True)
         ]
         return np.concatenate([np.zeros(0, dtype=bool), *ropes])
@@ -202,7 +211,7 @@ class Mixed:
         """Where the stresses of each family stand."""
         found, start = [], 0
         for f in self._families:
-            size = _ELASTIC[f.kernels.kind.physics].count
+            size = _ELASTIC[_physics(f.kernels.kind)].count
             found.append(start + np.arange(f.count * size).reshape(f.count, size))
             start += f.count * size
         return found

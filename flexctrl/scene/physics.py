@@ -69,7 +69,7 @@ EFFECTS: dict[str, Kind] = {
     "gravity": Kind(Gravity, {"g": vector}),
     "flexible": Kind(Flexible),
     "beam_flexibility": Kind(BeamFlexibility, {"of": several(text)}),
-    "component_modes": Kind(ComponentModes, {"count": whole, "of": several(text)}),
+    "component_modes": Kind(ComponentModes, {"count": whole, "of": several(text), "along": whole}),
     "shaft_elasticity": Kind(ShaftElasticity, {"of": several(text)}),
     "rope_stretch": Kind(RopeStretch, {"of": several(text)}),
     "rope_mass": Kind(RopeMass, {"of": several(text)}),

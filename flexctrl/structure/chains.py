@@ -15,7 +15,7 @@ from flexctrl.structure.joints import Weld
 from flexctrl.structure.nodes import Node
 from flexctrl.structure.sections import Section
 
-__all__ = ["BeamChain", "arc"]
+__all__ = ["BeamChain", "arc", "polygon"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class BeamChain:
     name : str
         The beams are called ``name0``, ``name1`` …
     points : sequence of points, or array of shape (n + 1, 3)
-        Where the beams join [m]; see `arc`.
+        Where the beams join [m]; see `arc` and `polygon`.
     section : Section, or sequence of n
         The same for all, or one for each beam.
     up : str or 3 floats, or sequence of n of these, optional
@@ -134,6 +134,40 @@ def arc(
     across = out - along
     side = np.cross(about, across)
     return np.asarray(middle + along + np.outer(np.cos(turns), across) + np.outer(np.sin(turns), side))
+
+
+def polygon(points: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
+    """Return the corners of a polygon that runs along a smooth curve, not inside its bends.
+
+    Chords of a curve lie inside its bends, in the mean by a twelfth of the second differences of its points. The inner
+    corners are moved out by that: few straight beams then do for a curved one (eight for an arc of 45°, 24 for one of
+    215°), where with nodes on the curve ten times as many would be needed. The ends stay.
+
+    Parameters
+    ----------
+    points : sequence of points, or array of shape (n + 1, 3)
+        On the curve, evenly spaced, less than half a radian of its turn from one to the next [m]; see `arc`.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n + 1, 3)
+
+    Raises
+    ------
+    StructureError
+        For fewer than two points, or what is no point.
+
+    Examples
+    --------
+    >>> import flexctrl as fc
+    >>> fc.polygon([(-1, 0, 1), (0, 0, 0), (1, 0, 1)])[1].round(4).tolist()
+    [0.0, 0.0, -0.1667]
+    """
+    corners = np.array([parse_point(point, "polygon") for point in listed(points, "polygon: points")])
+    if len(corners) < 2:
+        raise StructureError(f"polygon: {len(corners)} points; give two at least")
+    corners[1:-1] -= np.diff(corners, 2, axis=0) / 12.0
+    return corners
 
 
 def _single(up: object) -> bool:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Protocol, overload
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import Integrator
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.simulate import simulate
+from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import StructureError, shortened
 from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium

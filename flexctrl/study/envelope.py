@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import Integrator
+from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import StructureError, check_kind
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize

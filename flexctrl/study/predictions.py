@@ -9,9 +9,10 @@ import numpy as np
 import scipy.linalg as la
 from scipy.interpolate import CubicSpline
 
-from flexctrl.dynamics.alpha import GeneralizedAlpha, Integrator
+from flexctrl.dynamics.alpha import GeneralizedAlpha
 from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.simulate import simulate
+from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import EquilibriumError, LinearizationError, StructureError, did_you_mean
 from flexctrl.linear.statespace import modal_first_order
 from flexctrl.model.linearize import linearize

@@ -9,7 +9,7 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.design import Step, Tracking, pd
-from flexctrl.dynamics import alpha, journey
+from flexctrl.dynamics import alpha, watching
 
 
 def geared(*effects: fc.Effect) -> fc.Model:
@@ -72,7 +72,7 @@ METHODS = {"fixed": fc.GeneralizedAlpha(2e-3), "adaptive": fc.AdaptiveAlpha()}
 def test_marched_corners_are_those_of_plain_steps(case, method, plainly, monkeypatch):
     asked = {**case(), "method": method}
     plain = plainly(**asked)
-    monkeypatch.setattr(journey, "landed", None)  # no corner is met in a plain step
+    monkeypatch.setattr(watching, "landed", None)  # no corner is met in a plain step
     run = fc.simulate(**asked)
     assert len(run.events) == len(plain.events) > 1
     assert [(e.name, e.rising) for e in run.events] == [(e.name, e.rising) for e in plain.events]

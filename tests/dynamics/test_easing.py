@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.alpha import Coefficients
+from flexctrl.dynamics.alpha_point import Coefficients
 from flexctrl.dynamics.easing import eased_change, eased_rate
 
 H = 1e-3

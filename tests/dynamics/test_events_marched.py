@@ -10,7 +10,7 @@ from scipy.special import ellipk
 
 import flexctrl as fc
 from flexctrl.dynamics.foresight import calm_steps
-from flexctrl.dynamics.march import ride as riding
+from flexctrl.dynamics.march import guarding
 from flexctrl.dynamics.march.stepper import MarchingStepper
 
 SPEED, UNTIL = 2.0, 12.0
@@ -135,7 +135,7 @@ def test_legs_do_not_hide_events():
     whole = [e.t for e in ran("marched", "even", EVENTS, 4.0).events]
     for widest in (8, 13, 100):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(riding, "_WIDEST", widest)
+            patch.setattr(guarding, "_WIDEST", widest)
             assert [e.t for e in ran("marched", "even", EVENTS, 4.0).events] == pytest.approx(whole, abs=1e-12)
 
 
@@ -154,7 +154,7 @@ def test_every_touch_of_zero_is_in_doubt():
         def values(self, state, u):
             return np.array([self.first])
 
-        def dusts_of(self, sizes):
+        def dust_of(self, sizes):
             return 1e-13 * sizes
 
     for _ in range(200):

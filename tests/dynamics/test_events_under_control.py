@@ -9,7 +9,7 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.design import pd
-from flexctrl.dynamics.march import ride as riding
+from flexctrl.dynamics.march import guarding
 from flexctrl.dynamics.march.stepper import MarchingStepper
 
 BACKENDS = {"marched": None, "plain": fc.CasadiVM()}
@@ -134,7 +134,7 @@ def test_legs_do_not_hide_events(kind):
     whole = [(e.name, e.t) for e in ran(kind, "even").events]
     for widest in (8, 13, 100):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(riding, "_WIDEST", widest)
+            patch.setattr(guarding, "_WIDEST", widest)
             assert [(e.name, e.t) for e in ran(kind, "even").events] == whole
 
 

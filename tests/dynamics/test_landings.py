@@ -8,8 +8,8 @@ from test_corners_and_switches import bouncing
 from test_march_first_order import Rocking, slewing
 
 import flexctrl as fc
-from flexctrl.dynamics.events import _nearly
 from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.roots import nearly
 
 pytest.importorskip("llvmlite")
 
@@ -20,7 +20,7 @@ def test_the_root_of_a_parabola_is_exact():
         times, (root, other, size) = np.sort(rng.uniform(0.0, 1.0, 3)), rng.uniform((0.0, -1.0, -2.0), (1.0, 2.0, 2.0))
         values = size * (times - root) * (times - other)
         for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-            found = _nearly(list(zip(times, values, strict=True)), float(times[i]))
+            found = nearly(list(zip(times, values, strict=True)), float(times[i]))
             assert min(abs(found - root), abs(found - other)) < 1e-9
             assert times[i] <= found <= times[i + 1]
 

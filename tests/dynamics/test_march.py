@@ -12,10 +12,12 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.cranes.ceiling_crane import MEMBER
-from flexctrl.dynamics.alpha import Coefficients, Stepper
+from flexctrl.dynamics.alpha_point import Coefficients
+from flexctrl.dynamics.alpha_steps import Stepper
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.march.loops import run as tasks
-from flexctrl.dynamics.march.marching import Marcher, Method
+from flexctrl.dynamics.march.making import Method
+from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.record import DONE, FIXED, SETTLE
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.errors import ControllerError
@@ -260,7 +262,7 @@ def test_states_for_drawing_stay_within_their_room(monkeypatch):
     """Large machines have room for a few states in one call only."""
     how = {"until": 0.05, "inputs": {"push": 500.0}, "method": FIXED_STEPS, "tolerance": TIGHT}
     ample = fc.simulate(crane(), **how)
-    monkeypatch.setattr("flexctrl.dynamics.march.marching._BYTES", 3 * 8 * 400)
+    monkeypatch.setattr("flexctrl.dynamics.march.making._BYTES", 3 * 8 * 400)
     tight = fc.simulate(crane(), **how)
     assert np.array_equal(ample.y, tight.y)
     assert [state.t for state in ample.frames] == [state.t for state in tight.frames]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics import alpha
+from flexctrl.dynamics.alpha_steps import Stepper
 from flexctrl.model.flat.flattening import can_be_flat
 from flexctrl.structure.refine import refine
 
@@ -97,8 +97,8 @@ def test_jumps_of_fine_meshes_end_at_their_round_off(monkeypatch):
     effects = [fc.GeometricStiffness() if isinstance(e, fc.LargeRotation) else e for e in scene.effects]
     plan = replace(scene.simulation, until=0.6)
     fine = scene.with_(structure=refine(scene.structure, 2), effects=effects, simulation=plan)
-    asked, renew = [], alpha.Stepper.renew
-    monkeypatch.setattr(alpha.Stepper, "renew", lambda self, *jump: asked.append(1) or renew(self, *jump))
+    asked, renew = [], Stepper.renew
+    monkeypatch.setattr(Stepper, "renew", lambda self, *jump: asked.append(1) or renew(self, *jump))
     run = fine.run()
     assert run.report.steps > 300
     assert len(asked) < 5

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.alpha import Coefficients, Stepper
+from flexctrl.dynamics.alpha_point import Coefficients
+from flexctrl.dynamics.alpha_steps import Stepper
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.march.loops import run as tasks
-from flexctrl.dynamics.march.marching import Marcher, Method
+from flexctrl.dynamics.march.making import Method
+from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.record import DONE, FIXED, JUMP, SETTLE
 from flexctrl.dynamics.march.stepper import MarchingStepper
 

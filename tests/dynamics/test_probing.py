@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.alpha import Coefficients
-from flexctrl.dynamics.march.marching import Marcher, Method
+from flexctrl.dynamics.alpha_point import Coefficients
+from flexctrl.dynamics.march.making import Method
+from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.scales import turning, yardsticks
 

@@ -40,7 +40,7 @@ def test_no_modes_equal_plain_flexibility():
 
 
 def test_tangent_at_rest_is_the_assembled_matrices():
-    m = model(beam(2), fc.ComponentModes(3))
+    m = model(beam(2), fc.ComponentModes(3, along=2))
     still, u = np.zeros(m.n), np.zeros(1)
     for seed, matrix in (((1.0, 0.0, 0.0), m.stiffness()), ((0.0, 0.0, 1.0), m.mass())):
         found = -m.slope(m.rest, still, still, seed, u)
@@ -105,7 +105,7 @@ def test_weight_bends_the_modes():
 
 
 def test_energy_is_kept_and_backends_agree():
-    m = model(beam(2), fc.ComponentModes(2), fc.Gravity())
+    m = model(beam(2), fc.ComponentModes(2, along=1), fc.Gravity())
     runs = [
         fc.simulate(machine, until=0.2, method=fc.GeneralizedAlpha(5e-4, 1.0), every=0.01)
         for machine in (m, m.with_(backend=fc.Compiled()))
@@ -122,9 +122,9 @@ def test_turning_the_machine_turns_its_motion():
         b = fc.Beam("b", (0, 0, 0), R @ (3.0, 0.0, 0.0), SECTION, up=R @ (0.0, 0.0, 1.0))
         tip = fc.PointMass("tip", b.end, 2.0)
         s = fc.Structure([b, tip], [fc.Support(b.start), fc.Pin(b.end, tip.node)])
-        m = model(s, fc.ComponentModes(2), fc.Gravity(R @ (0.0, -3.0, -9.0)))
+        m = model(s, fc.ComponentModes(2, along=1), fc.Gravity(R @ (0.0, -3.0, -9.0)))
         rest = fc.equilibrium(m)
-        return rest.state.x[1], rest.state.q[-4:], fc.linearize(m, at=rest).modes().frequencies
+        return rest.state.x[1], rest.state.q[-6:], fc.linearize(m, at=rest).modes().frequencies
 
     (x, amplitudes, frequencies), (turned, same, also) = hung(np.eye(3)), hung(turn)
     assert turn @ x == pytest.approx(turned, abs=1e-9)
@@ -158,8 +158,10 @@ def test_what_cannot_be_is_refused():
     shearing = fc.Section(EA=1e7, EI_y=2e3, EI_z=1e3, GJ=8e2, rhoA=3.0, rhoJ=0.01, GA_y=1e5, GA_z=1e5)
     with pytest.raises(StructureError, match="section of beam 'b' shears"):
         model(beam(1, shearing), fc.ComponentModes(2))
-    with pytest.raises(StructureError, match="whole number from 0 to 10"):
+    with pytest.raises(StructureError, match=r"count = 2\.5; expected a whole number from 0 to 10"):
         fc.ComponentModes(2.5)
+    with pytest.raises(StructureError, match="along = 11; expected a whole number from 0 to 10"):
+        fc.ComponentModes(along=11)
     with pytest.raises(StructureError, match="did you mean 'b'"):
         fc.coarsen(beam(2), of=["bb"])
 
@@ -173,6 +175,42 @@ METHODS = {
 }
 
 
+@pytest.mark.parametrize("along", [1, 2])
+@pytest.mark.parametrize("freedom", ["u", "rx"])
+def test_rods_and_shafts_converge_by_two_orders_more_with_each_shape(freedom, along):
+    """A load at the end: β tan β = ρAL/m, or ρJ L/J; the second of ratio 10 with 3 and 6 elements."""
+    root, ratio = 4.3058014131, 10.0
+    section = fc.Section(EA=1.0, EI_y=1.0, EI_z=1.0, GJ=1.0, rhoA=1.0, rhoJ=1.0)
+
+    def off(elements):
+        rod = fc.Beam("rod", (0, 0, 0), (1, 0, 0), section, elements=elements)
+        load = fc.RigidBody("load", rod.end.position, 1.0 / ratio, (1.0 / ratio, 1.0, 1.0))
+        others = [f for f in ("u", "v", "w", "rx", "ry", "rz") if f != freedom]
+        held = [fc.Support(node, others) for node in rod.nodes[1:]]
+        s = fc.Structure([rod, load], [fc.Support(rod.start), fc.Weld(rod.end, load.node), *held])
+        omega = fc.linearize(model(s, fc.ComponentModes(0, along=along))).modes().omega
+        return np.abs(omega / root - 1.0).min()
+
+    assert off(6) < (6e-4, 3e-6)[along - 1]
+    assert np.log2(off(3) / off(6)) == pytest.approx(2.0 * along + 2.0, abs=0.5)
+
+
+def test_weight_draws_a_hanging_rod_into_a_parabola():
+    """Beside the mean strain, ρA g L²/8 EA in the middle; χ₁(½) = √3/4."""
+    rod = fc.Beam("rod", (0, 0, 0), (0, 0, -LENGTH), PLAIN)
+    m = model(fc.Structure([rod], [fc.Support(rod.start)]), fc.ComponentModes(0, along=2), fc.Gravity())
+    q = fc.equilibrium(m).state.q
+    middle = q[m.coordinate("rod_0_x1")] * math.sqrt(3.0) / 4.0
+    assert middle == pytest.approx(3.0 * 9.81 * LENGTH**2 / 8e9, rel=1e-6)
+    assert abs(q[m.coordinate("rod_0_x2")]) < 1e-6 * middle
+    assert abs(q[m.coordinate("rod_0_t1")]) < 1e-12
+
+
+def test_a_plane_keeps_stretch_and_holds_twist():
+    m = model(fc.planar(fc.coarsen(arm()), "y"), fc.ComponentModes(1, along=1))
+    assert m.coordinates[-2:] == ("rod_0_z1", "rod_0_x1")
+
+
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_of_integration_takes_modes(name):
     """A soft pendulum of one element with two modes, let go from the horizontal, against the explicit method."""
@@ -180,7 +218,7 @@ def test_every_method_of_integration_takes_modes(name):
     rod = fc.Beam("rod", (0, 0, 0), (1, 0, 0), section)
     outputs = [fc.Position(axis, rod.end, axis) for axis in "xz"]
     structure = fc.planar(fc.Structure([rod], [fc.Support(rod.start, "u v w")], outputs=outputs), "y")
-    machine = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.Flexible(), fc.ComponentModes(2)])
+    machine = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.Flexible(), fc.ComponentModes(2, along=1)])
     exact = fc.simulate(machine, until=0.5, method=fc.ExplicitRungeKutta(), tolerance=fc.Tolerance(1e-9, 1e-9))
     method, tolerance = METHODS[name]
     run = fc.simulate(machine, until=0.5, method=method, tolerance=tolerance)

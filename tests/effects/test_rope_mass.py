@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,6 +81,15 @@ def test_a_rope_between_two_posts_sags_into_a_catenary():
         errors.append(abs(-found.x[:, 2].min() / sag - 1.0))
     assert errors[0] < 1e-2
     assert errors[1] < 0.3 * errors[0]
+
+
+def test_how_stiff_a_rope_is_does_not_count_in_the_search():
+    rope = fc.Rope("rope", (0, 0, 0), (10, 0, 0), EA=1e7, length=11.0, rhoA=RHO, elements=20)
+    joints, effects = [fc.Support(rope.start), fc.Support(rope.end)], [LARGE, fc.Gravity(), HEAVY, fc.RopeStretch()]
+    ropes = [replace(rope, EA=EA) for EA in (1e7, 1e9, 1e12)]
+    models = [fc.assemble(fc.Structure([r], joints), effects, fc.CasadiVM()) for r in ropes]
+    iterations = [fc.equilibrium(model).iterations for model in models]
+    assert max(iterations) <= min(iterations) + 2
 
 
 @pytest.mark.parametrize("large", [True, False])

@@ -263,7 +263,7 @@ class _Builder:
         drives = [d.name for d in self.drives]
         springs = [p.name for p in self.elements if isinstance(p, fc.Spring)]
         plain = [p.name for p in self.elements if isinstance(p, fc.Beam) and not p.section.shears]
-        modes = [fc.ComponentModes(1, plain)] if plain else []
+        modes = [fc.ComponentModes(1, plain, along=1)] if plain else []
         chosen = self.seed % 8
         if chosen == 0:
             return [*common, fc.Flexible()]

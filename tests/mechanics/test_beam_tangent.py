@@ -42,16 +42,17 @@ def test_tangent_in_the_frame_is_the_derivative_by_differentiation(effects):
     assert ours.instructions < 0.6 * plain.instructions
 
 
+@pytest.mark.parametrize("along", [0, 2])
 @pytest.mark.parametrize("effects", EFFECTS)
-def test_tangent_of_an_element_with_modes_too(effects):
-    kind = modal_beam(2)
+def test_tangent_of_an_element_with_modes_too(effects, along):
+    kind = modal_beam(2, along)
     ours, plain = (Kernels(k, EFFECTS[effects]).tangent for k in (kind, replace(kind, slope=None)))
     p, rng = np.array(parameters()).ravel(), np.random.default_rng(4)
     slots = np.concatenate([random_slots(2, ENDS, 0.3, 0.1, 2.0), 0.02 * rng.standard_normal(4 * kind.drives)])
     for seeds in [*np.eye(3).tolist(), [1.0, 20.0, 400.0]]:
         found, expected = (np.array(k.function()(np.concatenate([slots, seeds]), p)) for k in (ours, plain))
         assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max(initial=1e-3)
-    assert ours.instructions < 0.7 * plain.instructions
+    assert ours.instructions < 0.75 * plain.instructions
 
 
 def test_in_a_turning_frame_the_whole_force_is_differentiated():

@@ -13,7 +13,7 @@ import numpy as np
 from flexctrl.kernels.kernel import Kernel
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.flat.flat import Flat, clear, drive
-from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.motion import APART
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexctrl.dynamics.nearing import Bracket
 from flexctrl.dynamics.settling import weightless
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.flat import Flat
-from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = ["Corners", "comes_through", "corners_of", "crossed", "passes", "value", "within"]
@@ -41,6 +42,8 @@ class Corners:
         Which are ends of runs.
     step, change : Reals
         Room for a step and a sum of forces.
+    bracket : Bracket
+        Of the time when a corner is met.
     turning : int
         Whether steps may end at corners and start anew beyond in the loops.
     which, when : int, float
@@ -65,6 +68,7 @@ class Corners:
     last: Wholes
     step: Reals
     change: Reals
+    bracket: Bracket
     turning: int
     which: int = 0
     when: float = 0.0
@@ -80,7 +84,8 @@ def corners_of(F: Flattened) -> Corners:
     last = np.array([bool(end) for end in kinks.ends], dtype=np.int64)
     step, change = np.zeros((2, F.flat.padded))
     turning = int(bool(kinks.names) and not weightless(F.model).size)
-    return Corners(*counts, *places, kinks.dust, sides, np.zeros(3 * kinks.sheaves), last, step, change, turning)
+    arms, bracket = np.zeros(3 * kinks.sheaves), Bracket(0.0, 0.0)
+    return Corners(*counts, *places, kinks.dust, sides, arms, last, step, change, bracket, turning)
 
 
 def passes(c: Corners, f: Flat) -> bool:

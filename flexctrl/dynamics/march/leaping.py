@@ -9,7 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.march.pairs import pairs_of
 from flexctrl.dynamics.march.record import Leap
-from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 if TYPE_CHECKING:

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
+from flexctrl.dynamics.alpha_point import AlphaPoint, Coefficients
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.exact import ExactStepper, ModalPoint
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.march.calling import Remembered
 from flexctrl.dynamics.march.leaping import Leaps, Tables
-from flexctrl.dynamics.march.marching import Marcher, Method, Remembered
+from flexctrl.dynamics.march.making import Method
+from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.scales import yardsticks

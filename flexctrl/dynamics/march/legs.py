@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AlphaPoint
+from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.marching import Pacing

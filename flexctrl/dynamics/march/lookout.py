@@ -9,8 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexctrl.dynamics.events import Event, EventError, Watch
+from flexctrl.dynamics.events import Event, EventError
 from flexctrl.dynamics.march.weaving import Weaver
+from flexctrl.dynamics.watch import Watch
 from flexctrl.model.state import State
 
 __all__ = ["FAR", "Lookout"]
@@ -69,8 +70,8 @@ class Lookout:
         number = len(watch.events)
         sides = watch.sides[:number]
         sizes = np.fmax.accumulate(np.fmax(np.abs(found).max(axis=0), watch.sizes[:number]))
-        clear = self._clear(found, sides, watch.dusts_of(sizes))
-        held = (sides * after > watch.dusts_of(sizes)) | (sides == 0.0)
+        clear = self._clear(found, sides, watch.dust_of(sizes))
+        held = (sides * after > watch.dust_of(sizes)) | (sides == 0.0)
         turned = np.diff(times) * (np.abs(self.weaver.rates(count)) * self.turns).max(axis=1, initial=0.0)
         doubtful, jumpy = ~clear.all(axis=1) | (turned > FAR), ~held.all(axis=1)
         quiet = int(np.argmax(doubtful)) if doubtful.any() else count

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.landing import SHORTEST, SMALLEST
 from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle, shelve
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
@@ -34,6 +33,7 @@ from flexctrl.dynamics.march.record import (
 )
 from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
 from flexctrl.dynamics.march.turning import start_anew, turn_corner
+from flexctrl.dynamics.nearing import SHORTEST, SMALLEST
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import energy
 

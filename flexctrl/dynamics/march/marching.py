@@ -3,67 +3,43 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AlphaPoint, Coefficients
+from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.books import Sums
-from flexctrl.dynamics.coning import coning_of
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.frames import Later
-from flexctrl.dynamics.march.closing import closing_of
-from flexctrl.dynamics.march.contacts import contacts_of, enter_contacts
-from flexctrl.dynamics.march.corners import corners_of
-from flexctrl.dynamics.march.flowing import flows_of
-from flexctrl.dynamics.march.law import Sampling, no_law
-from flexctrl.dynamics.march.loops import run
-from flexctrl.dynamics.march.probing import probes_of
+from flexctrl.dynamics.march.calling import Loops
+from flexctrl.dynamics.march.contacts import enter_contacts
+from flexctrl.dynamics.march.law import Sampling
+from flexctrl.dynamics.march.making import CAPACITY, Method
 from flexctrl.dynamics.march.record import (
     CONTROLLED,
     DONE,
     FIXED,
     FRESH,
     JUMP,
-    REFACTOR,
-    REMADE,
     SAMPLED,
     SETTLE,
-    SINGULAR,
-    WANTS_MASS,
-    WANTS_TANGENT,
-    WEIGH,
-    WEIGHED,
-    Factors,
-    March,
-    no_leap,
 )
 from flexctrl.dynamics.march.shelf import states_of, width_of
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.scales import components, farthest
 from flexctrl.dynamics.steps import Mark
-from flexctrl.dynamics.stiff_lines import firmest
-from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
-from flexctrl.model.flat.flattening import Flattened, can_be_flat, flatten
-from flexctrl.model.laws.kinds import NODE_SLOT
+from flexctrl.model.flat.flattening import can_be_flat
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
-__all__ = ["Marcher", "Method", "Pacing", "Remembered", "can_march"]
+__all__ = ["Marcher", "Pacing", "can_march"]
 
-_SHARE, _KEEPING = 3e-3, 1e-4  # where nothing is damped, what Newton's method leaves adds up
-_HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed", "swift")
-_PACED = (CONTROLLED, SAMPLED)
-_MADE, _ASKED = 5.0, 100.0
-_LOOSEST = 1e-6
-_TIGHT = 0.99e-10
-_CAPACITY, _SHELF = 4096, 1024
-_BYTES = 16e6
+
 _SPARE = 2
 
 
@@ -81,49 +57,6 @@ def can_march(model: Model) -> bool:
     return isinstance(model, Model) and isinstance(model.backend, Compiled) and can_be_flat(model)
 
 
-@dataclass(frozen=True)
-class Method:
-    """What a march needs to know of the method.
-
-    Attributes
-    ----------
-    coefficients : Coefficients
-    least : float
-        Tolerance of Newton's method; one that is not tight may be loosened to a share of the method's own error.
-    weight : numpy.ndarray, shape (n,)
-        One over the yardsticks of the degrees of freedom.
-    turning : numpy.ndarray of bool, shape (n,)
-    """
-
-    coefficients: Coefficients
-    least: float
-    weight: np.ndarray
-    turning: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Remembered:
-    """What later steps of a march depend on beside the point they start from.
-
-    Attributes
-    ----------
-    tangent, mass : numpy.ndarray
-        The workspace when they were made; empty if they have not been.
-    made_for : float
-        Step of the tangent [s].
-    numbers : tuple of float
-        What the march has learned: of Newton's habit, of the tangent's worth, of what the mass misses.
-    """
-
-    tangent: np.ndarray
-    mass: np.ndarray
-    made_for: float
-    numbers: tuple[float, ...]
-
-
-_NOTHING: tuple[tuple[int, int], np.ndarray, np.ndarray] = ((-1, -1), np.zeros(0), np.zeros(0))
-
-
 class Pacing(NamedTuple):
     """Steps of controlled error: the first and the largest, where to stop and what not to pass [s]; the tolerance."""
 
@@ -135,7 +68,7 @@ class Pacing(NamedTuple):
     absolute: float
 
 
-class Marcher:
+class Marcher(Loops):
     """A model on a compiled march.
 
     Parameters
@@ -145,19 +78,12 @@ class Marcher:
     method : Method
     """
 
-    leaping: ClassVar[int] = 0
-
     def __init__(self, model: Model, method: Method) -> None:
-        self.model, self.method = model, method
-        self.flattened = flatten(model)
-        self.contacts: Any = Packed(contacts_of(self.flattened))
-        self.march = Packed(_march(self.flattened, self.contacts, method, self.leaping))
-        m, self.dry = self.march, model.rest.dry
-        self._run = m.bound(run, without=("paced",))
-        self._task, self._h, self._wanted, self._jumping = (m.cell(n) for n in ("task", "h", "wanted", "jumping"))
+        super().__init__(model, method)
+        m = self.march
+        self._h, self._wanted, self._jumping = (m.cell(name) for name in ("h", "wanted", "jumping"))
         self._inputs: Any = self.flattened.flat.u.data
         self.steps, self.clock = m.cell("done"), m.cell("t")
-        self._kept = _NOTHING
         self._heeded: tuple[Sampling, Packed] | None = None
         self._last: tuple[Sampling, Packed] | None = None
         self.width = 1 + len(model.outputs)
@@ -181,47 +107,15 @@ class Marcher:
 
     def done(self) -> None:
         """Leave the march to another run."""
-        self.march.reset()
+        self.forget()
         self._heeded = None
-        self.flattened.flat.z[:] = 0.0
-        self._kept = _NOTHING
         if len(self._idle(self.model)) < _SPARE:
             self._idle(self.model).append(self)
-
-    def remembered(self) -> Remembered:
-        """Return what another march needs to go on with the same bits."""
-        m, kept = self.march, self._kept
-        if (m.factorisations, m.weighings) != kept[0]:
-            tangent = m.tangent.place.copy() if m.made_for > 0.0 else np.zeros(0)
-            mass = m.mass.place.copy() if m.mass_for == 1.0 else np.zeros(0)
-            self._kept = kept = ((m.factorisations, m.weighings), tangent, mass)
-        return Remembered(kept[1], kept[2], m.made_for, tuple(getattr(m, name) for name in _HABITS))
-
-    def recall(self, memory: Remembered) -> None:
-        """Go on as the march whose memory this is."""
-        m, f = self.march, self.flattened.flat
-        made = m.factorisations
-        for place, mass in ((memory.tangent, False), (memory.mass, True)):
-            if place.size:
-                f.z[:], m.h = place, memory.made_for
-                self._make(mass)
-        m.factorisations, m.made_for = made, memory.made_for
-        if not memory.mass.size:
-            m.mass_for = 0.0
-        self._kept = (made, m.weighings), memory.tangent, memory.mass
-        for name, number in zip(_HABITS, memory.numbers, strict=True):
-            setattr(m, name, number)
-
-    def _make(self, mass: bool) -> None:
-        if self.march.asking:
-            self._made((0.0, 0.0, 1.0) if mass else self._seeds, WEIGH if mass else REFACTOR)
-        else:
-            self._do(WEIGHED if mass else REMADE)
 
     @property
     def room(self) -> int:
         """How many steps can be taken in one call."""
-        return self.march.shelf if self.march.keeping else _CAPACITY
+        return self.march.shelf if self.march.keeping else CAPACITY
 
     @cached_property
     def readings(self) -> list[np.ndarray]:
@@ -330,7 +224,7 @@ class Marcher:
         if self._heeded is None or self._heeded[0].feed is not feed:
             assert isinstance(self.model.backend, Compiled)
             if self._last is None or not self._last[0].serves(feed):
-                sampling = Sampling(feed, self.model.backend, self.flattened.flat.u, _CAPACITY)
+                sampling = Sampling(feed, self.model.backend, self.flattened.flat.u, CAPACITY)
                 self._last = sampling, Packed(sampling.law)
             self._heeded = self._last
             self._heeded[0].serve(feed)
@@ -405,48 +299,6 @@ class Marcher:
         self.supply(u)
         return self._through(JUMP)
 
-    @cached_property
-    def _run_paced(self) -> Callable[[], int]:
-        """The loops with the tasks that most runs do without."""
-        return self.march.bound(run)
-
-    def _do(self, task: int) -> int:
-        self._task[0] = task
-        return self._run_paced() if task in _PACED else self._run()
-
-    def _through(self, task: int) -> int:
-        """Do a task, with the matrices it asks for."""
-        return self._answered(self._do(task), task)
-
-    def _answered(self, status: int, task: int) -> int:
-        """Go on with a task as long as it asks for matrices."""
-        while status in (WANTS_TANGENT, WANTS_MASS):
-            seeds, made = (self._seeds, REFACTOR) if status == WANTS_TANGENT else ((0.0, 0.0, 1.0), WEIGH)
-            if self._made(seeds, made) != DONE:
-                self.march.phase = FRESH
-                return SINGULAR
-            status = self._do(task)
-        return status
-
-    @property
-    def _seeds(self) -> tuple[float, float, float]:
-        c, h = self.method.coefficients, self.march.h
-        return 1.0, c.gamma / (h * c.beta), (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
-
-    def _made(self, seeds: tuple[float, float, float], task: int) -> int:
-        """Fill in a matrix that the loops do not make themselves, and factorise it."""
-        F, f, m = self.flattened, self.flattened.flat, self.march
-        poses = f.z[: self.model.forces.drive_base].reshape(-1, NODE_SLOT)[:, :12]
-        state = F.pose_state(poses.ravel(), f.q + f.step, f.v, f.found, m.t, self.dry)
-        state = self.model.switches.unheld(state)
-        slope = self.model.slope(state, state.v, F.own(f.rate), seeds, f.u).tocoo()
-        m.entries[:] = 0.0
-        try:
-            m.entries[F.plan.places(slope.row, slope.col)] = slope.data
-        except KernelError:
-            return SINGULAR
-        return self._do(task)
-
     def states(self) -> Sequence[State]:
         """Return the states kept in the last call; they are made when one is looked at."""
         count, width = self.march.kept, self._state_width
@@ -454,75 +306,3 @@ class Marcher:
             return ()
         table = self.march.states[: count * width].reshape(count, width).copy()
         return Later(count, float(table[-1, -1]), partial(states_of, self.flattened, table, self.dry))
-
-
-def _march(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
-    flat, c = F.flat, method.coefficients
-    v, rate, algorithmic, trend, pulled, reach, first = np.zeros((7, flat.padded))
-    closing: Any = Packed(closing_of(F))
-    state, part, probes = width_of(F), components(F.model), probes_of(F, method.weight)
-    cones = F.plan.position[coning_of(F.model).triples]
-    shelf = int(min(_SHELF, max(1, _BYTES // (8 * state))))
-    return March(
-        flat=flat,
-        gauges=F.gauges,
-        corners=Packed(corners_of(F)),  # type: ignore[arg-type]
-        closing=closing,
-        flows=flows_of(F),
-        contacts=contacts,
-        law=no_law(),
-        leap=no_leap(),
-        fronts=F.plan.fronts,
-        axes=F.axes,
-        tangent=_factors(F),
-        mass=_factors(F),
-        probes=probes,
-        entries=np.zeros(F.plan.length + 1),
-        v=v,
-        rate=rate,
-        algorithmic=algorithmic,
-        trend=trend,
-        pulled=pulled,
-        weight=F.ordered(method.weight),
-        turns=F.ordered(method.turning.astype(float)),
-        dust=F.ordered(F.model.dust),
-        cones=cones.ravel(),
-        reach=reach,
-        first=first,
-        rows=np.zeros((1 + F.gauges.outputs) * _CAPACITY),
-        states=np.zeros(state * shelf),
-        parts=int(part.max(initial=0)) + 1,
-        part=part[F.plan.order],
-        farthest=np.zeros(int(part.max(initial=0)) + 1),
-        coning=len(cones),
-        shelf=shelf,
-        alpha_m=c.alpha_m,
-        alpha_f=c.alpha_f,
-        beta=c.beta,
-        gamma=c.gamma,
-        least=method.least,
-        loosest=max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
-        share=_SHARE if c.damping else _KEEPING,
-        price=_MADE + probes.groups if flat.tangents or probes.groups else _ASKED,
-        leaping=leaping,
-        firmest=firmest(F.model),
-        asking=int(not flat.tangents and not probes.groups),
-        swift=int(flat.quick > 0 and not flat.pressing),
-        whole=flat.pressing,
-        tolerance=method.least,
-    )
-
-
-def _factors(F: Flattened) -> Factors:
-    axes, fronts = F.axes, F.plan.fronts
-    return Factors(
-        down=np.zeros(fronts.below + 8),
-        up=np.zeros(fronts.right + 8),
-        diagonal=np.zeros(fronts.n),
-        work=np.zeros(F.plan.widest),
-        wide=np.zeros(fronts.n + 8 if fronts.beyond else 0),
-        made=np.zeros(9 * axes.count),
-        turned=np.zeros(9 * axes.count),
-        angles=np.zeros(axes.angle_count),
-        place=np.zeros(F.flat.size),
-    )

@@ -14,7 +14,7 @@ import numpy as np
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 from flexctrl.model.flat.flat import Flat, clear, drive, place, press_entire, push
-from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.flat.flattened import Flattened
 
 __all__ = ["Probes", "probe", "probes_of"]
 

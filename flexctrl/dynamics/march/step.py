@@ -1,7 +1,7 @@
 """Generalised alpha in compiled loops: one step.
 
-The method, its Newton iterations and its tests are those of `alpha`, but for the tangent, which is kept longer
-(see `march_axes`), and for Newton's tolerance, which is a share of the method's own error.
+The method, its Newton iterations and its tests are those of `alpha_steps`, but for the tangent, which is kept longer
+(see `march.axes`), and for Newton's tolerance, which is a share of the method's own error.
 """
 
 from __future__ import annotations
@@ -14,26 +14,22 @@ from flexctrl.dynamics.march.contacts import feel, firmness
 from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
+from flexctrl.dynamics.newton import ASTRAY, ITERATIONS, POOR, small_enough
 from flexctrl.dynamics.stiff_lines import SHORT, STIFF, SURE, TURNING
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
-from flexctrl.model.flat.fronts import factor, whose
+from flexctrl.model.flat.fronts import factor
 
-__all__ = ["blended", "refactored", "sloped", "step", "to_rate", "to_v"]
+__all__ = ["blended", "press_all", "refactored", "sloped", "step", "to_rate", "to_v"]
 
 _TURNED = 0.03
-_POOR = 0.25
-_ASTRAY = 1.5
-_ITERATIONS = 12
 _TRUSTED = 8
 _PATIENCE = 500
 """Steps until the mass is tried again for the tangent."""
 _HABIT = 0.002
 _MOST = 2.0
 """Coning by a correction is left out where it cannot come to more than a tenth of Newton's tolerance: 10 · 2 η."""
-_ROUND_OFF = 1e-13
-"""Corrections below this that do not shrink any more are round-off."""
 
 
 def step(m: March) -> int:
@@ -114,38 +110,24 @@ def blended(m: March, rate: Eight, before: Eight, own: Eight) -> Eight:
 
 def newton(m: March) -> int:
     """Iterate until the step is solved."""
-    f = m.flat
-    while m.iteration < _ITERATIONS:
+    while m.iteration < ITERATIONS:
         if m.swift == 1:
             lag(m)
         elif m.phase == EVALUATE:
-            if m.whole == 1:
-                press_entire(f)
-            else:
-                place(f)
-                drive(f)
-                if m.contacts.count > 0 and m.contacts.stuck > 0:
-                    feel(m.contacts, f)
-                push(f)
+            press_all(m)
             m.phase = CORRECT
-            if m.attempt == 1 or wary(m) or m.contraction > _POOR or (m.iteration == 0 and stale(m)):
-                m.last = m.last if wary(m) else math.inf
-                if m.whole == 1:
-                    place(f)
-                    drive(f)
-                if m.asking == 1:
-                    return WANTS_TANGENT
-                sloped(m, 1.0, to_v(m), to_rate(m))
-                if refactored(m) != DONE:
-                    return SINGULAR
+            if m.attempt == 1 or wary(m) or m.contraction > POOR or (m.iteration == 0 and stale(m)):
+                status = sloped_here(m)
+                if status != DONE:
+                    return status
         m.phase = EVALUATE
         size = correct(m)
-        if not math.isfinite(size) or m.strayed > _ASTRAY:
+        if not math.isfinite(size) or m.strayed > ASTRAY:
             m.last = size if math.isfinite(size) else math.inf
             return FAILED
         m.contraction = size / m.last if math.isfinite(m.last) else 0.0
         m.last = size
-        if m.swift == 1 and m.contraction > _POOR:
+        if m.swift == 1 and m.contraction > POOR:
             return FAILED
         if m.contraction > 2.0 and m.iteration > 3 and not wary(m):
             return FAILED
@@ -157,6 +139,31 @@ def newton(m: March) -> int:
             return DONE
         m.iteration += 1
     return FAILED
+
+
+def press_all(m: March) -> None:
+    """Sum up the forces of the motion under way."""
+    f = m.flat
+    if m.whole == 1:
+        press_entire(f)
+        return
+    place(f)
+    drive(f)
+    if m.contacts.count > 0 and m.contacts.stuck > 0:
+        feel(m.contacts, f)
+    push(f)
+
+
+def sloped_here(m: March) -> int:
+    """Make the tangent anew where the iteration stands, or ask for it."""
+    m.last = m.last if wary(m) else math.inf
+    if m.whole == 1:
+        place(m.flat)
+        drive(m.flat)
+    if m.asking == 1:
+        return WANTS_TANGENT
+    sloped(m, 1.0, to_v(m), to_rate(m))
+    return refactored(m)
 
 
 def lag(m: March) -> None:
@@ -174,8 +181,6 @@ def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) ->
     if m.probes.groups > 0:
         probe(m.probes, m.flat, m.whole, on_place, on_rate, on_acceleration, m.entries)
     else:
-        if m.fronts.beyond > 0:  # levers turn under the forces they carry
-            push(m.flat)
         tangent(m.flat, on_place, on_rate, on_acceleration, m.entries)
 
 
@@ -212,7 +217,7 @@ def sure(m: March, size: float) -> bool:
 
     What goes back and forth between a slack rope and a taut one goes a little less far from then on.
     """
-    if size <= min(m.tolerance, SURE) or (m.contraction > _POOR and size <= _ROUND_OFF):
+    if small_enough(size, m.contraction, min(m.tolerance, SURE)):
         last = m.short == 0.0
         m.short = 0.0
         return last
@@ -245,7 +250,7 @@ def refactored(m: March) -> int:
     where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
     m.made_for = -1.0
     if where >= 0:
-        m.worst = whose(m.fronts, where)
+        m.worst = where
         return SINGULAR
     m.factorisations += 1
     m.made_for = m.h
@@ -266,7 +271,7 @@ def converged(m: March, size: float) -> bool:
     if m.contraction > 0.0:
         m.habit = max(m.contraction, max(m.habit, _HABIT))
         m.trusted = 0
-    if size <= m.tolerance or (m.contraction > _POOR and size <= _ROUND_OFF):
+    if small_enough(size, m.contraction, m.tolerance):
         return True
     if m.contraction > 0.0:
         return m.contraction < 1.0 and size * m.contraction <= 0.5 * m.tolerance

@@ -7,10 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from flexctrl.dynamics import alpha
-from flexctrl.dynamics.alpha import AlphaPoint
+from flexctrl.dynamics import alpha_steps
+from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.march.marching import Marcher, Method, Remembered
+from flexctrl.dynamics.march.calling import Remembered
+from flexctrl.dynamics.march.making import Method
+from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
@@ -23,7 +25,7 @@ __all__ = ["MarchingStepper", "Memory"]
 class Memory:
     """The tangents in use: of the plain steps and of the march."""
 
-    plain: alpha.Tangent | None
+    plain: alpha_steps.Tangent | None
     march: Remembered
 
 
@@ -38,7 +40,7 @@ class MarchingStepper:
     plain : Stepper
     """
 
-    plain: alpha.Stepper
+    plain: alpha_steps.Stepper
     _here: AlphaPoint | None = None
     _made: int = 0
 

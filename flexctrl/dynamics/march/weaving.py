@@ -12,7 +12,7 @@ from flexctrl.dynamics.frames import Later
 from flexctrl.dynamics.march.shelf import row_of, states_of, width_of
 from flexctrl.dynamics.march.weave import Weave, weave
 from flexctrl.kernels.native import Packed
-from flexctrl.model.flat.layout import Flattened
+from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.widened import widened
 from flexctrl.model.linkages.chart import Chart, Follower
 from flexctrl.model.linkages.charting import chart_of

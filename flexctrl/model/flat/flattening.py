@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from flexctrl.model.flat.layout import Flattened, Layout
+from flexctrl.model.flat.flattened import Flattened
+from flexctrl.model.flat.layout import Layout
 from flexctrl.model.flat.small_layout import SmallLayout
 from flexctrl.model.model import Model
 

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.rotation import turned_rows
+from flexctrl.model.flat import binding
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.layout import Layout
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
@@ -34,11 +35,6 @@ class SmallLayout(Layout):
             "back": self.padded if self.model.about else 0,
         }
 
-    @property
-    def long(self) -> bool:
-        """Levers are constant numbers."""
-        return False
-
     @cached_property
     def constants(self) -> tuple[int, np.ndarray]:
         rest, first, last = self.model.rest, self.starts["drawn"], self.starts["back"]
@@ -49,7 +45,7 @@ class SmallLayout(Layout):
         return first, values
 
     @property
-    def _coordinates(self) -> tuple[str, ...]:
+    def coordinates(self) -> tuple[str, ...]:
         """From where it rests on: what is small, and nothing of which is lost to what is not."""
         return ("q", "back") if self.model.about else ("q",)
 
@@ -110,16 +106,16 @@ class SmallLayout(Layout):
         cells = np.arange(6 * len(self.motion.place))
         return {
             "turn": (),
-            **self._linkage(),
-            "winding": self._winding("drawn") if self.motion.drives else (),
-            "forces": (self._entry_forces(),),
-            "tangents": (self._entry_slopes(),),
-            "energies": (self._entry_energies(),),
-            "shifts": (self._along((*self._coordinates, "step"), cells, self.starts["shift"]),),
+            "linkage": self._linkage(),
+            "winding": binding.winding(self, "drawn") if self.motion.drives else (),
+            "forces": (binding.entry_forces(self),),
+            "tangents": (binding.entry_slopes(self),),
+            "energies": (binding.entry_energies(self),),
+            "shifts": (self._along((*self.coordinates, "step"), cells, self.starts["shift"]),),
             "gusts": (),
         }
 
-    def _linkage(self) -> dict[str, tuple[Run, ...]]:
+    def _linkage(self) -> tuple[Run, ...]:
         """Poses from how far nodes are shifted, their rates and their accelerations."""
         nodes = np.arange(len(self.motion.place))
         drawn = self.starts["drawn"] + 12 * nodes[:, None] + np.arange(12)
@@ -128,7 +124,7 @@ class SmallLayout(Layout):
         none = np.zeros((len(nodes), 0))
         place = self.backend.bind(_shifted(), np.hstack([drawn, shift]), none, pose)
         rates, changes = (self._along((of,), cells, 0) for of, cells in self._rate_cells)
-        return {"placing": (place,), "rating": (rates,), "changing": (changes,), "carrying": ()}
+        return place, rates, changes
 
     @property
     def _rate_cells(self) -> tuple[tuple[str, np.ndarray], ...]:

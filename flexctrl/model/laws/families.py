@@ -111,7 +111,7 @@ def _modal_beams(s: Structure, effects: tuple[Effect, ...]) -> list[Family]:
     for effect in effects:
         chosen = [p for p in s.elements if isinstance(effect, ComponentModes) and effect.modes(p)]
         if isinstance(effect, ComponentModes) and chosen:
-            kind = part_kinds.modal_beam(effect.count)
+            kind = part_kinds.modal_beam(effect.count, effect.along)
             found.append(_beams(kind, s, _kernel_effects(effects), chosen, frozenset(), inner))
         inner += len(effect.inner(s))
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
+def _beam(
+    effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX, along: int = 0
+) -> Shares:
     import casadi as ca
 
-    modal = modes_in(slot)
+    modal = modes_in(slot, along)
     m = beam.beam_motion(nodes[0], nodes[1], parameters, modal)
     force, middle = beam.no_force(), 0.5 * (nodes[0].x + nodes[1].x)
     for effect in effects:
@@ -32,24 +34,30 @@ def _beam(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
         first, second = nodes
         felt = beam.beam_motion(seen_outside(effects, first), seen_outside(effects, second), parameters, modal)
         parked = (seen_outside(effects, standing(first)), seen_outside(effects, standing(second)))
-        still = tuple(0.0 * eta if k else eta for k, eta in enumerate(modal))
+        still = modal._replace(rates=0.0 * modal.rates, accelerations=0.0 * modal.accelerations) if modal else ()
         carried = beam_inertia.kinetic_energy(beam.beam_motion(*parked, parameters, still))
     inertia = beam.whole_force(felt, beam_inertia.inertial_force(felt))
     return Shares(inertia, beam.whole_force(m, force), beam_inertia.kinetic_energy(m), stored - carried)
 
 
-def modes_in(slot: ca.SX) -> tuple[ca.SX, ...]:
-    """Return amplitudes, rates and accelerations of an element's own modes; nothing where it has none."""
-    return tuple(slot[k::DRIVE_SLOT] for k in range(3)) if slot.numel() else ()
+def modes_in(slot: ca.SX, along: int = 0) -> beam.OwnMotion | tuple[()]:
+    """Return the motion of an element's own modes; nothing where it has none."""
+    values, rates, accelerations = (slot[k::DRIVE_SLOT] for k in range(3))
+    return beam.OwnMotion(values, rates, accelerations, along) if slot.numel() else ()
 
 
 def _beam_slope(
-    effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX, seeds: ca.SX
+    effects: tuple[Effect, ...],
+    nodes: Sequence[NodeMotion],
+    slot: ca.SX,
+    parameters: ca.SX,
+    seeds: ca.SX,
+    along: int = 0,
 ) -> ca.SX:
     def force(m: beam.BeamMotion) -> beam.BeamForce:
         return sum((e.beam(m) for e in effects), beam_inertia.inertial_force(m))
 
-    return beam_slope(nodes[0], nodes[1], parameters, seeds, force, modes_in(slot))
+    return beam_slope(nodes[0], nodes[1], parameters, seeds, force, modes_in(slot, along))
 
 
 def _spring(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
@@ -176,9 +184,16 @@ SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(beam.PARAMETERS + beam.SHEARI
 
 
 @cache
-def modal_beam(count: int) -> Kind:
-    """Return the kind of beam elements with some of their own modes in each plane."""
-    return Kind(f"beam_with_{count}_modes", 2, 6, 2 * count, len(beam.PARAMETERS), _beam, _beam_slope)
+def modal_beam(count: int, along: int) -> Kind:
+    """Return the kind of beam elements with some of their own modes in each plane, and along them."""
+    name = f"beam_with_{count}_modes" + (f"_and_{along}_along" if along else "")
+    physics, slope = partial(_beam, along=along), partial(_beam_slope, along=along)
+    return Kind(name, 2, 6, 2 * (count + along), len(beam.PARAMETERS), physics, slope)
+
+
+def along_of(kind: Kind) -> int:
+    """Return how many of their own modes of stretch, and as many of twist, elements of a kind have."""
+    return kind.physics.keywords["along"] if isinstance(kind.physics, partial) else 0
 
 
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)

@@ -1,0 +1,101 @@
+"""Events in a ride: steps up to the first one in which something may happen, taken again from where they began."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.foresight import calm_steps
+from flexctrl.dynamics.march.lookout import FAR, Lookout
+from flexctrl.dynamics.march.marching import Pacing
+from flexctrl.dynamics.march.stepper import Memory
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.march.ride import Ride
+
+__all__ = ["EVENT", "FEWEST", "Begun", "go_back", "guarded", "next_span", "warily"]
+
+FEWEST, _WIDEST = 8, 1024
+"""Steps that are looked at together."""
+EVENT = -1
+"""How a march ends where an event may be near."""
+
+
+class Begun(NamedTuple):
+    """Where a leg started: what it takes to take its steps again, and what had been counted."""
+
+    point: Any
+    memory: Memory
+    sums: Sums
+    due: float
+    newton: int
+    factorisations: int
+    rejected: int
+
+    @classmethod
+    def of(cls, ride: Ride) -> Begun:
+        """Return where a ride is."""
+        m, marcher = ride.marcher.march, ride.marcher
+        point, sums = ride.stepper.leave(ride.supply), marcher.books(ride.journey.books.sums)
+        return cls(point, ride.stepper.memory, sums, m.due, m.newton, m.factorisations, m.rejected)
+
+
+def guarded(ride: Ride, lookout: Lookout, pacing: float | Pacing, count: int) -> tuple[int, int]:
+    """Take steps up to the first one in which an event may happen, whatever there is beyond that."""
+    begun, u = Begun.of(ride), ride.supply.u
+    ride.marcher.march.turned = 0.0
+    status, done = ride.marcher.travel(pacing, count)
+    few = done < FEWEST and ride.marcher.march.turned <= FAR
+    if few and lookout.passes(0, done, begun.point.state.t, ride.marcher.rows, u.tolist()):
+        return status, done
+    calm, _ = lookout.calm(ride.marcher.rows[:done], np.tile(u, (done + 1, 1)))
+    if calm < done:
+        go_back(ride, begun)
+        status, done = EVENT, ride.marcher.travel(pacing, calm)[1] if calm else 0
+    lookout.pass_by(ride.marcher.rows[:done], np.tile(u, (done + 1, 1)))
+    return status, done
+
+
+def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
+    """Take steps up to the first one in which an event may happen; return how it ended, and how many there were.
+
+    What is looked at does not depend on the end of the run: a run that goes on looks at the same.
+    """
+    j, watch, begun = ride.journey, ride.journey.watch, Begun.of(ride)
+    sizes, span = watch.sizes.copy(), watch.span
+    ride.marcher.march.turned = 0.0
+    status, done = ride.marcher.travel(pacing, min(count, span))
+    far = ride.marcher.march.turned > FAR
+    calm = 0 if far else calm_steps(watch, begun.point, ride.marcher.rows[:done], ride.supply.u)
+    watch.span = next_span(span, calm, calm < done)
+    fitting = int(np.searchsorted(ride.marcher.rows[:done, 0], ride.until + ride.tick, "right"))
+    if fitting < calm and j.saved is None:
+        j.saved = replace(j.snapshot(), sizes=sizes, span=span)
+    wanted = ride.limited(min(calm, fitting))
+    if wanted == done:
+        return status, done
+    go_back(ride, begun)
+    return EVENT, ride.marcher.travel(pacing, wanted)[1] if wanted else 0
+
+
+def next_span(span: int, calm: int, near: bool) -> int:
+    """Return at how many steps (or samples) is looked next, after ``calm`` ones of a span before something was near."""
+    return max(FEWEST, 2 * calm) if near else min(_WIDEST, 2 * span)
+
+
+def go_back(ride: Ride, begun: Begun) -> None:
+    """Go back to where a leg started."""
+    m, books = ride.marcher.march, ride.journey.books
+    keeping, spacing = bool(m.keeping), m.spacing
+    m.factorisations = begun.factorisations
+    ride.stepper.recall(begun.memory)
+    ride.stepper.enter(begun.point)
+    m.newton, m.rejected, m.size = begun.newton, begun.rejected, ride.journey.mark.size
+    ride.marcher.open(books.first, begun.sums.moved, books.dissipates)
+    ride.marcher.go_on(begun.sums)
+    ride.marcher.watch(ride.journey.watch.corner_sides, begun.point.state)
+    ride.marcher.follow(ride.journey.mark)
+    ride.marcher.keep(keeping, begun.due, spacing)

@@ -1,0 +1,130 @@
+"""Accelerations beyond a corner of a law of force, in compiled loops; as `outset.join` finds them."""
+
+from __future__ import annotations
+
+from flexctrl.dynamics.march.axes import mark, solved
+from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.flowing import released
+from flexctrl.dynamics.march.jumping import jump
+from flexctrl.dynamics.march.record import DONE, SINGULAR, March
+from flexctrl.dynamics.march.step import press_all, sloped
+from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.native import seldom
+from flexctrl.model.flat.flat import clear, drive, energy, place
+from flexctrl.model.flat.fronts import factor
+
+__all__ = ["start_anew"]
+
+_SHARE, _CLEAR = 1e-4, 1e-3
+
+
+_FIRM = 1e30
+"""What holds freedoms of first order, over what stands for their mass."""
+
+
+@seldom
+def start_anew(m: March) -> int:
+    """Find the accelerations under the law of force that holds from now on, and the method's own.
+
+    The lead of these on the true ones is (α_m − α_f) h times the rate of the accelerations; see `outset.join`.
+    """
+    f = m.flat
+    m.made_for = -1.0
+    m.lean = 1.0
+    clear(f.padded, m.trend)
+    clear(f.padded, f.step)
+    copy(f.padded, m.v, f.v)
+    reach(m)
+    m.unsure = 1
+    status = jump(m)
+    m.unsure = 0
+    if status != DONE:
+        return status
+    clear(f.padded, f.step)
+    copy(f.padded, m.v, f.v)
+    copy(f.padded, m.rate, f.rate)
+    at_rest_in(m)
+    if m.losing == 1:
+        energy(f)
+        m.power = f.books[2]
+    if not firm(m):
+        return SINGULAR
+    forces_change(m)
+    at_rest_in(m)
+    give_lead(m)
+    return DONE
+
+
+@seldom
+def at_rest_in(m: March) -> None:
+    """Put nodes and drives where the march stands."""
+    place(m.flat)
+    drive(m.flat)
+
+
+@seldom
+def firm(m: March) -> bool:
+    """Factorise the forces that answer accelerations over a step, in the place of the tangent; tell if that can be."""
+    f = m.flat
+    clear(f.padded, f.rate)
+    if m.probes.groups > 0:  # differences are not to reach back over the corner
+        for i in range(0, f.padded, 8):
+            put(f.step[i:], _CLEAR * m.h * eight(m.v[i:]))
+    at_rest_in(m)
+    sloped(m, 1.0, m.gamma / (m.beta * m.h), 1.0 / (m.beta * m.h * m.h))
+    clear(f.padded, f.step)
+    copy(f.padded, m.rate, f.rate)
+    for k in range(m.flows.count):
+        m.entries[m.flows.cells[k]] = -_FIRM * m.flows.mass
+    where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
+    m.made_for = -1.0
+    if where >= 0:
+        m.worst = where
+        return False
+    m.factorisations += 1
+    mark(m.axes, m.tangent, f)
+    return True
+
+
+@seldom
+def forces_change(m: March) -> None:
+    """Work out how fast forces change, as the motion goes on with its accelerations: in the place of the forces."""
+    c = m.corners
+    f = m.flat
+    t = _SHARE * m.h
+    forces_in(m, 0.0)
+    for i in range(0, f.padded, 8):
+        put(c.change[i:], -3.0 * eight(f.force[i:]))
+    forces_in(m, t)
+    for i in range(0, f.padded, 8):
+        put(c.change[i:], eight(c.change[i:]) + 4.0 * eight(f.force[i:]))
+    forces_in(m, 2.0 * t)
+    for i in range(0, f.padded, 8):
+        put(c.change[i:], (eight(c.change[i:]) - eight(f.force[i:])) * (0.5 / t))
+    clear(f.padded, f.step)
+    copy(f.padded, m.v, f.v)
+
+
+@seldom
+def forces_in(m: March, t: float) -> None:
+    """Sum up the forces a time later."""
+    f = m.flat
+    for i in range(0, f.padded, 8):
+        put(f.step[i:], t * eight(m.v[i:]))
+        put(f.v[i:], eight(m.v[i:]) + t * eight(m.rate[i:]))
+    press_all(m)
+
+
+@seldom
+def give_lead(m: March) -> None:
+    """Give the method's own accelerations their lead."""
+    c = m.corners
+    f = m.flat
+    released(m.flows, c.change)
+    copy(f.padded, c.change, f.force)
+    f.force[f.n] = 0.0
+    solved(m.axes, m.tangent, m.fronts, f.force)
+    released(m.flows, f.force)
+    share = (m.alpha_f - m.alpha_m) / (m.beta * m.h)
+    for i in range(0, f.padded, 8):
+        put(m.algorithmic[i:], eight(m.rate[i:]) + share * eight(f.force[i:]))

@@ -1,0 +1,116 @@
+"""One step of a run, of a fixed length or of one chosen by its error, tried again shorter where that is needed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from flexctrl.dynamics.ending import ends_before
+from flexctrl.dynamics.landing import Missed
+from flexctrl.dynamics.nearing import SHORTEST, SMALLEST
+from flexctrl.dynamics.run import Status
+from flexctrl.dynamics.steps import Controlled, Point, StepError
+from flexctrl.dynamics.switching import lead
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["controlled", "fixed"]
+
+_NEAR = 1e-9
+
+
+def fixed(journey: Journey, stop: float, until: float) -> None:
+    """Take a step of one length, towards a stop."""
+    mark, t = journey.mark, journey.point.state.t
+    if not mark.left:
+        length = journey.plan.method.pace.step  # type: ignore[union-attr]
+        count = max(1, math.ceil((stop - t) / length - 1e-6)) if math.isfinite(stop) else 0
+        mark.size, mark.left = (stop - t) / count if count else length, count or -1
+    room = math.floor((until - t) / mark.size + _NEAR)
+    if not room:
+        if not ends_before(journey, stop):
+            _take(journey, until - t, stop)
+        return
+    _take(journey, mark.size, stop)
+    if mark.left > 0:
+        mark.left -= 1
+
+
+def controlled(journey: Journey, stop: float, until: float) -> None:
+    """Take a step whose error is allowed, towards a stop."""
+    pace, mark, t = journey.plan.method.pace, journey.mark, journey.point.state.t
+    assert isinstance(pace, Controlled)
+    left = stop - t
+    h = min(mark.size, pace.largest)
+    h = min(h, mark.cap) if mark.follow else h
+    h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
+    if t + h > until + journey.tick:
+        if ends_before(journey, stop):
+            return
+        h = until - t
+    after, h, size, factor = _tried(journey, pace, h)
+    if factor > 1.3 and h > 0.5 * size:
+        size = h * min(2.5, factor)
+    elif factor < 1.0:
+        size = h * factor
+    mark.size, mark.led, mark.follow = size, 0.0, max(0, mark.follow - 1)
+    try:
+        journey.accept(after, stop)
+    except Missed:
+        mark.rejected += 1
+        mark.size = 0.25 * h
+
+
+def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, float, float]:
+    """Take shorter and shorter steps until the error of one is allowed.
+
+    Returns where it ends, its length, the length meant before, and by what its error lets that grow.
+    """
+    mark, t, why = journey.mark, journey.point.state.t, ""
+    size = mark.size
+    while True:
+        if mark.led and h != mark.led:
+            lead(journey, h)
+        if h < SMALLEST * max(SHORTEST * journey.plan.until, t):
+            raise StepError(journey.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
+        try:
+            after = journey.stepper.step(journey.point, h)
+        except StepError as failure:
+            why = f": {failure}"
+            mark.rejected += 1
+            size = h = 0.25 * h
+            continue
+        error = journey.stepper.error(journey.point, after, journey.books.sums.moved, journey.plan.tolerance)
+        factor = 0.9 * max(error, 1e-9) ** (-1.0 / pace.steepness)
+        if error <= 1.0:
+            return after, h, size, factor
+        mark.rejected += 1
+        size = h = h * max(0.2, factor)
+
+
+def _take(journey: Journey, h: float, stop: float) -> None:
+    """A step of fixed length; where it does not converge, in halves."""
+    try:
+        after = journey.stepper.step(journey.point, h)
+    except StepError as failure:
+        journey.mark.rejected += 1
+        if h < 2e-3 * journey.mark.size:
+            why = f"{failure}; steps up to {journey.mark.size:.3g} s have failed too; take AdaptiveAlpha"
+            raise StepError(failure.worst, why) from failure
+        return _halved(journey, h, stop)
+    try:
+        journey.accept(after, stop)
+    except Missed:
+        journey.mark.rejected += 1
+        if h < 2e-3 * journey.mark.size:
+            raise
+        _halved(journey, h, stop)
+
+
+def _halved(journey: Journey, h: float, stop: float) -> None:
+    """Take a step in two; what ends the first short of its half is made up by the second."""
+    end = journey.point.state.t + h
+    _take(journey, 0.5 * h, stop)
+    if journey.status is Status.FINISHED and (left := end - journey.point.state.t) > SMALLEST * h:
+        _take(journey, left, stop)
