@@ -54,8 +54,8 @@ def bar(
     return linear(fc.planar(structure, plane) if plane else structure)
 
 
-def linear(structure: fc.Structure) -> fc.LinearModel:
-    return fc.linearize(fc.assemble(structure, [fc.Flexible(), fc.LargeRotation()], fc.CasadiVM()))
+def linear(structure: fc.Structure, *more: fc.Effect) -> fc.LinearModel:
+    return fc.linearize(fc.assemble(structure, [fc.Flexible(), fc.LargeRotation(), *more], fc.CasadiVM()))
 
 
 def bending(model: fc.LinearModel, count: int) -> np.ndarray:
@@ -125,25 +125,27 @@ def test_error_of_cubic_elements(record, mode, meshes):
     )
 
 
-def test_rod_and_shaft(record):
-    """Along the axis and about it: the linear elements' own error is (ω/n)²/24."""
+@pytest.mark.parametrize(("elements", "along", "tolerance"), [(100, 0, 3e-4), (10, 2, 1e-5)])
+def test_rod_and_shaft(record, elements, along, tolerance):
+    """Along the axis and about it: the linear elements' own error is (ω/n)²/24, that of cubics of sixth order."""
     roots = (2 * np.arange(1, 4) - 1) * np.pi / 2
     section = fc.Section(EA=1.0, EI_y=1.0, EI_z=1.0, GJ=4.0, rhoA=1.0, rhoJ=1.0)
     for held, freedom, speed, name in (
         ("v w rx ry rz", "u", 1.0, "rod, along"),
         ("u v w ry rz", "rx", 2.0, "shaft, twist"),
     ):
-        beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), section, elements=100)
+        beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), section, elements=elements)
         joints = [fc.Support(beam.start), *(fc.Support(node, held) for node in beam.nodes[1:])]
-        model = linear(fc.Structure([beam], joints))
-        assert {c.rsplit("_", 1)[1] for c in model.coordinates} == {freedom}
+        model = linear(fc.Structure([beam], joints), fc.ComponentModes(0, along=along))
+        own = {f"{kind}{i}" for i in range(1, along + 1) for kind in "xt"}
+        assert {c.rsplit("_", 1)[1] for c in model.coordinates} == {freedom} | own
         found = model.modes(3).omega / speed
         record(
-            f"fixed–free {name}: ωL/c, 100 elements",
+            f"fixed–free {name}: ωL/c, {elements} elements" + (f", {along} shapes along each" if along else ""),
             ours=found,
             reference=roots,
             source="closed form, (2k − 1)π/2",
-            tolerance=3e-4,
+            tolerance=tolerance,
         )
 
 
