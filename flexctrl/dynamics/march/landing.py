@@ -113,7 +113,7 @@ def zero_of(start: float, middle: float, end: float, dust: float) -> float:
 def short_of(m: March, guess: float, h: float) -> bool:
     """Take steps that end ever nearer to a corner, on this side of it; tell whether the last one does so.
 
-    The time left to the corner is in ``when``. As in `landing`: only an end on this side tells when the corner is.
+    The time left to the corner is in ``when``. Only an end on this side tells when the corner is.
     """
     c = m.corners
     b = c.bracket
