@@ -52,13 +52,19 @@ def _light(model: Model) -> np.ndarray:
     """Stiffness and damping of each degree of freedom, these zero where they are rounding, and whether it is light."""
     if not isinstance(model, Model) or model.switches.names:
         return np.zeros((3, 0))
-    zero, u = np.zeros(model.n), np.zeros(len(model.inputs))
-    seeds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    stiffness, damping, mass = (np.abs(model.slope(model.rest, zero, zero, seed, u).diagonal()) for seed in seeds)
-    damping[damping <= model.forces.rounding((0.0, 1.0, 0.0))] = 0.0
-    light = mass <= model.dust
+    light = _own(model, (0.0, 0.0, 1.0)) <= model.dust
     light[np.setdiff1d(model.motion.inner, model.n)] = False
+    if not light.any():
+        return np.zeros((3, model.n))
+    stiffness, damping = (_own(model, seeds) for seeds in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    damping[damping <= model.forces.rounding((0.0, 1.0, 0.0))] = 0.0
     return np.array([stiffness, damping, light])
+
+
+def _own(model: Model, seeds: tuple[float, float, float]) -> np.ndarray:
+    """Size of each degree of freedom's own entry in a slope at rest."""
+    zero, u = np.zeros(model.n), np.zeros(len(model.inputs))
+    return np.abs(model.slope(model.rest, zero, zero, seeds, u).diagonal())
 
 
 def settled(model: Model, state: State, feed: Feed, supply: Supply) -> tuple[State, Supply]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from flexctrl.effects.effect import Inner
 from flexctrl.kernels.kernel import Backend
+from flexctrl.model.linkages.levers import Levers
 from flexctrl.model.linkages.linkage import Linkage
 from flexctrl.model.linkages.twists import Twists
 from flexctrl.model.state import State
@@ -136,6 +137,24 @@ class Coordinates:
     def cells(self) -> np.ndarray:
         """Number of each raw freedom's degree of freedom, ``n`` for none, shape (raw,)."""
         return np.concatenate([self.place.ravel(), self.sources, self.inner])
+
+    @cached_property
+    def owned(self) -> np.ndarray:
+        """Number of the degree of freedom that each raw freedom is, whatever else moves; ``n`` for the others."""
+        if self.plain:
+            return self.cells
+        found, linked = self.cells.copy(), np.append(self.linked, self.n)
+        levers = self.linkage
+        found[self.linked_cells] = linked[levers.owned] if isinstance(levers, Levers) else self.n
+        return found
+
+    @cached_property
+    def said(self) -> np.ndarray:
+        """Raw freedoms that the linkage works out; of a short one all that it has to do with."""
+        levers = self.linkage
+        if self.plain:
+            return self.linked_cells[:0]
+        return self.linked_cells[levers.said] if isinstance(levers, Levers) else self.linked_cells
 
     @cached_property
     def linked_cells(self) -> np.ndarray:

@@ -15,9 +15,11 @@ from flexctrl.model.laws.families import Family
 from flexctrl.model.laws.gusts import Gusts
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.laws.wind_kinds import WIND
+from flexctrl.model.linkages.levers import Levers
 from flexctrl.model.mixed import Excess, Mixed
 from flexctrl.model.motion import DENSE_UP_TO, Motion
 from flexctrl.model.state import State
+from flexctrl.model.unfolded import LEVELS, Unfolded
 
 _ROUND_OFF = 1e-14
 
@@ -127,10 +129,17 @@ class Forces:
             places, indices, indptr = self._table
             data = np.bincount(places, weights=blocks, minlength=len(indices) + 1)[:-1]
             return sp.csr_matrix((data, indices, indptr), shape=(self.motion.n, self.motion.n), copy=False)
-        slope = self._led(state, v, a, seeds, z, blocks, gusts)
+        acting = np.zeros(self.motion.raw)
         if seeds[0] != 0.0:
             acting = self.raw(state, v, a) + (0.0 if loads is None else loads)
             acting = acting if excess is None else acting + excess.raw
+        if isinstance(self.motion.linkage, Levers):
+            levels = [self._blocks(z, level, gusts) for level in LEVELS]
+            if excess is not None:
+                levels[0] += excess.blocks
+            return sp.csr_matrix(self.unfolded.slope(z, v, a, seeds, acting, [blocks, *levels], self.pattern))
+        slope = self._led(state, v, a, seeds, z, blocks, gusts)
+        if seeds[0] != 0.0:
             slope = slope + seeds[0] * self.motion.stiffening(state, acting)
         return sp.csr_matrix(slope)
 
@@ -161,6 +170,11 @@ class Forces:
         places, indices, indptr = self._raw_table
         data = np.bincount(places, weights=blocks, minlength=len(indices))
         return sp.csr_matrix((data, indices, indptr), shape=(self.motion.raw, self.motion.raw), copy=False)
+
+    @cached_property
+    def unfolded(self) -> Unfolded:
+        """How slopes are made of machines with long linkages."""
+        return Unfolded(self.motion, self.families)
 
     @cached_property
     def mixed(self) -> Mixed:

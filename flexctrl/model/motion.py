@@ -15,8 +15,10 @@ import scipy.sparse as sp
 from flexctrl.kernels.kernel import Run
 from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.coordinates import Coordinates
+from flexctrl.model.linkages.levers import Levers
 from flexctrl.model.linkages.linkage import reciprocal_condition
 from flexctrl.model.state import State
+from flexctrl.model.unfolded import Unfolded
 from flexctrl.structure.relations import Fit
 
 DENSE_UP_TO = 60
@@ -198,12 +200,18 @@ class Motion(Coordinates):
 
     def stiffening(self, state: State, raw: np.ndarray) -> np.ndarray:
         """Return ∂(Tᵀ F)/∂(own freedoms) under constant raw forces F, shape (n, n): the levers turn."""
+        if isinstance(self.linkage, Levers):
+            return self._unfolded.stiffening(state, raw)
         pose = self._pose(state.x, state.R)
         motion = self.linkage.matrix_at(pose)[: 6 * len(self.nodes)]
         own = self.linkage.stiffening_at(pose, raw[self.linked_cells]) @ motion
         if self.n > DENSE_UP_TO:
             return self._lead.T @ sp.csr_matrix(own) @ self._lead
         return self._dense_lead.T @ own @ self._dense_lead
+
+    @cached_property
+    def _unfolded(self) -> Unfolded:
+        return Unfolded(self, ())
 
     def drift(self, state: State, v: np.ndarray, a: np.ndarray) -> tuple[sp.csr_matrix | np.ndarray, ...]:
         """Return how raw rates and accelerations change as levers turn.

@@ -16,6 +16,8 @@ from flexctrl.errors import SingularMatrixError
 Solve = Callable[[np.ndarray], np.ndarray]
 
 _DENSE_UP_TO = 40
+_FULL = 0.3
+"""Share of entries from which on a matrix is dealt with as a full one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,7 @@ def factorise(A: sp.spmatrix, known: Plan | None = None) -> Solve:
     if not np.isfinite(A.data).all():
         bad = int(np.flatnonzero(~np.isfinite(A.data))[0])
         raise SingularMatrixError(int(np.searchsorted(A.indptr, bad, side="right")) - 1)
-    if A.shape[0] <= _DENSE_UP_TO:
+    if A.shape[0] <= _DENSE_UP_TO or A.nnz > _FULL * A.shape[0] ** 2:
         return _dense(A.toarray())
     known = known if known is not None and known.fits(A) else plan(A)
     return _banded(A, known) if known.band else _sparse(A)

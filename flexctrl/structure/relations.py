@@ -162,12 +162,28 @@ def reads(follow: Follow) -> tuple[tuple[int, bool], ...]:
 
 def in_order(follows: Sequence[Follow]) -> tuple[Follow, ...]:
     """Order the followers so that every master is known before its follower."""
-    left, done = list(follows), []
-    while left:
-        waiting = {writes(f) for f in left}
-        ready = [f for f in left if waiting.isdisjoint(reads(f))]
-        if not ready:
-            raise StructureError("rigid parts follow each other in a circle; make one of them flexible")
-        done += ready
-        left = [f for f in left if not waiting.isdisjoint(reads(f))]
-    return tuple(done)
+    waiting, behind = dependencies(follows)
+    level, done = [i for i, count in enumerate(waiting) if not count], []
+    while level:
+        done += level
+        later = []
+        for j in (j for i in level for j in behind.get(i, ())):
+            waiting[j] -= 1
+            later += [] if waiting[j] else [j]
+        level = sorted(later)
+    if len(done) < len(follows):
+        raise StructureError("rigid parts follow each other in a circle; make one of them flexible")
+    return tuple(follows[i] for i in done)
+
+
+def dependencies(follows: Sequence[Follow]) -> tuple[list[int], dict[int, list[int]]]:
+    """Return how many others each follower waits for, and who waits for each, by their places in the sequence."""
+    writers: dict[tuple[int, bool], list[int]] = {}
+    for i, f in enumerate(follows):
+        writers.setdefault(writes(f), []).append(i)
+    before = [{j for value in reads(f) for j in writers.get(value, ())} for f in follows]
+    behind: dict[int, list[int]] = {}
+    for i, some in enumerate(before):
+        for j in some:
+            behind.setdefault(j, []).append(i)
+    return [len(some) for some in before], behind

@@ -83,10 +83,12 @@ class _Tying:
         self.ground = 6 * len(nodes)
         self.same = _Classes(self.ground + 1)
         self.definer: dict[int, int] = {}
+        self.definers: set[int] = set()
         self.anchored: set[int] = set()
         self.follows: list[Follow] = []
         self.closures: list[Closure | Fit] = []
         self.writers: dict[tuple[int, bool], Follow] = {}
+        self.read: set[tuple[int, bool]] = set()
         self.lines: list[tuple[int, Vector]] = []
         self.unit = {i: g.nodes[0] for g in groups for i in g.nodes}
         self.moving = self._unite(joints)
@@ -152,15 +154,20 @@ class _Tying:
 
     def _settle(self, moving: list[Hinge | Slide]) -> list[Hinge | Slide]:
         """Turn joints whose axis cannot move into plain rows; one may settle the next."""
-        while fixed := [j for j in moving if self._axis_fixed(j)]:
-            for joint in fixed:
-                a, b = (6 * self.place[n.part, n.index] for n in joint.nodes)
-                kept = range(3, 6) if isinstance(joint, Hinge) else range(3)
-                for f in kept:
-                    if f in joint.shared:
-                        self.same.unite(a + f, b + f)
-            moving = [j for j in moving if j not in fixed]
-        return moving
+        left, before = list(enumerate(moving)), len(moving) + 1
+        while len(left) < before:  # to and fro: a chain is settled from either end
+            before, left = len(left), [(i, j) for i, j in reversed(left) if not self._settled(j)]
+        return [joint for _, joint in sorted(left, key=lambda one: one[0])]
+
+    def _settled(self, joint: Hinge | Slide) -> bool:
+        """Turn a joint into plain rows if its axis cannot move; tell whether it is."""
+        if not self._axis_fixed(joint):
+            return False
+        a, b = (6 * self.place[n.part, n.index] for n in joint.nodes)
+        for f in range(3, 6) if isinstance(joint, Hinge) else range(3):
+            if f in joint.shared:
+                self.same.unite(a + f, b + f)
+        return True
 
     def _axis_fixed(self, joint: Hinge | Slide) -> bool:
         axis = joint.axis if isinstance(joint, Hinge) else joint.along
@@ -240,10 +247,13 @@ class _Tying:
             return
         self.follows.append(follow)
         self.writers[writes(follow)] = follow
+        self.read.update(reads(follow))
         self._define(follow.node, range(3, 6) if isinstance(follow, Turn) else range(3))
 
     def _hangs(self, follow: Follow) -> bool:
         """Tell whether what a follower reads hangs on what it writes."""
+        if writes(follow) not in self.read and writes(follow) not in reads(follow) and follow.node not in self.definers:
+            return False
         todo, seen = list(reads(follow)), set()
         while todo:
             value = todo.pop()
@@ -266,6 +276,7 @@ class _Tying:
                 self.closures.append(Closure(node, f, self._first(node, f)))
             else:
                 self.definer[cell] = node
+                self.definers.add(node)
 
     def _first(self, node: int, f: int) -> int:
         """The node that says what a freedom does which another node shares."""

@@ -11,7 +11,7 @@ from flexctrl.kernels.eights import eight, largest
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.flat import Flat
-from flexctrl.model.flat.fronts import Fronts, solve
+from flexctrl.model.flat.fronts import Fronts, solve_own
 from flexctrl.model.laws.kinds import NODE_SLOT
 
 __all__ = ["mark", "solved", "turned_too_far"]
@@ -77,7 +77,7 @@ def tilt(a: Reals) -> float:
 def solved(axes: Axes, factors: Factors, fronts: Fronts, b: Reals) -> None:
     """Solve in place with the matrix as it would be now."""
     turn_back(axes.triple_count, axes.triples, factors.turned, b)
-    solve(fronts, factors.down, factors.up, b, factors.work)
+    solve_own(fronts, factors.down, factors.up, b, factors.work, factors.wide)
     turn_on(axes.triple_count, axes.triples, factors.turned, b)
 
 

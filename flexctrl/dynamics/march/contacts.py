@@ -12,7 +12,7 @@ import numpy as np
 
 from flexctrl.kernels.eights import eight, total
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
-from flexctrl.model.flat.flat import Flat, clear
+from flexctrl.model.flat.flat import Flat, carry, clear
 from flexctrl.model.flat.flattening import Flattened, layout_of
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.laws.kinds import DRIVE_SLOT
@@ -147,8 +147,7 @@ def feel(c: Contacts, f: Flat) -> None:
             row = c.rows[c.padded * k :]
             for i in range(f.padded + f.carried):
                 f.force[i] = own[3 + i]
-            if f.carried > 0:
-                f.linkage[3](f.z, f.z)
+            carry(f)
             f.force[f.n] = 0.0
             for i in range(f.padded):
                 row[i] = f.force[i]

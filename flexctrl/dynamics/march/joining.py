@@ -11,7 +11,7 @@ from flexctrl.dynamics.march.step import press_all, sloped
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, drive, energy, place
-from flexctrl.model.flat.fronts import factor
+from flexctrl.model.flat.fronts import factor, whose
 
 __all__ = ["start_anew"]
 
@@ -79,7 +79,7 @@ def firm(m: March) -> bool:
     where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
     m.made_for = -1.0
     if where >= 0:
-        m.worst = where
+        m.worst = whose(m.fronts, where)
         return False
     m.factorisations += 1
     mark(m.axes, m.tangent, f)

@@ -15,7 +15,7 @@ from flexctrl.dynamics.march.step import sloped
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import accelerate, clear, drive, energy, load, press_entire, pull, push
-from flexctrl.model.flat.fronts import factor
+from flexctrl.model.flat.fronts import factor, seat
 
 __all__ = ["jump", "weighed"]
 
@@ -235,7 +235,7 @@ def weighed(m: March) -> int:
     where = factor(m.fronts, m.entries, m.mass.diagonal, m.mass.down, m.mass.up)
     m.mass_for = 0.0
     for i in range(f.n):
-        if not m.mass.diagonal[i] > m.dust[i]:
+        if not m.mass.diagonal[seat(m.fronts, i)] > m.dust[i]:
             where = i
     if where >= 0:
         return SINGULAR

@@ -145,8 +145,9 @@ def _factors(F: Flattened) -> Factors:
     return Factors(
         down=np.zeros(fronts.below + 8),
         up=np.zeros(fronts.right + 8),
-        diagonal=np.zeros(F.flat.n),
+        diagonal=np.zeros(fronts.n),
         work=np.zeros(F.plan.widest),
+        wide=np.zeros(fronts.n + 8 if fronts.beyond else 0),
         made=np.zeros(9 * axes.count),
         turned=np.zeros(9 * axes.count),
         angles=np.zeros(axes.angle_count),

@@ -41,8 +41,9 @@ class Factors:
 
     Attributes
     ----------
-    down, up, diagonal, work : Reals
-        What solving reads; the sizes of its diagonal before, and room for a column.
+    down, up, diagonal, work, wide : Reals
+        What solving reads; the sizes of its diagonal before, and room for a column and for unknowns beyond the degrees
+        of freedom.
     made, turned : Reals
         Rotations of the axes when it was made, and since.
     angles : Reals
@@ -55,6 +56,7 @@ class Factors:
     up: Reals
     diagonal: Reals
     work: Reals
+    wide: Reals
     made: Reals
     turned: Reals
     angles: Reals

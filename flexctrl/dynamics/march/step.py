@@ -19,7 +19,7 @@ from flexctrl.dynamics.stiff_lines import SHORT, STIFF, SURE, TURNING
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
-from flexctrl.model.flat.fronts import factor
+from flexctrl.model.flat.fronts import factor, whose
 
 __all__ = ["blended", "press_all", "refactored", "sloped", "step", "to_rate", "to_v"]
 
@@ -181,6 +181,8 @@ def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) ->
     if m.probes.groups > 0:
         probe(m.probes, m.flat, m.whole, on_place, on_rate, on_acceleration, m.entries)
     else:
+        if m.fronts.beyond > 0:  # levers turn under the forces they carry
+            push(m.flat)
         tangent(m.flat, on_place, on_rate, on_acceleration, m.entries)
 
 
@@ -250,7 +252,7 @@ def refactored(m: March) -> int:
     where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
     m.made_for = -1.0
     if where >= 0:
-        m.worst = where
+        m.worst = whose(m.fronts, where)
         return SINGULAR
     m.factorisations += 1
     m.made_for = m.h

@@ -9,7 +9,9 @@ import numpy as np
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.rotation import turn_kernel
 from flexctrl.model.flat.entries import entry, entry_energy, entry_slope
+from flexctrl.model.flat.unfolding import unfolded_tangents
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
+from flexctrl.model.linkages.levers import Levers
 
 if TYPE_CHECKING:
     from flexctrl.model.flat.layout import Layout
@@ -49,6 +51,8 @@ def energies(layout: Layout) -> list[Run]:
 
 def tangents(layout: Layout) -> list[Run]:
     """Their tangents, added to the fronts."""
+    if layout.unfolds:
+        return unfolded_tangents(layout)
     rows, columns, kept = layout.pattern
     places = np.full(layout.forces.entries, layout.plan.length)
     places[kept] = layout.plan.places(rows, columns)
@@ -81,14 +85,18 @@ def _gust_slopes(layout: Layout, places: np.ndarray) -> Run:
 def turn(layout: Layout, nodes: np.ndarray) -> Run:
     """Rotations of nodes, turned by a step."""
     old = layout.starts["pose"] + 12 * nodes[:, None] + 3 + np.arange(9)
-    theta = layout.starts["step"] + layout.position[layout.motion.place[nodes, 3:]]
+    theta = layout.starts["step"] + layout.position[layout.owned[nodes, 3:]]
     new = NODE_SLOT * nodes[:, None] + 3 + np.arange(9)
     return layout.backend.bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(nodes), 0)), new)
 
 
-def linkage(layout: Layout) -> tuple[Run, ...]:
+def linkage(layout: Layout) -> dict[str, tuple[Run, ...]]:
     """Places, rates and accelerations of nodes that follow, and the forces on them on the degrees of freedom."""
     m, starts = layout.motion, layout.starts
+    if m.plain:
+        return dict.fromkeys(("placing", "rating", "changing", "carrying"), ())
+    if isinstance(m.linkage, Levers):
+        return m.linkage.bound(layout.backend, layout.lever_places)._asdict()
     place, rates, accelerations, collect = m.linkage.kernels[:4]
     rigid = layout.forces.drive_base + DRIVE_SLOT * np.flatnonzero(m.rigid)
     slot = NODE_SLOT * m.nodes[:, None]
@@ -97,12 +105,13 @@ def linkage(layout: Layout) -> tuple[Run, ...]:
     v, a = starts["v"] + own, starts["rate"] + own
     speeds, changes = ((slot + k + np.arange(6)).ravel() for k in (12, 18))
     raw = starts["force"] + layout.padded + np.arange(len(layout.linked))
-    return (
-        _bind(layout, place, np.concatenate([before, starts["step"] + own]), pose),
-        _bind(layout, rates, np.concatenate([pose, v]), np.concatenate([speeds, rigid + 1])),
-        _bind(layout, accelerations, np.concatenate([pose, v, a]), np.concatenate([changes, rigid + 2])),
-        _bind(layout, collect, np.concatenate([pose, raw]), starts["force"] + own),
-    )
+    speed, change = np.concatenate([speeds, rigid + 1]), np.concatenate([changes, rigid + 2])
+    return {
+        "placing": (_bind(layout, place, np.concatenate([before, starts["step"] + own]), pose),),
+        "rating": (_bind(layout, rates, np.concatenate([pose, v]), speed),),
+        "changing": (_bind(layout, accelerations, np.concatenate([pose, v, a]), change),),
+        "carrying": (_bind(layout, collect, np.concatenate([pose, raw]), starts["force"] + own),),
+    }
 
 
 def winding(layout: Layout, levers: str) -> tuple[Run, Run]:

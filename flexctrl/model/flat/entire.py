@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.model.flat.flat import Flat, clear, drive, energy, load, place, pull, push
+from flexctrl.model.flat.flat import HIDDEN, Flat, clear, drive, energy, load, place, pull, push
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 if TYPE_CHECKING:
@@ -83,7 +83,11 @@ def entire_of(layout: Layout) -> Entire:
     modal = bool(motion.inner.size) and all(i.order == 2 for i in motion.effects)
     if not model.large or not 0 < motion.n <= (_BENDING if modal else _FREEDOMS):
         return _NONE
-    apt = not motion.plain and not (motion.linkage.loops if modal else motion.inner.size or motion.flows.size)
+    apt = (
+        not motion.plain
+        and not layout.long
+        and not (motion.linkage.loops if modal else motion.inner.size or motion.flows.size)
+    )
     if not apt:
         return _NONE
     pieces = sum(f.count * f.kernels.force.instructions for f in model.forces.families)
@@ -175,7 +179,7 @@ class _Drawing:
             for k in range(NODE_SLOT * i + 12, NODE_SLOT * (i + 1)):
                 z[k] = z[k] if nodes_placed and k in self.moving else 0.0
         part: dict[str, Any] = {
-            name: z[s : s + layout.sizes[name]] for name, s in layout.starts.items() if name != "slots"
+            name: z[s : s + layout.sizes[name]] for name, s in layout.starts.items() if name not in HIDDEN
         }
         return Flat(z=z, **part, **self.numbers, **self.runs)
 
@@ -226,9 +230,8 @@ class _Drawing:
         """All forces at the end of a step."""
         f = self.workspace(self.fixed, False)
         if f.linking:
-            first: Any = f.linkage[0]
-            loose: Any = replace(first, kernel=self.layout.motion.linkage.freely)
-            f = replace(f, linkage=(loose, *f.linkage[1:]))
+            first: Any = f.placing[0]
+            f = replace(f, placing=(replace(first, kernel=self.layout.motion.linkage.freely),))
         load(f)
         self.placed(f)
         drive(f)

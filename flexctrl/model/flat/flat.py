@@ -20,6 +20,7 @@ __all__ = [
     "Flat",
     "accelerate",
     "arrive",
+    "carry",
     "clear",
     "dissipate",
     "drive",
@@ -32,6 +33,9 @@ __all__ = [
     "push",
     "tangent",
 ]
+
+HIDDEN = frozenset({"slots", "drawn", "back", "units"})
+"""Parts of the workspace that only kernels read."""
 
 _TURN = 2.0 * math.pi
 _POSE = 12
@@ -85,9 +89,12 @@ class Flat:
         Inputs.
     shift : Reals *
         How far all nodes are shifted and turned from the drawn shape, for models in small motion.
-    turn, linkage, winding, forces, tangents, energies, shifts : Runs
-        Kernels; of the linkage: places, rates, accelerations, forces; of its drives: driven coordinates, and what
-        steps add to them.
+    turn, winding, forces, tangents, energies, shifts : Runs
+        Kernels; of the linkage's drives: driven coordinates, and what steps add to them.
+    placing, rating, changing, carrying : Runs
+        What levers do: places, rates, accelerations; forces.
+    placed, levers, slopes : int
+        How many kernels place; how many do each of the others; how many tangents there are.
     gusts : Runs
         Kernels of the forces of gusts.
     books : Reals *
@@ -102,7 +109,7 @@ class Flat:
         Whether the first of them gives forces (`press_entire`) rather than accelerations.
     """
 
-    LASTING = ("linking", "carried", "quick")
+    LASTING = ("linking", "placed", "levers", "carried", "quick")
 
     n: int
     padded: int
@@ -113,6 +120,9 @@ class Flat:
     turning: int
     turns: int
     linking: int
+    placed: int
+    levers: int
+    slopes: int
     rates: int
     drives: int
     spinning: int
@@ -156,7 +166,10 @@ class Flat:
     u: Reals
     shift: Reals
     turn: Runs
-    linkage: Runs
+    placing: Runs
+    rating: Runs
+    changing: Runs
+    carrying: Runs
     winding: Runs
     forces: Runs
     tangents: Runs
@@ -199,7 +212,8 @@ def place(f: Flat) -> None:
     if f.linking > 0:
         for k in range(f.linking):
             clear(_POSE, f.z[NODE_SLOT * f.linked[k] :])
-        f.linkage[0](f.z, f.z)
+    for k in range(f.placed):
+        f.placing[k](f.z, f.z)
     if f.drives > 0:
         wind(f)
     for i in range(f.drives, f.drives + f.inner):
@@ -255,8 +269,10 @@ def drive(f: Flat) -> None:
     if f.linking > 0:
         for k in range(f.linking):
             clear(_POSE, f.z[NODE_SLOT * f.linked[k] + _POSE :])
-        f.linkage[1](f.z, f.z)
-        f.linkage[2](f.z, f.z)
+    for k in range(f.levers):
+        f.rating[k](f.z, f.z)
+    for k in range(f.levers):
+        f.changing[k](f.z, f.z)
 
 
 def six(x: Reals, y: Reals) -> None:
@@ -274,8 +290,14 @@ def push(f: Flat) -> None:
     press(f)
     for k in range(f.pieces):
         f.forces[k](f.z, f.z)
+    carry(f)
+
+
+def carry(f: Flat) -> None:
+    """Hand forces on, from followers to their masters."""
     if f.carried > 0:
-        f.linkage[3](f.z, f.z)
+        for k in range(f.levers):
+            f.carrying[k](f.z, f.z)
 
 
 def accelerate(f: Flat) -> None:
@@ -307,8 +329,7 @@ def pull(f: Flat) -> None:
         f.entire[2](f.z, f.z)
         return
     press(f)
-    if f.carried > 0:
-        f.linkage[3](f.z, f.z)
+    carry(f)
 
 
 def press(f: Flat) -> None:
@@ -335,7 +356,7 @@ def tangent(f: Flat, on_place: float, on_rate: float, on_acceleration: float, en
     f.seeds[1] = on_rate
     f.seeds[2] = on_acceleration
     clear(f.entries, entries)
-    for k in range(f.pieces + f.gusting):
+    for k in range(f.slopes):
         f.tangents[k](f.z, entries)
 
 

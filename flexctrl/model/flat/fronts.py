@@ -21,7 +21,7 @@ from flexctrl.errors import KernelError
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 
-__all__ = ["Fronts", "Plan", "factor", "plan_of", "solve"]
+__all__ = ["Fronts", "Plan", "factor", "plan_of", "seat", "solve", "solve_own", "whose"]
 
 _VANISHING = 1e-13
 _MERGED = 12
@@ -35,7 +35,9 @@ class Plan:
     ----------
     fronts : Fronts
     order : numpy.ndarray of int, shape (n,)
-        The matrix' own number of each unknown, in the order of elimination.
+        The number of each degree of freedom, in the order of elimination. They are the first of the matrix' unknowns.
+    seats : numpy.ndarray of int, shape (unknowns,)
+        When each unknown is eliminated.
     length : int
         Number of entries of all fronts.
     widest : int
@@ -44,12 +46,13 @@ class Plan:
 
     fronts: Fronts
     order: np.ndarray
+    seats: np.ndarray
     length: int
     widest: int
 
     @cached_property
     def position(self) -> np.ndarray:
-        """When each of the matrix' unknowns is eliminated."""
+        """Place of each degree of freedom in their order of elimination."""
         place = np.empty_like(self.order)
         place[self.order] = np.arange(len(self.order))
         return place
@@ -63,7 +66,7 @@ class Plan:
             For an entry that the pattern does not have.
         """
         f = self.fronts
-        r, c = self.position[rows], self.position[columns]
+        r, c = self.seats[rows], self.seats[columns]
         front = np.repeat(np.arange(f.count), f.pivots)[np.minimum(r, c)]
         return f.base[front] + self.rows(front, c) * f.lead[front] + self.rows(front, r)
 
@@ -85,8 +88,10 @@ class Fronts:
 
     Attributes
     ----------
-    n : int
-        Unknowns; they are numbered in the order in which they are eliminated.
+    n, beyond : int
+        Unknowns; they are numbered in the order in which they are eliminated. How many are no degrees of freedom.
+    seats : Wholes, (n − beyond,)
+        The unknown that each degree of freedom is, in their order.
     count : int
         Fronts.
     first, pivots, size, lead, base, rest, parent : Wholes, (count,)
@@ -101,8 +106,12 @@ class Fronts:
         How many numbers the columns of all pivots have, and the rows right of their blocks.
     """
 
+    LASTING = ("beyond",)
+
     n: int
+    beyond: int
     count: int
+    seats: Wholes
     first: Wholes
     pivots: Wholes
     size: Wholes
@@ -117,36 +126,77 @@ class Fronts:
     right: int
 
 
-def plan_of(rows: np.ndarray, columns: np.ndarray, n: int) -> Plan:
-    """Return the plan for matrices with entries at some rows and columns (repeats allowed)."""
+_NONE = (np.zeros(0, dtype=int), np.zeros(0, dtype=int))
+
+
+def plan_of(
+    rows: np.ndarray,
+    columns: np.ndarray,
+    n: int,
+    own: int | None = None,
+    after: tuple[np.ndarray, np.ndarray] = _NONE,
+) -> Plan:
+    """Return the plan for matrices with entries at some rows and columns (repeats allowed).
+
+    Parameters
+    ----------
+    rows, columns : numpy.ndarray of int
+    n : int
+        Unknowns.
+    own : int, optional
+        How many of them are degrees of freedom; default: all.
+    after : tuple of numpy.ndarray
+        Pairs of unknowns of which the first is to be eliminated after the second.
+
+    Returns
+    -------
+    Plan
+    """
     pattern = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n))
     pattern = (pattern + pattern.T + sp.identity(n)).tocsr()
-    groups, touching = _grouped(pattern)
-    return _laid_out(n, _merged(*_eliminated(groups, touching)))
+    order = sp.csr_matrix((np.ones(len(after[0])), after), shape=(n, n))
+    members, touching, group = _grouped(pattern, order)
+    before = [set(found) - {i} for i, found in enumerate(_gathered(order, members, group))]
+    return _laid_out(n, n if own is None else own, _merged(*_eliminated(members, touching, before)))
 
 
-def _grouped(pattern: sp.csr_matrix) -> tuple[list[np.ndarray], list[set[int]]]:
-    """Return groups of unknowns with the same neighbours, and the groups that each touches."""
+def _grouped(pattern: sp.csr_matrix, order: sp.csr_matrix) -> tuple[list[np.ndarray], list[set[int]], np.ndarray]:
+    """Return groups of unknowns with the same neighbours, the groups that each touches, and the group of each unknown.
+
+    Unknowns of which one waits for another are in groups of their own.
+    """
     n = pattern.shape[0]
     pattern.data[:] = 1.0
     marks = pattern @ np.random.default_rng(0).random((n, 2))
+    marks += 1e3 * (order @ np.random.default_rng(1).random((n, 2)))
+    marks += 1e6 * (order.T @ np.random.default_rng(2).random((n, 2)))
     _, lead, group = np.unique(marks.round(9), axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
     members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]) if n else []
     touching = [set(group[pattern.indices[pattern.indptr[i] : pattern.indptr[i + 1]]].tolist()) for i in lead]
-    return members, [found - {i} for i, found in enumerate(touching)]
+    return members, [found - {i} for i, found in enumerate(touching)], group
 
 
-def _eliminated(groups: list[np.ndarray], touching: list[set[int]]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _gathered(pattern: sp.csr_matrix, members: list[np.ndarray], group: np.ndarray) -> list[set[int]]:
+    """Return the groups that the rows of each group's members have entries of."""
+    rows = ([pattern.indices[pattern.indptr[i] : pattern.indptr[i + 1]] for i in some] for some in members)
+    return [set(group[np.concatenate(some)].tolist()) if some else set() for some in rows]
+
+
+def _eliminated(
+    groups: list[np.ndarray], touching: list[set[int]], before: list[set[int]]
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Return the groups in the order of elimination, and the unknowns each touches then: fewest first.
 
+    None comes before those that it waits for.
     Among equals the one known longest comes first: branches are taken in turns, and the processor has
     independent work side by side.
     """
     weight = [len(g) for g in groups]
     costs = [sum(weight[k] for k in near) for near in touching]
-    waiting = [(cost, i, i) for i, cost in enumerate(costs)]
+    waiting = [(cost, i, i) for i, cost in enumerate(costs) if not before[i]]
     heapq.heapify(waiting)
+    left, behind = [len(some) for some in before], _reversed(before)
     age, order, fronts = len(groups), [], []
     while waiting:
         cost, _, one = heapq.heappop(waiting)
@@ -159,8 +209,23 @@ def _eliminated(groups: list[np.ndarray], touching: list[set[int]]) -> tuple[lis
             touching[k] |= near
             touching[k] -= {one, k}
             costs[k], age = sum(weight[j] for j in touching[k]), age + 1
-            heapq.heappush(waiting, (costs[k], age, k))
+            if not left[k]:
+                heapq.heappush(waiting, (costs[k], age, k))
+        for k in behind.get(one, ()):
+            left[k] -= 1
+            if not left[k]:
+                age += 1
+                heapq.heappush(waiting, (costs[k], age, k))
     return order, [np.concatenate([groups[k] for k in sorted(near)]) if near else np.zeros(0, int) for near in fronts]
+
+
+def _reversed(before: list[set[int]]) -> dict[int, list[int]]:
+    """Which groups wait for each."""
+    behind: dict[int, list[int]] = {}
+    for k, some in enumerate(before):
+        for i in some:
+            behind.setdefault(i, []).append(k)
+    return behind
 
 
 def _merged(order: list[np.ndarray], touched: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -180,13 +245,13 @@ def _merged(order: list[np.ndarray], touched: list[np.ndarray]) -> list[tuple[np
     return [(np.array(own[k]), touched[k]) for k in range(len(order)) if not gone[k]]
 
 
-def _laid_out(n: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
-    """Return the tables of fronts."""
-    order = np.concatenate([np.zeros(0, dtype=int), *(own for own, _ in fronts)])
+def _laid_out(n: int, own: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
+    """Return the tables of fronts; the first of the unknowns are degrees of freedom."""
+    order = np.concatenate([np.zeros(0, dtype=int), *(some for some, _ in fronts)])
     position = np.empty(n, dtype=int)
     position[order] = np.arange(n)
     others = [np.sort(position[rest]) for _, rest in fronts]
-    pivots = np.array([len(own) for own, _ in fronts], dtype=int)
+    pivots = np.array([len(some) for some, _ in fronts], dtype=int)
     rests = np.array([len(rest) for rest in others], dtype=int)
     front = np.repeat(np.arange(len(fronts)), pivots)
     size = pivots + rests
@@ -195,7 +260,9 @@ def _laid_out(n: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
     parent = np.array([front[rest[0]] if len(rest) else -1 for rest in others], dtype=int)
     tables = Fronts(
         n=n,
+        beyond=n - own,
         count=len(fronts),
+        seats=np.flatnonzero(order < own),
         first=starts[0],
         pivots=pivots,
         size=size,
@@ -209,10 +276,10 @@ def _laid_out(n: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> Plan:
         below=int((pivots * size).sum()),
         right=int((pivots * rests).sum()),
     )
-    found = Plan(tables, order, int((lead * size).sum()), int(lead.max(initial=8)))
+    found = Plan(tables, order[order < own], position, int((lead * size).sum()), int(lead.max(initial=8)))
     up = np.repeat(parent, rests)
     tables.into[:] = found.rows(up, tables.others)
-    tables.diagonal[:] = found.places(order, order)
+    tables.diagonal[:] = found.places(order, order)  # of all unknowns
     return found
 
 
@@ -221,7 +288,8 @@ def factor(f: Fronts, entries: Reals, diagonal: Reals, down: Reals, up: Reals) -
     """Factorise the matrix in ``entries``, which are used up; return the unknown whose pivot vanishes, or −1.
 
     The columns of pivots go to ``down``, front by front, and the rows right of them, by columns, to ``up``; each
-    has eight places more than numbers.
+    has eight places more than numbers. With unknowns beyond the degrees of freedom, ``diagonal`` is left with the
+    pivots: what such a degree of freedom carries stands in the rows of others.
     """
     for i in range(f.n):
         diagonal[i] = abs(entries[f.diagonal[i]])
@@ -236,6 +304,8 @@ def factor(f: Fronts, entries: Reals, diagonal: Reals, down: Reals, up: Reals) -
             pivot = a[k * lead + k]
             if not abs(pivot) > _VANISHING * diagonal[f.first[s] + k]:
                 return f.first[s] + k
+            if f.beyond > 0:
+                diagonal[f.first[s] + k] = abs(pivot)
             sweep(size, lead, k, 1.0 / pivot, a, a[k * lead :])
         below = put_down(size, 0, pivots, lead, a, below, down)
         right = put_down(pivots, pivots, size, lead, a, right, up)
@@ -279,6 +349,36 @@ def extend(rest: int, lead: int, a: Reals, wide: int, into: Wholes, parent: Real
         column = parent[into[j] * wide :]
         for i in range(rest):
             column[into[i]] += a[j * lead + i]
+
+
+def seat(f: Fronts, i: int) -> int:
+    """Return which unknown a degree of freedom is."""
+    if f.beyond > 0:
+        return f.seats[i]
+    return i
+
+
+def whose(f: Fronts, where: int) -> int:
+    """Return the degree of freedom that an unknown is, or the next that is eliminated."""
+    if f.beyond > 0:
+        for i in range(f.n - f.beyond):
+            if f.seats[i] >= where:
+                return i
+    return where
+
+
+def solve_own(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals, wide: Reals) -> None:
+    """Solve in place for the degrees of freedom, nothing being on the other unknowns; these need ``wide``."""
+    if f.beyond > 0:
+        for i in range(f.n):
+            wide[i] = 0.0
+        for i in range(f.n - f.beyond):
+            wide[f.seats[i]] = b[i]
+        solve(f, down, up, wide, work)
+        for i in range(f.n - f.beyond):
+            b[i] = wide[f.seats[i]]
+    else:
+        solve(f, down, up, b, work)
 
 
 def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:

@@ -13,11 +13,13 @@ from flexctrl.kernels.kernel import Backend
 from flexctrl.model.flat import binding
 from flexctrl.model.flat.axes import Axes, axes_of
 from flexctrl.model.flat.entire import Entire, entire_of
-from flexctrl.model.flat.flat import Flat
+from flexctrl.model.flat.flat import HIDDEN, Flat
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.fronts import Plan, plan_of
+from flexctrl.model.flat.unfolding import lever_places, together, unfolded_plan
 from flexctrl.model.gauges import Gauges, gauges_of
 from flexctrl.model.laws.kinds import NODE_SLOT
+from flexctrl.model.linkages.levers import Levers, Places
 from flexctrl.model.model import Model
 
 __all__ = ["Layout"]
@@ -33,7 +35,7 @@ class Layout:
         self.backend: Backend = model.backend
         m = self.motion
         self.padded = (m.n // 8 + 1) * 8
-        self.linked = np.zeros(0, dtype=int) if m.plain else m.linked_cells
+        self.linked = m.said
         self.carried = -(-len(self.linked) // 8) * 8
         self.sizes = self._sizes()
         ends = np.cumsum([0, *(-(-size // 8) * 8 for size in self.sizes.values())])
@@ -53,13 +55,26 @@ class Layout:
             "books": 3,
             "u": len(self.model.inputs),
             "shift": 0,
+            "units": 9 if self.unfolds else 0,
         }
+
+    @property
+    def long(self) -> bool:
+        """Whether levers are worked off in loops."""
+        return isinstance(self.motion.linkage, Levers)
+
+    @property
+    def unfolds(self) -> bool:
+        """Whether tangents are unfolded, what levers say being unknowns of their own."""
+        return self.long and not self.model.signals.follows and not self.model.gusts
 
     @cached_property
     def pattern(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows and columns of the tangent in degrees of freedom; which entries of the blocks they are, if plain."""
         m = self.motion
         raw = self.forces.pattern
+        if self.unfolds:
+            return (*together(self.plan), np.zeros(0, dtype=int))
         if m.plain:
             rows, columns = (m.cells[cells] for cells in raw)
             kept = np.flatnonzero((rows < m.n) & (columns < m.n))
@@ -95,6 +110,8 @@ class Layout:
 
     @cached_property
     def plan(self) -> Plan:
+        if self.unfolds:
+            return unfolded_plan(self)
         rows, columns = (np.concatenate([a, b]) for a, b in zip(self.pattern[:2], self.entries[:2], strict=True))
         return plan_of(rows, columns, self.motion.n)
 
@@ -106,7 +123,7 @@ class Layout:
     @cached_property
     def targets(self) -> np.ndarray:
         """Where each raw force is added, from the start of ``force``."""
-        found = self.position[self.motion.cells]
+        found = self.position[self.motion.owned]
         found[self.linked] = self.padded + np.arange(len(self.linked))
         return found
 
@@ -114,7 +131,7 @@ class Layout:
         """Return the model on a workspace of its own, with so many entries more behind it."""
         z = _aligned(self.length + spare)
         part = {name: z[start : start + self.sizes[name]] for name, start in self.starts.items()}
-        for hidden in {"slots", "drawn", "back"} & set(part):
+        for hidden in HIDDEN & set(part):
             del part[hidden]
         vectors: dict[str, Any] = {"z": z, **part}
         flat = Flat(
@@ -133,7 +150,7 @@ class Layout:
     @property
     def constants(self) -> tuple[int, np.ndarray]:
         """What the workspace holds from some place on that never changes."""
-        return 0, np.zeros(0)
+        return self.starts["units"], np.eye(3).ravel()[: self.sizes["units"]]
 
     @cached_property
     def entire(self) -> Entire:
@@ -150,31 +167,51 @@ class Layout:
 
     @cached_property
     def own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nodes that are not placed by the linkage; those that move, and those that turn."""
+        """Nodes with freedoms of their own alone, or beside what levers say; those that move, and those that turn."""
         m = self.motion
-        own = np.setdiff1d(np.arange(len(m.place)), [] if m.plain else m.nodes)
-        moved, turned = (own[(m.place[own, cells] < m.n).any(axis=1)] for cells in (slice(3), slice(3, 6)))
+        own = np.setdiff1d(np.arange(len(m.place)), [] if m.plain or self.long else m.nodes)
+        moved, turned = (own[(self.owned[own, cells] < m.n).any(axis=1)] for cells in (slice(3), slice(3, 6)))
         return own, moved, turned
+
+    @cached_property
+    def owned(self) -> np.ndarray:
+        """Degree of freedom of each node's six, shape (nodes, 6)."""
+        return self.motion.owned[: self.motion.source_base].reshape(-1, 6)
+
+    @cached_property
+    def _kept(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes that move and nodes that turn by freedoms of their own or by levers."""
+        said = np.zeros(self.motion.raw, dtype=bool)
+        said[self.linked if self.long else []] = True
+        nodes = said[: self.motion.source_base].reshape(-1, 2, 3)
+        moves, turns = (np.flatnonzero(nodes[:, k].any(axis=1)) for k in (0, 1))
+        return np.union1d(self.own[1], moves), np.union1d(self.own[2], turns)
+
+    @cached_property
+    def lever_places(self) -> Places:
+        """Where the workspace holds what levers read and write."""
+        return lever_places(self)
 
     @cached_property
     def _whole(self) -> np.ndarray:
         """Nodes whose six degrees of freedom are their own and follow each other."""
         own = self.own[0]
-        cells = self.position[self.motion.place[own]]
+        cells = self.position[self.owned[own]]
         return own[(np.diff(cells, axis=1) == 1).all(axis=1) & (cells[:, -1] < self.motion.n)]
 
     @cached_property
     def tables(self) -> dict[str, Any]:
-        m, (own, moved, turned) = self.motion, (np.setdiff1d(nodes, self._whole) for nodes in self.own)
-        cells = self.position[m.place[own]]
+        m, owned = self.motion, self.owned
+        own, moved, turned = (np.setdiff1d(nodes, self._whole) for nodes in (self.own[0], *self._kept))
+        cells = self.position[owned[own]]
         nodes, freedoms = np.nonzero(cells < m.n)
         loads = self.model.signals.loads.tocoo()
         return {
-            "whole": np.column_stack([self._whole, self.position[m.place[self._whole, 0]]]).ravel(),
+            "whole": np.column_stack([self._whole, self.position[owned[self._whole, 0]]]).ravel(),
             "moved": moved,
             "turned": turned,
-            "linked": np.zeros(0, dtype=int) if m.plain else m.nodes,
-            "cells": self.position[m.place].ravel(),
+            "linked": np.zeros(0, dtype=int) if m.plain or self.long else m.nodes,
+            "cells": self.position[owned].ravel(),
             "slots": NODE_SLOT * own[nodes] + 12 + freedoms,
             "sources": cells[nodes, freedoms],
             "shafts": self.position[np.concatenate([m.sources, m.inner])],
@@ -201,6 +238,9 @@ class Layout:
             "turning": len(tables["turned"]),
             "turns": len(self.runs["turn"]),
             "linking": len(tables["linked"]),
+            "placed": len(self.runs["placing"]),
+            "levers": len(self.runs["rating"]),
+            "slopes": len(self.runs["tangents"]),
             "rates": len(tables["slots"]),
             "drives": len(m.drives),
             "spinning": len(self._spun),
@@ -218,11 +258,11 @@ class Layout:
     @cached_property
     def runs(self) -> dict[str, Any]:
         m, turned = self.motion, self.own[2]
-        own_tangents = m.plain and not self.model.signals.follows
+        own_tangents = (m.plain and not self.model.signals.follows) or self.unfolds
         damped = bool(self.model.viscous.nnz)
         return {
             "turn": (binding.turn(self, turned),) if len(turned) else (),
-            "linkage": () if m.plain else binding.linkage(self),
+            **binding.linkage(self),
             "winding": binding.winding(self, "pose") if m.drives else (),
             "forces": (*binding.forces(self), *([binding.entry_forces(self)] if damped else [])),
             "tangents": (*([binding.entry_slopes(self)] if damped else []), *binding.tangents(self))

@@ -35,6 +35,11 @@ class SmallLayout(Layout):
             "back": self.padded if self.model.about else 0,
         }
 
+    @property
+    def long(self) -> bool:
+        """Levers are constant numbers."""
+        return False
+
     @cached_property
     def constants(self) -> tuple[int, np.ndarray]:
         rest, first, last = self.model.rest, self.starts["drawn"], self.starts["back"]
@@ -106,7 +111,7 @@ class SmallLayout(Layout):
         cells = np.arange(6 * len(self.motion.place))
         return {
             "turn": (),
-            "linkage": self._linkage(),
+            **self._linkage(),
             "winding": binding.winding(self, "drawn") if self.motion.drives else (),
             "forces": (binding.entry_forces(self),),
             "tangents": (binding.entry_slopes(self),),
@@ -115,7 +120,7 @@ class SmallLayout(Layout):
             "gusts": (),
         }
 
-    def _linkage(self) -> tuple[Run, ...]:
+    def _linkage(self) -> dict[str, tuple[Run, ...]]:
         """Poses from how far nodes are shifted, their rates and their accelerations."""
         nodes = np.arange(len(self.motion.place))
         drawn = self.starts["drawn"] + 12 * nodes[:, None] + np.arange(12)
@@ -124,7 +129,7 @@ class SmallLayout(Layout):
         none = np.zeros((len(nodes), 0))
         place = self.backend.bind(_shifted(), np.hstack([drawn, shift]), none, pose)
         rates, changes = (self._along((of,), cells, 0) for of, cells in self._rate_cells)
-        return place, rates, changes
+        return {"placing": (place,), "rating": (rates,), "changing": (changes,), "carrying": ()}
 
     @property
     def _rate_cells(self) -> tuple[tuple[str, np.ndarray], ...]:

@@ -15,6 +15,7 @@ from flexctrl.model.flat.flattening import layout_of
 from flexctrl.model.flat.layout import Layout
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.linkages.chart import Chart
+from flexctrl.model.linkages.levers import Levers
 from flexctrl.model.model import Model
 
 __all__ = ["widened"]
@@ -43,8 +44,8 @@ def widened(model: Model, chart: Chart | None) -> tuple[Flattened, np.ndarray, n
     found = layout.made(beyond)
     places = np.append(layout.position[: model.n], layout.padded + np.arange(beyond))
     if chart is not None and beyond:
-        turn, linkage = _runs(layout, chart, found.flat)
-        found = replace(found, flat=replace(found.flat, turn=turn, linkage=linkage))
+        turn, placing = _runs(layout, chart, found.flat)
+        found = replace(found, flat=replace(found.flat, turn=turn, placing=placing))
     return found, found.flat.z[layout.length :], places
 
 
@@ -54,15 +55,19 @@ def _runs(layout: Layout, chart: Chart, flat: Flat) -> tuple[Sequence[Run], Sequ
     bind, none = layout.model.backend.bind, starts["step"] + own.n
     beyond = layout.length + np.arange(wide.n - own.n)
     steps = np.concatenate([starts["step"] + layout.position[: own.n], beyond, [none]])
-    turn, linkage = flat.turn, flat.linkage
+    turn, placing = flat.turn, flat.placing
     if (turned := layout.own[2]).size:
         old, new = (start[:, None] + 3 + np.arange(9) for start in (starts["pose"] + 12 * turned, NODE_SLOT * turned))
-        theta = steps[wide.place[turned, 3:]]
+        theta = steps[wide.owned[: wide.source_base].reshape(-1, 6)[turned, 3:]]
         turn = (bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(turned), 0)), new),)
-    if not own.plain:
+    if isinstance(wide.linkage, Levers):
+        at = replace(layout.lever_places, step=np.append(steps[wide.linked], none))
+        beside = np.full(len(at.step) - len(at.v), at.v[-1])  # only places are asked for
+        at = replace(at, v=np.append(at.v, beside), a=np.append(at.a, beside), goal=np.append(at.goal, beside))
+        placing = wide.linkage.bound(layout.model.backend, at).placing
+    elif not own.plain:
         poses = starts["pose"] + 12 * own.nodes, NODE_SLOT * own.nodes
         old, new = ((start[:, None] + np.arange(12)).ravel() for start in poses)
         gather = np.concatenate([old, steps[wide.linked]])
-        place = bind(wide.linkage.kernels[0], gather[None], np.zeros((1, 0)), new[None])
-        linkage = (place, *linkage[1:])
-    return turn, linkage
+        placing = (bind(wide.linkage.kernels[0], gather[None], np.zeros((1, 0)), new[None]),)
+    return turn, placing

@@ -11,6 +11,7 @@ from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
 from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import cross
+from flexctrl.model.linkages.levers import long_or_short
 from flexctrl.model.linkages.linkage import Linkage
 from flexctrl.model.linkages.open_linkage import Link, Loop, renumbered, span_of
 from flexctrl.model.linkages.twists import Twists
@@ -151,10 +152,11 @@ def _linkage(
     independent = sorted(every - set(loops.dependent))
     order = {number: i for i, number in enumerate([*independent, *loops.dependent])}
     cells = [[order.get(k, len(order)) for k in row] for row in place[nodes].tolist()]
+    own = {k + 1: i + 1 for k, i in order.items()}
     linkage = Linkage(
         cells=np.array(cells, dtype=int).reshape(-1, 6),
         rest=x[nodes],
-        follows=tuple(renumbered(f, local, {k + 1: i + 1 for k, i in order.items()}) for f in ties.follows),
+        follows=tuple(renumbered(f, local, own) for f in ties.follows),
         lines=tuple((local[n], _line_axes(along)) for n, along in ties.lines),
         links=tuple(
             Link(d, local[a], local[b], tuple((x[a] - x[b]).tolist()), d.name not in elastic)
@@ -164,7 +166,7 @@ def _linkage(
         free=len(independent),
         spare=tuple(_local(c, local) for c in loops.spare),
     )
-    return linkage, np.array(nodes, dtype=int), np.array(independent, dtype=int)
+    return long_or_short(linkage), np.array(nodes, dtype=int), np.array(independent, dtype=int)
 
 
 def _involved(follow: Follow) -> tuple[int, ...]:

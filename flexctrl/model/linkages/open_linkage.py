@@ -231,7 +231,7 @@ class OpenLinkage:
             if isinstance(f, Turn):
                 axis = ca.DM(f.axis)
                 turned = ca.dot(old_R[m] @ axis, rotation_vector(R[m] @ old_R[m].T))
-                phi = _twist(old_R[m].T @ old_R[n], axis) + _own(f.own, step) - turned
+                phi = twist(old_R[m].T @ old_R[n], axis) + _own(f.own, step) - turned
                 K = ca.skew(axis)
                 R[n] = R[m] @ (ca.DM.eye(3) + ca.sin(phi) * K + (1.0 - ca.cos(phi)) * (K @ K))
             elif isinstance(f, Ride):
@@ -269,10 +269,16 @@ class OpenLinkage:
 
         d = link.drive
         p = ca.SX([d.stiffness, d.damping, d.inertia, d.effective_ratio, *d.direction, *link.rest])
-        if isinstance(d, RotaryDrive):
-            return rotary_motion(node(link.node), node(link.base), ca.SX.zeros(3), ca.SX(0), p)
-        motion_of = hoist_motion if isinstance(d, Winch) else linear_motion
-        return motion_of(node(link.node), node(link.base), ca.SX.zeros(3), p)
+        return drive_motion(type(d), node(link.node), node(link.base), p)
+
+
+def drive_motion(kind: type[Drive], node: NodeMotion, base: NodeMotion, p: ca.SX) -> DriveMotion:
+    """Return how a drive of some kind moves between its node and its base."""
+    import casadi as ca
+
+    if issubclass(kind, RotaryDrive):
+        return rotary_motion(node, base, ca.SX.zeros(3), ca.SX(0), p)
+    return (hoist_motion if issubclass(kind, Winch) else linear_motion)(node, base, ca.SX.zeros(3), p)
 
 
 def _opening(loop: Loop | Fit, pose: ca.SX, motion: Sequence[tuple[ca.SX, ca.SX]]) -> ca.SX:
@@ -304,7 +310,7 @@ def attitude(pose: ca.SX) -> ca.SX:
     return ca.reshape(pose[3:12], 3, 3).T
 
 
-def _twist(Q: ca.SX, axis: ca.DM) -> ca.SX:
+def twist(Q: ca.SX, axis: ca.DM | ca.SX) -> ca.SX:
     """The angle of a rotation about an axis, between −π and π."""
     import casadi as ca
 
