@@ -178,6 +178,12 @@ def resident() -> float:
     return pages * resource.getpagesize() / 1e6
 
 
+def most_resident() -> float:
+    """Most resident memory that there was [MB]; getrusage would tell that of the process which started this one."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return 1024e-6 * next(float(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
+
+
 def closed_loop(folder: str, kind: str, until: str) -> None:
     """A closed loop at 1 kHz; prints times and resident memory [MB] on the way, and the most there was."""
     kept = fc.CsvStream(Path(folder) / "rows.csv") if kind == "streamed" else fc.InMemory(states=1e6)
@@ -188,8 +194,7 @@ def closed_loop(folder: str, kind: str, until: str) -> None:
         progress=lambda share: marks.append((share * end, resident())),
     )  # fmt: skip
     half = next(m for m in marks if m[0] > 0.4 * end)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
-    print(run.status.name, *half, *marks[-1], peak)
+    print(run.status.name, *half, *marks[-1], most_resident())
 
 
 def chain(folder: str, elements: str) -> None:
@@ -199,7 +204,7 @@ def chain(folder: str, elements: str) -> None:
     machine = fc.Structure([beam], [fc.Support(beam.start, "u v w")], outputs=[fc.Position("tip", beam.end, "z")])
     model = fc.assemble(machine, [fc.LargeRotation(), fc.Gravity(), fc.Flexible()])
     run = fc.simulate(model, until=20e-4, method=fc.GeneralizedAlpha(1e-4))
-    print(run.status.name, run.report.steps, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6)
+    print(run.status.name, run.report.steps, most_resident())
 
 
 def as_child(parent: int) -> None:
