@@ -91,8 +91,8 @@ class AdaptiveAlpha(_Damped):
     ----------
     rho : float
         Spectral radius at infinite frequency, 0 … 1.
-    first_step : float
-        [s]
+    first_step : float, optional
+        [s]; left out: told by how the machine sets out.
     largest_step : float
         [s]
     most_steps : float
@@ -105,13 +105,14 @@ class AdaptiveAlpha(_Damped):
     """
 
     rho: float = 0.8
-    first_step: float = 1e-4
+    first_step: float | None = None
     largest_step: float = np.inf
     most_steps: float = field(default=MOST_STEPS, repr=False)
 
     def __post_init__(self) -> None:
         _check_rho(self.rho)
-        check_seconds(self.first_step, "first_step", "AdaptiveAlpha")
+        if self.first_step is not None:
+            check_seconds(self.first_step, "first_step", "AdaptiveAlpha")
         check_seconds(self.largest_step, "largest_step", "AdaptiveAlpha", endless=True)
         check_number(self.most_steps, "most_steps", "AdaptiveAlpha", above=0.0)
 

@@ -41,8 +41,8 @@ class ExplicitRungeKutta:
     ----------
     step : float, optional
         Length of the steps [s]; left out: chosen to meet the tolerance.
-    first_step : float
-        Where steps are chosen [s].
+    first_step : float, optional
+        Where steps are chosen [s]; left out: told by how the machine sets out.
     largest_step : float
         Where steps are chosen [s].
     most_steps : float
@@ -55,14 +55,15 @@ class ExplicitRungeKutta:
     """
 
     step: float | None = None
-    first_step: float = 1e-3
+    first_step: float | None = None
     largest_step: float = np.inf
     most_steps: float = field(default=MOST_STEPS, repr=False)
 
     def __post_init__(self) -> None:
         if self.step is not None:
             check_step(self.step, "ExplicitRungeKutta")
-        check_seconds(self.first_step, "first_step", "ExplicitRungeKutta")
+        if self.first_step is not None:
+            check_seconds(self.first_step, "first_step", "ExplicitRungeKutta")
         check_seconds(self.largest_step, "largest_step", "ExplicitRungeKutta", endless=True)
         check_number(self.most_steps, "most_steps", "ExplicitRungeKutta", above=0.0)
 

@@ -213,7 +213,7 @@ class Feed:
 
     def _short_of_break(self, t: float) -> float:
         """Return t, or just before where the command jumps there: a step that ends at a jump does not feel it."""
-        near = _NEAR * (1.0 + abs(t))
+        near = _NEAR * abs(t)
         return t - near if any(abs(t - b) < near for b in self.breaks) else t
 
     def _answer(self, t: float, y: np.ndarray, before: Supply, h: float) -> Supply:

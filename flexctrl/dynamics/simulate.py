@@ -15,14 +15,15 @@ from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track, curves_of
 from flexctrl.dynamics.events import Event
-from flexctrl.dynamics.feed import feed_of
+from flexctrl.dynamics.feed import Supply, feed_of
+from flexctrl.dynamics.first_step import first_step
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.record import InMemory, Record, Unwritten
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
 from flexctrl.dynamics.settling import quasistatic
-from flexctrl.dynamics.steps import Fixed, Integrator, Mark, Reusable, Stepper
+from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.watch import Watch
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
@@ -186,10 +187,12 @@ def _begun(
     """A run from a state."""
     model, pace = plan.model, plan.method.pace
     state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
-    size = pace.step if isinstance(pace, Fixed) else min(pace.first, pace.largest)
     state = model.motion.counted(state) if isinstance(model, Model) else state
     supply = plan.feed.first(state)
     state = model.switches.begin(state, supply.u)
+    stops = Stops(plan.feed.sample_time, plan.feed.breaks)
+    stops.skip(0.0)
+    size = pace.step if isinstance(pace, Fixed) else _first(plan, pace, state, supply, min(stops.next, plan.until))
     try:
         point = stepper.start(state, supply, size)
     except SingularMatrixError as error:
@@ -198,8 +201,7 @@ def _begun(
             f"simulate: {name} has neither mass nor stiffness; hold it with a Support, or give the part "
             "rotary inertia (rhoJ, rhoI) or mass"
         ) from None
-    stops, watch = Stops(plan.feed.sample_time, plan.feed.breaks), _watch(plan, events)
-    stops.skip(0.0)
+    watch = _watch(plan, events)
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method.order, plan.tolerance)
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
@@ -207,6 +209,13 @@ def _begun(
         journey.notes = (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
     rows.here(point, 0.0)
     return journey
+
+
+def _first(plan: Plan, pace: Controlled, state: State, supply: Supply, span: float) -> float:
+    """The first step, as asked for or from how the machine sets out."""
+    if pace.first is None:
+        return first_step(plan.feed, state, supply, pace, plan.tolerance, span)
+    return min(pace.first, pace.largest)
 
 
 def _resumed(

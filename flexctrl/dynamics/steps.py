@@ -109,15 +109,17 @@ class Controlled:
 
     Attributes
     ----------
-    first, largest : float
-        Length of the first and of the largest step [s].
+    first : float or None
+        Length of the first step [s]; None: told by how the machine sets out.
+    largest : float
+        Length of the largest step [s].
     steepness : int
         Power of the step with which the estimated error grows.
     most : float
         Steps that a run may take; one that is seen to need more ends.
     """
 
-    first: float
+    first: float | None
     largest: float
     steepness: int
     most: float = math.inf

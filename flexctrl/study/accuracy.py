@@ -140,5 +140,4 @@ def _with_steps(method: Any, longest: float) -> Any:
         return replace(method, step=min(0.5 * method.step, longest)) if hasattr(method, "step") else method
     if not hasattr(method, "largest_step"):
         return method
-    largest = min(method.largest_step, longest)
-    return replace(method, largest_step=largest, first_step=min(method.first_step, largest))
+    return replace(method, largest_step=min(method.largest_step, longest))

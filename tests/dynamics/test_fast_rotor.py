@@ -55,10 +55,10 @@ def error(name: str, neighbour: str, speed: float) -> float:
 @pytest.mark.parametrize("neighbour", ["rotor", "cart", "driven"])
 @pytest.mark.parametrize("name", METHODS)
 def test_the_pendulum_is_as_right_as_without_the_neighbour(name, neighbour):
-    """What moves at a constant rate is made exactly by every method, and asks for no steps of its own."""
+    """What moves at a constant rate is made exactly by every method; its rounding may ask for shorter steps."""
     alone = error(name, neighbour, 0.0)
     assert alone < 0.02
-    assert error(name, neighbour, 1000.0) == pytest.approx(alone, rel=0.01)
+    assert error(name, neighbour, 1000.0) <= 1.01 * alone
 
 
 def test_parts_are_what_is_coupled():

@@ -119,8 +119,7 @@ def found(machine: Callable[[Units], Machine], u: Units) -> dict[str, np.ndarray
     model, hold, inputs = machine(u)
     rest = fc.equilibrium(model, hold=hold)
     linear = fc.linearize(model, at=rest)
-    method = fc.AdaptiveAlpha(first_step=1e-4 * u.time)
-    run = fc.simulate(model, until=0.1 * u.time, inputs=inputs, start=rest, method=method)
+    run = fc.simulate(model, until=0.1 * u.time, inputs=inputs, start=rest)
     poles = linear.damped_poles() * u.time
     return {
         "equilibrium": np.array([rest.outputs[axis] for axis in "xyz"]) / u.length,
