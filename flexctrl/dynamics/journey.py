@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -281,15 +281,20 @@ class Journey:
     def leapt(self) -> None:
         """Note the events that a jump of the inputs has brought about; one of them may end the run."""
         watch, point = self.watch, self.point
-        for crossing in watch.leaps(point):
+        leaps = watch.leaps(point)
+        for crossing in leaps:
             watch.reach(crossing)
-            if self.is_over(crossing):
-                continue
+        leaps = [crossing for crossing in leaps if not self.is_over(crossing)]
+        for crossing in leaps:
             self.happens(crossing, point.state, point.supply.u)
-            if watch.stops(crossing.gauge):
-                name = watch.last_word(crossing.gauge)
-                self.status, self.message = Status.STOPPED, f"{name} at t = {crossing.t:.6g} s"
+        self.end_by(leaps, point.state.t)
         watch.settle(point)
+
+    def end_by(self, crossings: Sequence[Crossing], t: float) -> None:
+        """End the run if any of what happens at an instant ends it; say which do."""
+        watch = self.watch
+        if ends := [end for c in crossings if watch.stops(c.gauge) and (end := watch.last_word(c.gauge))]:
+            self.status, self.message = Status.STOPPED, f"{' and '.join(ends)} at t = {t:.6g} s"
 
     def accept(self, after: Point, stop: float) -> None:
         """Enter a step in the books, rows and track, up to where something ended it."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from flexctrl.dynamics.crossings import crossings, offset
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.landing import landed
-from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.steps import Point, StepError
 from flexctrl.dynamics.switching import anew, is_brief, withheld
 from flexctrl.dynamics.watch import Crossing
@@ -46,12 +45,13 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
     there = [c for c in closest if c.gauge != landing.gauge and _is_there(journey, c, before, after, slid)]
     _note(journey, [c for c in earlier if c not in there], curve, before)
     watch.settle(after)
-    for c in sorted((*there, landing), key=lambda c: c.gauge):
+    together = sorted((*there, landing), key=lambda c: c.gauge)
+    for c in together:
         watch.cross(c)
         if not 0 <= c.gauge - len(watch.events) < len(watch.names):
             journey.happens(replace(c, t=landing.t), after.state, after.supply.u)
-    if end := watch.last_word(landing.gauge):
-        journey.status, journey.message = Status.STOPPED, f"{end} at t = {landing.t:.6g} s"
+    journey.end_by(together, landing.t)
+    if watch.last_word(landing.gauge):
         return after, None
     short = landing.t - before.state.t < 1e-6 * journey.mark.size
     journey.mark.stuck = journey.mark.stuck + 1 if short else 0

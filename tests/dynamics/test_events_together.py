@@ -8,6 +8,7 @@ from itertools import permutations
 import pytest
 
 import flexctrl as fc
+from flexctrl.design.trajectories import Ramp, Step
 
 METHODS = {
     "chosen": fc.AdaptiveAlpha(),
@@ -38,6 +39,7 @@ def test_all_events_at_the_end_are_told(method, backend):
     assert run.status is fc.Status.STOPPED
     assert [e.name for e in run.events] == ["early", "stop", "log", "halt"]
     assert {e.t for e in run.events[1:]} == {run.t[-1]}
+    assert run.report.message == f"stop and halt at t = {run.t[-1]:.6g} s"
     assert run["z"][-1] == pytest.approx(5.0, abs=1e-8)
 
 
@@ -52,3 +54,33 @@ def test_a_run_that_goes_on_tells_none_of_them_again(method):
     rest = fallen(events, method, start=fallen(events, method).checkpoint)
     assert [e.name for e in rest.events] == ["late"]
     assert rest.status is fc.Status.FINISHED
+
+
+def pushed(*effects: fc.Effect) -> fc.Model:
+    block = fc.PointMass("block", (0, 0, 0), 2.0)
+    joints, push = [fc.Support(block.node, "v w")], fc.Force("pull", block.node, "x")
+    machine = fc.Structure([block], joints, inputs=[push], outputs=[fc.Position("x", block.node, "x")])
+    return fc.assemble(machine, effects)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_jump_of_the_inputs_names_all_that_it_ends_a_run_by(method):
+    events = [fc.Event(name, "pull", 1.0, terminal=True) for name in ("first", "second")]
+    law = fc.OpenLoop({"pull": Step(2.0, at=0.1)}, 0.05)
+    run = fc.simulate(pushed(), law, until=1.0, method=METHODS[method], events=events)
+    assert run.status is fc.Status.STOPPED
+    assert run.report.message == "first and second at t = 0.1 s"
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_ends_a_run_does_so_where_a_contact_breaks_loose(method):
+    """A pull of 2 N/s breaks 5 N of static friction at 2.5 s; 3 N of the kinetic one are left against it."""
+    model = pushed(fc.LargeRotation(), fc.CoulombFriction({"block.u": fc.Coulomb(3.0, static=5.0)}))
+    law = fc.OpenLoop({"pull": Ramp(2.0, 10.0)})
+    events = [fc.Event("full", "pull", 5.0, terminal=True)]
+    how = {"until": 3.0, "method": METHODS[method], "events": events}
+    run = fc.simulate(model, law, **how)
+    assert (run.status, run.report.message) == (fc.Status.STOPPED, "full at t = 2.5 s")
+    rest = fc.simulate(model, law, start=run.checkpoint, **how)
+    assert rest.status is fc.Status.FINISHED
+    assert rest["x"][-1] == pytest.approx(0.5**2 / 2.0 + 0.5**3 / 6.0, rel=1e-3)
