@@ -57,6 +57,7 @@ class Turnover:
         h : float
             Its length [s].
         """
+        h = float(f"{h:.12e}")  # steps to samples differ by round-off
         found = self._kept.get(h)
         if found is None:
             if len(self._kept) >= _KEPT:
