@@ -19,6 +19,7 @@ from flexctrl.dynamics.feed import Supply, feed_of
 from flexctrl.dynamics.first_step import first_step
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_plant import LinearPlant
+from flexctrl.dynamics.nearing import SMALLEST
 from flexctrl.dynamics.record import InMemory, Record, Unwritten
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
@@ -214,7 +215,8 @@ def _begun(
 def _first(plan: Plan, pace: Controlled, state: State, supply: Supply, span: float) -> float:
     """The first step, as asked for or from how the machine sets out."""
     if pace.first is None:
-        return first_step(plan.feed, state, supply, pace, plan.tolerance, span)
+        first = first_step(plan.feed, state, supply, pace, plan.tolerance, span)
+        return max(first, SMALLEST * plan.until)
     return min(pace.first, pace.largest)
 
 
