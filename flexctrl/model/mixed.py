@@ -17,7 +17,7 @@ import numpy as np
 
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
-from flexctrl.mechanics import beam, pieces
+from flexctrl.mechanics import beam, pieces, winch
 from flexctrl.mechanics.beam_tangent import beam_slope
 from flexctrl.model.laws import part_kinds
 from flexctrl.model.laws.kinds import NODE_SLOT, Kind, Physics, moved, symbols_of
@@ -79,9 +79,8 @@ def _line_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parame
 
     pull = part_kinds.spring_pull if kind is part_kinds.SPRING else part_kinds.rope_pull
     increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
-    first, second = _still(kind, symbols, increment)
-    stress = pull(effects, pieces.line_motion(first, second, parameters))
-    step = ca.vertcat(*[_rates(symbols, i)[: kind.freedoms] for i in range(kind.nodes)])
+    stress = pull(effects, _line_motion(kind, symbols, increment, parameters))
+    step = ca.vertcat(*[_rates(symbols, i)[: kind.freedoms] for i in range(kind.nodes)], *_slot(kind, symbols)[1:2])
     return ca.substitute(ca.vertcat(stress, ca.jtimes(stress, increment, step)), increment, zero)
 
 
@@ -91,13 +90,23 @@ def _line_geometric(
     import casadi as ca
 
     increment, zero = ca.SX.sym("increment", kind.width), ca.SX.zeros(kind.width)
-    first, second = _still(kind, symbols, increment)
-    force = pieces.line_force(pieces.line_motion(first, second, parameters), stress)
+    m = _line_motion(kind, symbols, increment, parameters)
+    wound = [stress / winch.named(winch.WINCH_PARAMETERS, parameters)["ratio"]] if kind is part_kinds.WINCH else []
+    force = ca.vertcat(pieces.line_force(m, stress), *wound)
     return ca.substitute(ca.jacobian(force, increment), increment, zero), ca.substitute(force, increment, zero)
 
 
+def _line_motion(kind: Kind, symbols: ca.SX, increment: ca.SX, parameters: ca.SX) -> pieces.LineMotion:
+    import casadi as ca
+
+    first, second = _still(kind, symbols, increment)
+    if kind is not part_kinds.WINCH:
+        return pieces.line_motion(first, second, parameters)
+    return winch.paid_out(first, second, ca.vertcat(_slot(kind, symbols)[0] + increment[-1], 0, 0), parameters)
+
+
 _BEAM, _LINE = _Elastic(6, _beam_stress, _beam_geometric), _Elastic(1, _line_stress, _line_geometric)
-_ROPES = (part_kinds.ROPE, part_kinds.HEAVY_ROPE)
+_ROPES = (part_kinds.ROPE, part_kinds.HEAVY_ROPE, part_kinds.WINCH)
 _ELASTIC = {part_kinds.BEAM.physics: _BEAM, **{kind.physics: _LINE for kind in (part_kinds.SPRING, *_ROPES)}}
 """The physics of pieces that strain."""
 
@@ -130,6 +139,13 @@ def _geometric_kernel(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
 
 def _rates(symbols: ca.SX, node: int) -> ca.SX:
     return symbols[NODE_SLOT * node + 12 : NODE_SLOT * node + 18]
+
+
+def _slot(kind: Kind, symbols: ca.SX) -> list[ca.SX]:
+    """What a piece reads beside its nodes."""
+    import casadi as ca
+
+    return ca.vertsplit(symbols[NODE_SLOT * kind.nodes :])
 
 
 def _still(kind: Kind, symbols: ca.SX, increment: ca.SX) -> list:

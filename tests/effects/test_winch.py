@@ -210,3 +210,18 @@ def test_a_crane_on_a_moving_trolley():
 def test_impossible_winches_are_refused(make, message):
     with pytest.raises(StructureError, match=message):
         make()
+
+
+def test_how_stiff_its_rope_is_does_not_count_in_the_search():
+    """A load drawn aside swings under the winch."""
+    iterations = []
+    for EA in (1e7, 1e9, 1e13):
+        top, load = fc.PointMass("top", (0, 0, 0), 0.0), fc.PointMass("load", (5, 0, -10), 1000.0)
+        winch = fc.Winch("winch", load.node, top.node, EA=EA, radius=0.5, ratio=20.0, inertia=1.0)
+        structure = fc.Structure([top, load], [fc.Support(top.node), fc.Support(load.node, "v")], [winch])
+        model = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.Flexible()], fc.CasadiVM())
+        rest = fc.equilibrium(model, hold={"winch_source": 0.0})
+        stretched = np.hypot(5.0, 10.0) * (1.0 + 1000.0 * 9.81 / EA)
+        assert rest.state.x[1] == pytest.approx((0.0, 0.0, -stretched), abs=1e-9)
+        iterations.append(rest.iterations)
+    assert max(iterations) <= min(iterations) + 2
