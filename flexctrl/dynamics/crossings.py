@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -20,7 +20,7 @@ from flexctrl.dynamics.watch import Crossing, Watch
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
-__all__ = ["crossings", "offset"]
+__all__ = ["crossings", "met", "offset"]
 
 _SLOPE = 1e-2
 _BENT = 0.25
@@ -49,6 +49,19 @@ def crossings(watch: Watch, curve: Curve, before: Point, after: Point, every: fl
         corners = [(t, last[gauge]), *((at, v[gauge]) for at, v in (seen if gauge < number else ends))]
         found += _through(watch, gauge, _with_vertices(sorted(corners), gauge, value), value)
     return sorted(found, key=lambda c: c.t)
+
+
+def met(
+    watch: Watch, curves: Callable[[Point, Point], Curve], before: Point, after: Point, every: float | None = None
+) -> list[Crossing]:
+    """Return where gauges cross zero over a step, in order: corners where what is gone on from meets them."""
+    found = crossings(watch, curves(before, after), before, after, every)
+    if after.firm is after or not watch.corner_names:
+        return found
+    firm = crossings(watch, curves(before.firm, after.firm), before.firm, after.firm)
+    corners = len(watch.events) + len(watch.names)
+    both = [c for c in found if c.gauge < corners] + [c for c in firm if c.gauge >= corners]
+    return sorted(both, key=lambda c: c.t)
 
 
 def offset(watch: Watch, curve: Curve, before: Point, after: Point, gauge: int) -> float:

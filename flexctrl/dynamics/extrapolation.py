@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.settling import quasistatic
-from flexctrl.dynamics.steps import Counts, Integrator, Pace, Point, Stepper
+from flexctrl.dynamics.steps import Counts, Integrator, Joining, Pace, Point, Stepper
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.model import Model
@@ -38,7 +37,8 @@ class Richardson:
 
     Two more orders for a method that is symmetric in time (`ConservingMidpoint`, ``GeneralizedAlpha(h, rho=1.0)``),
     one more for others, at three times the cost of the coarser run. As damped and as stable as the method itself.
-    Errors of both runs grow with time, so this is for runs in which the coarser one still follows the motion.
+    Errors of both runs grow with time, so this is for runs in which the coarser one still follows the motion. Beyond a
+    corner of a law of force both go on from where the finer one is.
 
     Parameters
     ----------
@@ -86,6 +86,11 @@ class _Point(Point):
     coarse: Point
     fine: Point
     gap: np.ndarray
+
+    @property
+    def firm(self) -> _Point:
+        """The finer run: an extrapolation of what steps do not resolve, gone on from again and again, grows."""
+        return replace(self, state=self.fine.state, rate=self.fine.rate, supply=self.fine.supply)
 
 
 @dataclass
@@ -136,8 +141,8 @@ class _Stepper:
 
     def join(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point with both runs in its state: apart, they would meet a corner of a law of force apart."""
-        coarse = _from(self.coarse, point.coarse, (point.state, self._own(point.coarse, supply), step))
-        fine = _from(self.fine, point.fine, (point.state, self._own(point.fine, supply), 0.5 * step))
+        coarse = _joined(self.coarse, replace(point.coarse, state=point.state), supply, step)
+        fine = _joined(self.fine, replace(point.fine, state=point.state), supply, 0.5 * step)
         return replace(point, rate=fine.rate, supply=supply, coarse=coarse, fine=fine, gap=np.zeros(self.model.n))
 
     def _own(self, run: Point, supply: Supply) -> Supply:
@@ -183,13 +188,10 @@ class _Stepper:
         return float((local / allowed).max(initial=0.0))
 
 
-def _from(stepper: Stepper[Any], run: Point, start: tuple[State, Supply, float]) -> Point:
-    """Start a run anew; the method's own accelerations keep their lead on the true ones."""
+def _joined(stepper: Stepper[Any], run: Any, supply: Supply, step: float) -> Any:
+    """Start a run anew, as the method by itself does beyond a corner."""
     plain = stepper.plain if isinstance(stepper, MarchingStepper) else stepper
-    fresh = plain.start(*start)
-    if isinstance(fresh, AlphaPoint) and isinstance(run, AlphaPoint):
-        return replace(fresh, algorithmic=fresh.rate + run.algorithmic - run.rate)
-    return fresh
+    return plain.join(run, supply, step) if isinstance(plain, Joining) else plain.start(run.state, supply, step)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from flexctrl.dynamics.crossings import crossings, offset
+from flexctrl.dynamics.crossings import met, offset
 from flexctrl.dynamics.nearing import (
     LANDINGS,
     LEAD,
@@ -42,7 +42,7 @@ def landed(journey: Journey, before: Point, after: Point, crossing: Crossing) ->
         after, crossing = _land(journey, before, after, crossing)
         if after is before:
             break
-        passed = crossings(journey.watch, journey.track.curve(before, after), before, after)
+        passed = met(journey.watch, journey.track.curve, before, after)
         ends = (
             c for c in passed if c.gauge != crossing.gauge and journey.watch.stops(c.gauge) and not journey.is_over(c)
         )
@@ -87,7 +87,7 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
     """Take the step again, to just before a corner.
 
     What lies beyond a stiff one pulls the end of a longer step back onto it, too late and with another speed: only
-    an end on the side of the start tells when the corner is.
+    an end on the side of the start tells when the corner is. It is where what goes on beyond it is.
     """
     t, h, gauge, watch = before.state.t, after.state.t - before.state.t, crossing.gauge, journey.watch
     lead, dust = max(LEAD * h, 8.0 * math.ulp(t + h)), watch.dusts[gauge]
@@ -100,10 +100,14 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
             after = _towards(journey, before, at - t)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
-        curve, end = journey.track.curve(before, after), after.state.t
-        left = watch.left(after, before, crossing)
+        (first, final), end = (before.firm, after.firm), after.state.t
+        left = watch.left(final, first, crossing)
         above = left - dust
-        off = offset(watch, curve, before, after, gauge) if above > 0.0 or last is None else 0.0
+        off = (
+            offset(watch, journey.track.curve(first, final), first, final, gauge)
+            if above > 0.0 or last is None
+            else 0.0
+        )
         on = to_zero(*last, end, above) if last else off
         missed = above > 0.0 and end < at - lead  # no step ends there
         narrow(bracket, end if above > 0.0 else at, above)

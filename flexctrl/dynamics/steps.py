@@ -44,6 +44,11 @@ class Point:
     rate: np.ndarray
     supply: Supply
 
+    @property
+    def firm(self) -> Point:
+        """Where a run sets out anew from: nothing here is extrapolated."""
+        return self
+
 
 @dataclass
 class Counts:

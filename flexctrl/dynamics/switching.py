@@ -61,7 +61,7 @@ def withheld(journey: Journey, at: Point, switch: int) -> Point:
 
 def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
     """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
-    watch, sign = journey.watch, 1.0 if corner.rising else -1.0
+    at, watch, sign = at.firm, journey.watch, 1.0 if corner.rising else -1.0
     span = max(LEAST * journey.mark.size, corner.t - at.state.t)
     state, v = at.state, at.state.v
     for _ in range(NUDGES):

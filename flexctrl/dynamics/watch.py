@@ -199,6 +199,8 @@ class Watch:
     def settle(self, after: Point) -> None:
         """Note the sides after a step."""
         values = self.values(after.state, after.supply.u)
+        if self.corner_names:
+            values[-len(self.corner_names) :] = self.corners(after.firm.state, after.firm.state)
         clear = np.abs(values) > self.dusts
         self.sides = np.where(clear, np.sign(values), self.sides)
         self.switched()

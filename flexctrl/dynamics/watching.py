@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from flexctrl.dynamics.crossings import crossings, offset
+from flexctrl.dynamics.crossings import met, offset
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.landing import landed
 from flexctrl.dynamics.steps import Point, StepError
@@ -26,22 +26,22 @@ _TOGETHER = 1e-7
 def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Crossing | None]:
     """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
     watch, curve = journey.watch, journey.track.curve(before, after)
-    met = crossings(watch, curve, before, after, journey.rows.every)
-    landing = next((c for c in met if watch.stops(c.gauge) and not journey.is_over(c)), None)
+    found = met(watch, journey.track.curve, before, after, journey.rows.every)
+    landing = next((c for c in found if watch.stops(c.gauge) and not journey.is_over(c)), None)
     switch = -1 if landing is None else landing.gauge - len(watch.events)
     if 0 <= switch < len(watch.names) and journey.mark.stuck >= _CHATTER:
         name = watch.names[switch]
         raise StepError(journey.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
     if landing is None or journey.mark.stuck >= _CHATTER:
-        _note(journey, met, curve, before)
+        _note(journey, found, curve, before)
         watch.settle(after)
         journey.mark.stuck = 0
         return after, None
-    earlier, slid = [c for c in met if c.t < landing.t], after
+    earlier, slid = [c for c in found if c.t < landing.t], after
     after, landing = landed(journey, before, after, landing)
     switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
     brief = 0 <= switch < len(watch.names) and is_brief(journey, before, after, slid, switch)
-    closest = {c.gauge: c for c in sorted(met, key=lambda c: -abs(c.t - landing.t))}.values()
+    closest = {c.gauge: c for c in sorted(found, key=lambda c: -abs(c.t - landing.t))}.values()
     there = [c for c in closest if c.gauge != landing.gauge and _is_there(journey, c, before, after, slid)]
     _note(journey, [c for c in earlier if c not in there], curve, before)
     watch.settle(after)
