@@ -173,7 +173,7 @@ def _run(
 
 
 def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:
-    switches, kinks = plan.model.switches, plan.model.kinks
+    switches, kinks = plan.model.switches, plan.model.kinks.met
     return Watch(plan.feed, events, switches.gaps, switches.names, kinks.values, kinks.names, kinks.ends, kinks.dust)
 
 

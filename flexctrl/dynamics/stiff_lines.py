@@ -84,7 +84,7 @@ def _frequencies(model: Model) -> np.ndarray:
     still = np.zeros(model.n)
     slope = model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs)))
     mass = -slope.diagonal()
-    pulls = sp.csr_matrix(np.array([_pull(model, line) for line in lines])) @ model.motion.jacobian(model.rest)
+    pulls = _pulls(model, lines) @ model.motion.jacobian(model.rest)
     light = mass <= model.dust
     mobility = np.where(light, 0.0, 1.0 / np.where(light, 1.0, mass))
     return np.sqrt(pulls.power(2) @ mobility * [_stiffness(line) for line in lines])
@@ -103,17 +103,21 @@ def _stiffness(line: Line) -> float:
     return line.stiffness if isinstance(line, Rope | Spring) else line.EA / line.length
 
 
-def _pull(model: Model, line: Line) -> np.ndarray:
-    """How each raw coordinate lengthens a line, shape (raw,)."""
-    nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
-    first, second = (model.structure.number(node) for node in nodes)
-    arm = model.rest.x[second] - model.rest.x[first]
-    found = np.zeros(model.motion.raw)
-    found[6 * second : 6 * second + 3] = arm / np.linalg.norm(arm)
-    found[6 * first : 6 * first + 3] -= arm / np.linalg.norm(arm)
-    if isinstance(line, Winch):
-        found[model.motion.source_base + model.structure.drives.index(line)] = -1.0 / line.effective_ratio
-    return found
+def _pulls(model: Model, lines: tuple[Line, ...]) -> sp.csr_matrix:
+    """How each raw coordinate lengthens each line, shape (lines, raw)."""
+    rows, columns, values = [], [], []
+    for i, line in enumerate(lines):
+        nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
+        first, second = (model.structure.number(node) for node in nodes)
+        arm = model.rest.x[second] - model.rest.x[first]
+        arm = arm / np.linalg.norm(arm)
+        columns += [6 * end + k for end in (second, first) for k in range(3)]
+        values += [*arm.tolist(), *(-arm).tolist()]
+        if isinstance(line, Winch):
+            columns.append(model.motion.source_base + model.structure.drives.index(line))
+            values.append(-1.0 / line.effective_ratio)
+        rows += [i] * (7 if isinstance(line, Winch) else 6)
+    return sp.csr_matrix((values, (rows, columns)), shape=(len(lines), model.motion.raw))
 
 
 def stiffest(model: Model) -> tuple[str, float]:

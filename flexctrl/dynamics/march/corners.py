@@ -76,7 +76,7 @@ class Corners:
 
 def corners_of(F: Flattened) -> Corners:
     """Return the corners of a model."""
-    kinks = F.model.kinks
+    kinks = F.model.kinks.met
     (ends, lengths), (drives, sums), (travels, spans) = kinks.lines, kinks.shafts, kinks.rails
     sides = np.zeros(len(kinks.names))
     counts = len(lengths), len(drives), len(travels), kinks.sheaves

@@ -244,7 +244,7 @@ def _sums(F: Flattened, both: np.ndarray) -> np.ndarray | None:
 
 def _arms(F: Flattened, both: np.ndarray) -> np.ndarray | None:
     """The arms of lines that have corners, likewise; None where other laws of force have some."""
-    kinks, motion, n = F.model.kinks, F.model.motion, F.model.n
+    kinks, motion, n = F.model.kinks.met, F.model.motion, F.model.n
     (ends, lengths), (drives, _), (travels, _) = kinks.lines, kinks.shafts, kinks.rails
     if len(drives) or len(travels) or kinks.sheaves or (6 * ends >= motion.source_base).any():
         return None

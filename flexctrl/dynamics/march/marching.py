@@ -261,7 +261,7 @@ class Marcher(Loops):
         ``sides`` are those of the corners that a state is on.
         """
         m = self.march
-        m.corners.arms[:] = self.model.kinks.sheaved(state).ravel()
+        m.corners.arms[:] = self.model.kinks.met.sheaved(state).ravel()
         m.corners.sides[:] = sides
         m.watching, self.contacts.watched = int(sides.size > 0), int(self.contacts.count > 0)
 

@@ -5,7 +5,7 @@ Steps end there, or the corner would cost accuracy however small the step: the v
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,10 @@ from flexctrl.structure.trolleys import Trolley
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
 
-__all__ = ["Kinks"]
+__all__ = ["MANY", "Kinks"]
+
+MANY = 32
+"""Ropes up to which steps end where one of them goes slack or taut."""
 
 _ROUND_OFF = 1e-12
 _DIGITS = 16.0 * float(np.finfo(float).eps)
@@ -82,15 +85,30 @@ class Kinks:
     Attributes
     ----------
     model : Model
+    ropes : bool
+        Whether ropes are among the lines.
     """
 
     model: Model
+    ropes: bool = True
+
+    @cached_property
+    def met(self) -> Kinks:
+        """Those that steps end at: all, but for ropes that many others are in a row with.
+
+        Waves that run along a row of n pieces pass n corners on their way: located one by one, steps would be n² times
+        as many, for what a piece has in it. Errors that passing them makes are the control of steps to see.
+        """
+        parts = self.model.structure.elements
+        many = sum(isinstance(p, Rope) and self.model.bends(p) for p in parts) > MANY
+        return replace(self, ropes=False) if many else self
 
     @cached_property
     def _lines(self) -> tuple[Line, ...]:
         """Ropes, springs with play, and what hangs on winches on its way to the sheave."""
         parts, gaps = self.model.structure.elements, gaps_of(self.model.effects)
-        ropes = [Line(p.name, p.start, p.end, p.length) for p in parts if isinstance(p, Rope) and self.model.bends(p)]
+        bent = [p for p in parts if isinstance(p, Rope) and self.model.bends(p)] if self.ropes else []
+        ropes = [Line(p.name, p.start, p.end, p.length) for p in bent]
         loose = [p for p in parts if isinstance(p, Spring) and p.name in self._loose]
         gapped = [Line(p.name, p.start, p.end, p.length + s * gaps[p.name]) for p in loose for s in (0.5, -0.5)]
         winches = [d for d in self.model.structure.drives if isinstance(d, Winch)]
