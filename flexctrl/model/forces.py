@@ -223,7 +223,7 @@ class Forces:
             gather = np.hstack([f.gather(self.drive_base), np.tile(seeds, (f.count, 1))])
             blocks = evaluate(f.kernels.tangent, z[gather], f.parameters).reshape(f.count, f.kernels.kind.width, -1)
             own = reach[f.scatter(self.motion.source_base)].astype(EXTENDED)
-            total -= np.einsum("eik,eji,ejl->kl", own, blocks, own)
+            total -= np.tensordot(blocks @ own, own, axes=((0, 1), (0, 1)))
         return total.astype(float)
 
     def terms(self, state: State) -> Terms:
