@@ -23,7 +23,7 @@ from flexctrl.kernels.kernel import Backend, Kernel, Run
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["Lowered", "Tracer", "lowered"]
+__all__ = ["LAWS", "Lowered", "NotLowered", "Told", "Tracer", "lowered"]
 
 Told = tuple["ca.SX", "ca.SX"]
 """A command and the state at the next sample."""
@@ -104,7 +104,7 @@ class Tracer:
         NotLowered
             For a law that does not tell.
         """
-        known = _LAWS.get(type(law))
+        known = LAWS.get(type(law))
         if known is not None:
             return known(law, self, x, y)
         own = getattr(law, "lowered", None)
@@ -371,7 +371,7 @@ def _along(signal: Signal, times: np.ndarray) -> np.ndarray:
     return np.array([float(signal(t)) for t in times.tolist()])
 
 
-_LAWS: dict[type, Callable[[Any, Tracer, Any, Any], Told]] = {
+LAWS: dict[type, Callable[[Any, Tracer, Any, Any], Told]] = {
     LinearController: _linear,
     Sampled: _through,
     Saturated: _saturated,

@@ -147,7 +147,7 @@ class PiecewisePolynomial(Trajectory):
 
     @cached_property
     def _rising(self) -> np.ndarray:
-        rows = [[*row, *(0.0,) * (self._width - len(row))] for row in self.coefficients]
+        rows = [[*row, *(0.0,) * (self.width - len(row))] for row in self.coefficients]
         return np.array(rows)
 
     @cached_property
@@ -208,11 +208,27 @@ class PiecewisePolynomial(Trajectory):
         piece = bisect_right(self._reached, instant) - 1
         row, s = (self.coefficients[piece], instant - self.knots[piece]) if piece >= 0 else ((self.before,), 0.0)
         shifted = [sum(math.comb(k, m) * row[k] * s ** (k - m) for k in range(m, len(row))) for m in range(len(row))]
-        return (*(amplitude * c for c in shifted), *(0.0,) * (self._width - len(row)))
+        return (*(amplitude * c for c in shifted), *(0.0,) * (self.width - len(row)))
 
     @cached_property
-    def _width(self) -> int:
+    def width(self) -> int:
+        """Most coefficients of a piece."""
         return max(map(len, self.coefficients))
+
+    def piece(self, t: float) -> tuple[float, tuple[float, ...]]:
+        """Return the piece at a time: its first instant, and coefficients of powers of the time since then.
+
+        Parameters
+        ----------
+        t : float
+            [s]
+
+        Returns
+        -------
+        tuple of float and tuple of float
+        """
+        i = bisect_right(self._reached, t) - 1
+        return (self.knots[i], self.coefficients[i]) if i >= 0 else (self.knots[0], (self.before,))
 
 
 @dataclass(frozen=True)

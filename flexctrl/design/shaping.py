@@ -53,6 +53,11 @@ class Shaped(Trajectory):
             return pieces.convolved(self.shaper.amplitudes, self.shaper.times)
         return self._copies
 
+    @property
+    def pieces(self) -> Trajectory:
+        """The same trajectory as polynomials; itself where it is none."""
+        return self._value if isinstance(self._value, PiecewisePolynomial) else self
+
     def along(self, times: np.ndarray) -> np.ndarray:
         value = self._value
         return value.along(times) if isinstance(value, PiecewisePolynomial) else super().along(times)

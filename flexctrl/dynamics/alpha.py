@@ -27,9 +27,16 @@ _LEFTOVER = 1e-11  # stiff parts that steps do not resolve make accelerations of
 def _quickest(plain: Stepper) -> Any:
     """Return steps in compiled loops, where the model and its feed allow that."""
     from flexctrl.dynamics.march.marching import can_march
-    from flexctrl.dynamics.march.stepper import MarchingStepper
 
-    return MarchingStepper(plain) if can_march(plain.model) and not plain.feed.continuous else plain
+    if not can_march(plain.model):
+        return plain
+    if not plain.feed.continuous:
+        from flexctrl.dynamics.march.stepper import MarchingStepper
+
+        return MarchingStepper(plain)
+    from flexctrl.dynamics.march.answerer import AnsweringStepper, can_answer
+
+    return AnsweringStepper(plain) if can_answer(plain.feed) else plain
 
 
 class _Damped:

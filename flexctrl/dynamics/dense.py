@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.local import Local
 from flexctrl.dynamics.steps import Point, Stepper
 from flexctrl.model.model import Model
@@ -94,10 +94,13 @@ def curves_of(model: Model, stepper: Stepper[Any]) -> Callable[[Point, Point], C
 
 
 class Stretched(Protocol):
-    """Steps between two points; ``states`` has those after each of them."""
+    """Steps between two points; ``states`` and ``supplies`` are those after each of them."""
 
     @property
     def states(self) -> Sequence[State]: ...
+
+    @property
+    def supplies(self) -> Sequence[Supply]: ...
 
     @property
     def before(self) -> Point: ...
@@ -132,6 +135,10 @@ class Stretch:
     states: Sequence[State]
     before: Point
     after: Point
+
+    @property
+    def supplies(self) -> Sequence[Supply]:
+        return (self.before.supply,) * (len(self.states) - 1) + (self.after.supply,)
 
     def part(self, t: float) -> Stretch:
         """The only part."""
@@ -194,4 +201,5 @@ class Track:
             return s.before, s.after
         ends = [s.before.state, *s.states]
         i = min(max(1, bisect_right([state.t for state in ends], t)), len(ends) - 1)
-        return replace(s.before, state=ends[i - 1]), replace(s.after, state=ends[i])
+        told = [s.before.supply, *s.supplies]
+        return replace(s.before, state=ends[i - 1], supply=told[i - 1]), replace(s.after, state=ends[i], supply=told[i])

@@ -18,6 +18,7 @@ from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
+    from flexctrl.design.answers import Answering
     from flexctrl.design.lowering import Lowered
 
 _SMALL = 1e-7
@@ -80,7 +81,7 @@ class Feed:
         """Whether the inputs change between breaks."""
         return self.controller is not None and self.controller.sample_time == 0.0
 
-    @property
+    @cached_property
     def breaks(self) -> tuple[float, ...]:
         """Instants at which a continuous command jumps."""
         return tuple(getattr(self.controller, "breaks", ())) if self.continuous else ()
@@ -98,6 +99,15 @@ class Feed:
         from flexctrl.design.lowering import lowered  # all kinds of controllers: not for runs without any
 
         return lowered(self.controller)
+
+    @cached_property
+    def answering(self) -> Answering | None:
+        """The controller as a kernel over a step; None if it is not continuous, or cannot be one."""
+        if self.controller is None or not self.continuous:
+            return None
+        from flexctrl.design.answers import answering
+
+        return answering(self.controller)
 
     @cached_property
     def _asked(self) -> Callable[[np.ndarray, np.ndarray], None] | None:
@@ -168,10 +178,17 @@ class Feed:
     def evaluate(self, state: State, x: np.ndarray) -> Supply:
         """Return the inputs that a continuous controller in state x gives."""
         assert self.controller is not None
-        y = self.measured(state)
+        return self._answered(state.t, self.measured(state), x)
+
+    def renewed(self, t: float, y: np.ndarray, supply: Supply) -> Supply:
+        """Return the inputs from a sample instant or a break on, of what the controller reads there."""
+        return self._answered(t, y, supply.x) if self.continuous else self.sampled(t, y, supply)
+
+    def _answered(self, t: float, y: np.ndarray, x: np.ndarray) -> Supply:
+        assert self.controller is not None
         try:
-            rate = _reals(self.controller.rate(state.t, x, y), "rate") if x.size else x
-            return Supply(np.array(self._total(self.controller.command(state.t, x, y))), x, rate)
+            rate = _reals(self.controller.rate(t, x, y), "rate") if x.size else x
+            return Supply(np.array(self._total(self.controller.command(t, x, y))), x, rate)
         except Exception as error:
             raise _blamed(error)  # noqa: B904 - its cause is set
 

@@ -10,6 +10,7 @@ import numpy as np
 from flexctrl.dynamics.dense import Curve
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.frames import Frames, Later
+from flexctrl.dynamics.inputs import Inputs
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.record import Recorder
 from flexctrl.dynamics.steps import Fixed, Pace, Point
@@ -65,7 +66,7 @@ class Rows:
         if not to_jump:
             self.here(after, near)
 
-    def among(self, start: State, times: np.ndarray, states: Sequence[State], supply: Supply, to_jump: bool) -> None:
+    def _among(self, start: State, times: np.ndarray, states: Sequence[State], supply: Supply, to_jump: bool) -> None:
         """Write the rows within many steps."""
         kept, near = len(times) - to_jump, _near(times[-1], times[0] - start.t)
         assert self.every is not None
@@ -79,7 +80,7 @@ class Rows:
                 return
             self._write(state, supply.u)
 
-    def between(self, weaver: Weaver, table: np.ndarray, inputs: np.ndarray, to_jump: bool) -> None:
+    def between(self, weaver: Weaver, table: np.ndarray, inputs: Inputs, to_jump: bool) -> None:
         """Write the rows within many steps whose states a weaver knows, and at their ends.
 
         Parameters
@@ -87,8 +88,7 @@ class Rows:
         weaver : Weaver
         table : numpy.ndarray, shape (steps, 1 + outputs)
             Time and outputs after each step.
-        inputs : numpy.ndarray, shape (steps + 1, inputs)
-            In force over each step, and after the last one.
+        inputs : Inputs
         to_jump : bool
             Whether inputs are about to jump at the end of the last one.
         """
@@ -107,34 +107,46 @@ class Rows:
             for states in drawn:
                 self.frames.take(states)
             self.count += len(due)
-            self.recorder.rows(rows, inputs[steps + ends])
+            self.recorder.rows(rows, inputs.at(steps, ends, rows))
         weaver.go_on(len(table))
 
     def on_steps(self, pace: Pace, sample: float, t: float) -> bool:
         """Tell whether rows are due at the ends of steps only, as these are from a time on."""
         if self.every is None or (sample > 0.0 and _whole(self.every / sample)):
             return True
-        return isinstance(pace, Fixed) and all(_whole(s / pace.step) for s in (self.every, sample, t))
+        return (
+            isinstance(pace, Fixed)
+            and not self.feed.breaks
+            and all(_whole(s / pace.step) for s in (self.every, sample, t))
+        )
 
     def due(self) -> tuple[float, float]:
         """Return when the next state for drawing is due, and their spacing."""
         spacing = self.until / _FRAMES * (1 - _NEAR)
         return (self.frames.last + spacing if self.frames else 0.0), spacing
 
-    def ridden(self, start: State, table: np.ndarray, states: Sequence[State], supply: Supply, to_jump: bool) -> None:
+    def ridden(
+        self,
+        start: State,
+        table: np.ndarray,
+        states: Sequence[State],
+        supply: Supply,
+        inputs: Inputs,
+        to_jump: bool,
+    ) -> None:
         """Write the rows of many steps: times and outputs, and all states or those due for drawing."""
         times, kept = table[:, 0], len(table) - to_jump
         if self.every is not None and len(states) == len(table):
-            return self.among(start, times, states, supply, to_jump)
+            return self._among(start, times, states, supply, to_jump)
         self.frames.take(states)
-        chosen = table[:kept]
+        chosen = np.arange(kept)
         if self.every is not None:
             near = _near(times[-1], times[0] - start.t)
             ahead = int((times[-1] + near) / self.every) + 1
             wanted = np.searchsorted(times, self.every * np.arange(self.count, ahead) - near)
-            chosen = table[wanted[wanted < kept]]
+            chosen = wanted[wanted < kept]
         self.count += len(chosen)
-        self.recorder.rows(chosen, supply.u)
+        self.recorder.rows(table[chosen], inputs.at(chosen, np.ones(len(chosen), dtype=bool), table[chosen]))
 
     def sampled(self, table: np.ndarray, commands: np.ndarray, states: Sequence[State], slack: float) -> None:
         """Write the rows of many steps with inputs of their own, and keep the states due for drawing."""

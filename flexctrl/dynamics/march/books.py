@@ -80,7 +80,7 @@ def enter(m: March) -> None:
     work = 0.0 * eight(m.weight)
     if f.gusting > 0:
         drive(f)
-    if f.carried > 0 or f.following > 0 or f.gusting > 0:
+    if f.carried > 0 or f.following > 0 or f.gusting > 0 or m.answering == 1:
         pull(f)
         for i in range(0, f.padded, 8):
             work = work + 0.5 * (eight(m.pulled[i:]) + eight(f.force[i:])) * eight(f.step[i:])

@@ -69,12 +69,13 @@ class Loops:
     """
 
     leaping: ClassVar[int] = 0
+    answering: ClassVar[int] = 0
 
     def __init__(self, model: Model, method: Method) -> None:
         self.model, self.method = model, method
         self.flattened = flatten(model)
         self.contacts: Any = Packed(contacts_of(self.flattened))
-        self.march = Packed(march_of(self.flattened, self.contacts, method, self.leaping))
+        self.march = Packed(march_of(self.flattened, self.contacts, method, self.leaping, self.answering))
         self.dry = model.rest.dry
         self._run = self.march.bound(run, without=("paced",))
         self._task = self.march.cell("task")

@@ -185,9 +185,18 @@ class Legs:
         """Where the last leg ends."""
         return self.end
 
-    @cached_property
+    @property
     def states(self) -> list[list[State]]:
         """The states after the steps of each leg."""
+        return [states for states, _ in self._again]
+
+    @property
+    def supplies(self) -> list[list[Supply]]:
+        """The inputs after the steps of each leg."""
+        return [supplies for _, supplies in self._again]
+
+    @cached_property
+    def _again(self) -> list[tuple[list[State], list[Supply]]]:
         again = self.stepper.again()
         again.marcher.recall(self.memory.march)
         again.enter(self.start)
@@ -198,15 +207,12 @@ class Legs:
         marcher.watch(self.books.sides, self.start.state)
         marcher.follow(self.mark)
         marcher.keep(all_states=True)
-        u, found = self.start.supply.u, []
+        before, found = self.start.supply, []
         for leg in self.legs:
             marcher.march.t = leg.t
-            if not same(leg.supply.u, u):
-                u = leg.supply.u
-                if isinstance(leg.pacing, float):
-                    marcher.about_to(leg.pacing)
-                marcher.jump(u)
-            found.append(marcher.travelled(leg.pacing, leg.steps))
+            marcher.resupply(before, leg.supply, leg.pacing)
+            before = leg.supply
+            found.append(marcher.travelled(leg.supply, leg.pacing, leg.steps))
         return found
 
 
@@ -222,6 +228,11 @@ class Span:
         """After each step."""
         return self.ride.states[self.number]
 
+    @property
+    def supplies(self) -> Sequence[Supply]:
+        """After each step."""
+        return self.ride.supplies[self.number]
+
     @cached_property
     def before(self) -> Point:
         """Where the leg starts."""
@@ -234,4 +245,4 @@ class Span:
         """Where it ends."""
         last = self.number == len(self.ride.legs) - 1
         state = self.ride.end.state if last else self.states[-1]
-        return Point(state, np.zeros(0), self.ride.legs[self.number].supply)
+        return Point(state, np.zeros(0), self.supplies[-1])

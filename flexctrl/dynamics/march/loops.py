@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.march.answering import commanded, take
 from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle, shelve
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
@@ -154,11 +155,13 @@ def fixed(m: March) -> int:
             return status
         m.jumping = 0
     while m.done < m.wanted and m.kept < m.shelf:
-        status = leap(m) if m.leaping == 1 else step(m)
+        status = advanced(m)
         if status != DONE:
             return status
         reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
+            if m.answering == 1:
+                return CORNER
             if m.leaping == 1:
                 back(m)
             return turn_corner(m, m.h)
@@ -166,8 +169,22 @@ def fixed(m: March) -> int:
             return CORNER
         if m.contacts.count > 0 and lets_go(m):
             return CORNER
-        accept(m)
+        accepted(m)
     return DONE
+
+
+def advanced(m: March) -> int:
+    """Solve a step."""
+    if m.answering == 1:
+        return commanded(m)
+    return leap(m) if m.leaping == 1 else step(m)
+
+
+def accepted(m: March) -> None:
+    """Go on to the end of the step."""
+    if m.answering == 1:
+        take(m)
+    accept(m)
 
 
 def glided(m: March) -> int:
@@ -202,7 +219,7 @@ def controlled(m: March) -> int:
                 return unmarched(m)
         if m.h < SMALLEST * max(SHORTEST * m.until, m.t):
             return SHORT
-        status = step(m)
+        status = advanced(m)
         if status == WANTS_TANGENT:
             return status
         if status == SINGULAR:
@@ -219,6 +236,8 @@ def controlled(m: March) -> int:
         grown = grown_by(m, 0.9 * growth(error))
         reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
+            if m.answering == 1:
+                return unmarched(m)
             status = turn_corner(m, grown)
             return unmarched(m) if status == CORNER else status
         if m.closing.looks > 0 and in_doubt(m.closing, m.flat, m.h):
@@ -228,7 +247,7 @@ def controlled(m: March) -> int:
         m.size = grown
         m.led = 0.0
         m.follow = max(0, m.follow - 1)
-        accept(m)
+        accepted(m)
     return DONE
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha_point import Coefficients
 from flexctrl.dynamics.coning import coning_of
+from flexctrl.dynamics.march.answer import no_answer
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.flowing import flows_of
@@ -58,7 +59,7 @@ class Method:
     turning: np.ndarray
 
 
-def march_of(F: Flattened, contacts: Any, method: Method, leaping: int) -> March:
+def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answering: int) -> March:
     """Return the record of a march.
 
     Parameters
@@ -69,6 +70,8 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int) -> March
     method : Method
     leaping : int
         Whether steps are exact ones.
+    answering : int
+        Whether inputs follow from what is at the end of a step.
     """
     corners: Any = Packed(corners_of(F))
     closing: Any = Packed(closing_of(F))
@@ -81,6 +84,7 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int) -> March
         flows=flows_of(F),
         contacts=contacts,
         law=no_law(),
+        answer=no_answer(),
         leap=no_leap(),
         fronts=F.plan.fronts,
         axes=F.axes,
@@ -89,6 +93,7 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int) -> March
         probes=probes,
         entries=np.zeros(F.plan.length + 1),
         leaping=leaping,
+        answering=answering,
         **_motion(F),
         **_yardsticks(F, method),
         **_room(F),

@@ -14,6 +14,7 @@ from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.frames import Later
+from flexctrl.dynamics.inputs import Inputs, Stepwise
 from flexctrl.dynamics.march.calling import Loops
 from flexctrl.dynamics.march.contacts import enter_contacts
 from flexctrl.dynamics.march.law import Sampling
@@ -240,15 +241,40 @@ class Marcher(Loops):
             m.size, m.largest, m.stop, m.until, m.relative, m.absolute = pacing
         return self._through(SAMPLED)
 
-    def travelled(self, pacing: float | Pacing, count: int) -> list[State]:
-        """Take as many steps and return the states after them."""
+    def inputs(self, supply: Supply, t: float, count: int) -> Inputs:
+        """Return the inputs over as many steps taken last, which set out under some supply at a time."""
+        return Stepwise(np.tile(supply.u, (count + 1, 1)))
+
+    def under(self, supply: Supply) -> Marcher:
+        """Go on under inputs that are in force already; return the march."""
+        return self
+
+    def supplied(self, supply: Supply) -> Supply:
+        """Return the inputs where the march stands, having set out under others."""
+        return supply
+
+    def supplies(self, supply: Supply, count: int) -> list[Supply]:
+        """Return the inputs after each of as many steps taken last."""
+        return [supply] * count
+
+    def resupply(self, before: Supply, supply: Supply, pacing: float | Pacing) -> None:
+        """Let the inputs jump at the start of a leg, if they do."""
+        if before.u.tolist() != supply.u.tolist():
+            if isinstance(pacing, float):
+                self.about_to(pacing)
+            self.jump(supply.u)
+
+    def travelled(self, supply: Supply, pacing: float | Pacing, count: int) -> tuple[list[State], list[Supply]]:
+        """Take as many steps; return the states and the inputs after them."""
         found: list[State] = []
+        told: list[Supply] = []
         while len(found) < count:
-            self.travel(pacing, min(self.room, count - len(found)))
+            done = self.travel(pacing, min(self.room, count - len(found)))[1]
             found += self.states()
+            told += self.supplies(supply, done)
             if isinstance(pacing, Pacing):
                 pacing = pacing._replace(size=self.march.size)
-        return found
+        return found, told
 
     def keep(self, all_states: bool, due: float = math.inf, spacing: float = math.inf) -> None:
         """Keep the states after all steps, or only when they are due."""

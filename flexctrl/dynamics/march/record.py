@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.contacts import Contacts
 from flexctrl.dynamics.march.corners import Corners
@@ -147,6 +148,7 @@ class March:
     closing : Closing
     flows : Flows
     law : Law
+    answer : Answer
     leap : Leap
     fronts : Fronts
     axes : Axes
@@ -178,8 +180,8 @@ class March:
         Of error-controlled steps beyond a corner; see `flexctrl.dynamics.steps.Mark`.
     phase, attempt, iteration, last, contraction, strayed : int, float
         Where in a step it is.
-    leaping : int
-        Whether steps are exact ones on modal states.
+    leaping, answering : int
+        Whether steps are exact ones on modal states; whether inputs follow from what is at the end of the step.
     paced : int
         Whether steps of controlled error, or from sample to sample of a law, are among the tasks.
     firmest, short : float
@@ -234,7 +236,7 @@ class March:
         Poses, degrees of freedom, rates, driven coordinates, angles of outputs, and the time.
     """
 
-    LASTING = ("leaping", "swift", "whole")
+    LASTING = ("answering", "leaping", "swift", "whole")
 
     flat: Flat
     gauges: Gauges
@@ -243,6 +245,7 @@ class March:
     flows: Flows
     contacts: Contacts
     law: Law
+    answer: Answer
     leap: Leap
     fronts: Fronts
     axes: Axes
@@ -278,6 +281,7 @@ class March:
     coning: int
     shelf: int
     leaping: int
+    answering: int
     paced: int = 1
     firmest: float = 0.0
     short: float = 0.0

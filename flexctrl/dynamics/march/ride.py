@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.dense import Dense
+from flexctrl.dynamics.inputs import Stepwise
 from flexctrl.dynamics.march.guarding import EVENT, FEWEST, guarded, warily
 from flexctrl.dynamics.march.law_inside import told
 from flexctrl.dynamics.march.law_outside import samples
@@ -44,12 +45,15 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
 
     They do not go beyond ``until``; where ``most`` is given, there are no more than that, all before the next stop.
 
-    Between samples only, where some freedom has no mass: the march has no rule for how its place jumps.
+    Between samples only, where some freedom has no mass: the march has no rule for how its place jumps. Under a
+    continuous law only where no events are to be found within steps.
     """
     stepper, plan = journey.stepper, journey.plan
     if not isinstance(stepper, MarchingStepper):
         return False
     if journey.watch.events and _near_stop(journey) and (most is not None or not _looked_out(journey)):
+        return False
+    if plan.feed.continuous and journey.watch.events:
         return False
     if plan.feed.sample_time and weightless(plan.model).size:
         return False
@@ -140,6 +144,7 @@ class Ride:
             self.journey.mark.size = self.marcher.march.size
         if done:
             self._passed(Leg(self.supply, t, pacing, done), stop)
+            self.supply = self.marcher.supplied(self.supply)
         return self.well(status) and done > 0
 
     def _travel(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
@@ -195,7 +200,7 @@ class Ride:
         """Write rows after samples: inputs before, and in force from each step's end on."""
         rows, table = self.journey.rows, self.marcher.rows[:done]
         if self.weaver is not None:
-            rows.between(self.weaver, table, np.vstack([before, commands]), False)
+            rows.between(self.weaver, table, Stepwise(np.vstack([before, commands])), False)
         else:
             rows.sampled(table, commands, self.marcher.states(), 1e-6 * self.journey.mark.size)
 
@@ -227,16 +232,16 @@ class Ride:
         mark.steps += leg.steps
         mark.left -= leg.steps if mark.left > 0 else 0
         to_jump = stop - marcher.march.t <= self.tick
+        inputs = marcher.inputs(leg.supply, leg.t, leg.steps)
         if self.weaver is not None:
-            inputs = np.tile(leg.supply.u, (leg.steps + 1, 1))
             rows.between(self.weaver, marcher.rows[: leg.steps], inputs, to_jump)
             return
         states = marcher.states()
-        rows.ridden(self.last, marcher.rows[: leg.steps], states, leg.supply, to_jump)
+        rows.ridden(self.last, marcher.rows[: leg.steps], states, leg.supply, inputs, to_jump)
         self.last = states[-1] if len(states) == leg.steps else self.last
 
     def _renew(self, stop: float) -> bool:
-        """Take a sample and let the inputs jump."""
+        """Take a sample, or pass a break of a continuous command, and let the inputs jump."""
         j, m = self.journey, self.marcher.march
         m.t = stop
         if abs(self.last.t - stop) < self.tick:
@@ -246,7 +251,7 @@ class Ride:
         y = self.marcher.rows[m.done - 1, 1:]
         feed, before = j.plan.feed, self.supply
         try:
-            self.supply = feed.sampled(stop, y[feed.reads], before)
+            self.supply = feed.renewed(stop, y[feed.reads], before)
         except (ControllerError, KeyboardInterrupt) as fault:
             self.faults.append(fault)
             return False
@@ -259,6 +264,7 @@ class Ride:
         elif written and abs(self.last.t - stop) < self.tick:
             j.rows.frame(self.last)
         self.jumped = same(u, before.u) or self.marcher.jump(u) == DONE
+        self.marcher.under(self.supply)
         self.leapt = self.lookout is not None and self.lookout.leaps(self.marcher.rows[m.done - 1], u.tolist())
         return self.jumped and not self.leapt
 

@@ -1,0 +1,83 @@
+"""What compiled steps know of a continuous law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexctrl.kernels.native import Reals, Runs, Wholes
+
+__all__ = ["Answer", "no_answer"]
+
+
+@dataclass
+class Answer:
+    """A continuous law, and what it has said; see `flexctrl.design.answers`.
+
+    Attributes
+    ----------
+    outputs, inputs : int
+        Of the machine.
+    states, clocks, commands, width : int
+        Of the law: its states, what depends on time alone, its commands, coefficients of what depends on time.
+    step : Runs
+        The kernel.
+    work, answer : Reals
+        What it reads: outputs, its state near the end of the step, state and rate at the start, length of the step,
+        clocks. What it says: commands, state and rate at the end.
+    writes : Wholes
+        The inputs commanded.
+    base, u, last, trend, said : Reals
+        Inputs under the commands; inputs guessed, those at the start of the step, their rates over the one before,
+        and what the law says they are.
+    inverse, gap, before, change, felt, row : Reals
+        Of Broyden's method: minus the inverse of the gap's slope; what the law says beside the guess, now and before
+        it was changed; by how much that was; room.
+    way : Reals
+        The step as it was before the last change of the inputs.
+    powers, origins : Reals
+        What depends on time: falling powers of the time since some instant, one row a clock; these instants.
+    told : Reals
+        One row a step: inputs, state and rate of the law at its end.
+    asked, answers : Reals
+        Rows of what the law reads, and of its commands.
+    tries, wanted : int
+        How often the inputs were put right in this step; rows to be answered.
+    """
+
+    outputs: int
+    inputs: int
+    states: int
+    clocks: int
+    commands: int
+    width: int
+    step: Runs
+    work: Reals
+    answer: Reals
+    writes: Wholes
+    base: Reals
+    u: Reals
+    last: Reals
+    trend: Reals
+    said: Reals
+    inverse: Reals
+    gap: Reals
+    before: Reals
+    change: Reals
+    felt: Reals
+    row: Reals
+    way: Reals
+    powers: Reals
+    origins: Reals
+    told: Reals
+    asked: Reals
+    answers: Reals
+    tries: int = 0
+    wanted: int = 0
+
+
+def no_answer() -> Answer:
+    """Return what there is without a continuous law."""
+    e, none = np.zeros(0), np.zeros(0, dtype=int)
+    return Answer(0, 0, 0, 0, 0, 0, (), e, e, none, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e)

@@ -1,0 +1,194 @@
+"""Generalised alpha in compiled loops: steps under a continuous law, whose inputs at the end follow from what is there.
+
+A step is solved under inputs that are guessed, the law is asked at its end, and the guess put right by Broyden's method
+(1965), which learns how the law answers, until what is still put right moves nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flexctrl.dynamics.march.answer import Answer
+from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
+from flexctrl.dynamics.march.step import step
+from flexctrl.kernels.eights import eight, larger, largest
+from flexctrl.model.flat.flat import clear, drive, load
+from flexctrl.model.gauges import read
+
+__all__ = ["commanded", "forget", "recite", "take"]
+
+_AFRESH, _MOST = 20, 40
+"""Tries until what has been learned of the law is forgotten, and until the step is given up."""
+
+
+def commanded(m: March) -> int:
+    """Solve a step under inputs that are at its end what the law says there."""
+    a = m.answer
+    if m.phase == FRESH and a.tries == 0:
+        foresee(m)
+    while True:
+        status = step(m)
+        if status == WANTS_TANGENT:
+            return status
+        if status == DONE:
+            reach(m)
+            if a.tries > 0 and moved(m) <= m.tolerance:
+                a.tries = 0
+                return DONE
+            status = asked(m)
+        if status != DONE or a.tries == _MOST:
+            a.tries = 0
+            forget(a)
+            return FAILED if status == DONE else status
+        if unlike(a) == 0.0:
+            a.tries = 0
+            return DONE
+        correct_inputs(m)
+
+
+def foresee(m: March) -> None:
+    """Guess the inputs and the law's state at the end of the step, and set the clocks of the law."""
+    a = m.answer
+    for i in range(a.inputs):
+        a.u[i] = a.last[i] + m.h * a.trend[i]
+    load(m.flat)
+    x = a.work[a.outputs :]
+    for i in range(a.states):
+        x[i] = x[a.states + i] + m.h * x[2 * a.states + i]
+    x[3 * a.states] = m.h
+    t = m.t + m.h
+    now = x[3 * a.states + 1 :]
+    for k in range(a.clocks):
+        s = t - a.origins[k]
+        value = 0.0
+        for j in range(a.width):
+            value = value * s + a.powers[a.width * k + j]
+        now[k] = value
+
+
+def asked(m: March) -> int:
+    """Ask the law at the end of the step; tell whether what it says are numbers."""
+    a = m.answer
+    if m.gauges.moving == 1 and m.swift != 1 and m.whole != 1:
+        drive(m.flat)
+    read(m.gauges, m.flat.z, a.work)
+    clear(a.commands + 2 * a.states, a.answer)
+    a.step[0](a.work, a.answer)
+    total = 0.0
+    for i in range(a.commands + 2 * a.states):
+        total += a.answer[i]
+    if not math.isfinite(total):
+        return FAILED
+    x = a.work[a.outputs :]
+    for i in range(a.states):
+        x[i] = a.answer[a.commands + i]
+    return DONE
+
+
+def unlike(a: Answer) -> float:
+    """Find by how much the law says others than the inputs in force; return the largest difference."""
+    for i in range(a.inputs):
+        a.said[i] = a.base[i]
+    for k in range(a.commands):
+        a.said[a.writes[k]] += a.answer[k]
+    most = 0.0
+    for k in range(a.commands):
+        a.gap[k] = a.said[a.writes[k]] - a.u[a.writes[k]]
+        most = max(most, abs(a.gap[k]))
+    return most
+
+
+def correct_inputs(m: March) -> None:
+    """Put the inputs right, and go on with the step from where it is."""
+    a = m.answer
+    if a.tries == _AFRESH:
+        forget(a)
+    elif a.tries > 0:
+        learn(a)
+    for k in range(a.commands):
+        a.before[k] = a.gap[k]
+        change = 0.0
+        for j in range(a.commands):
+            change += a.inverse[a.commands * k + j] * a.gap[j]
+        a.change[k] = change
+        a.u[a.writes[k]] += change
+    load(m.flat)
+    copy(m.flat.padded, m.flat.step, a.way)
+    m.phase = EVALUATE
+    m.iteration = 0
+    m.last = math.inf
+    m.contraction = 0.0
+    m.strayed = 0.0
+    m.short = 0.0
+    a.tries += 1
+
+
+def learn(a: Answer) -> None:
+    """Take the last change of the inputs and of the gap into account: by the least change of the inverse, H.
+
+    H is minus that of the gap's slope: H ← H + (c + H d) cᵀH / (−cᵀ H d), for a change c of inputs and d of the gap.
+    """
+    n = a.commands
+    share = 0.0
+    for i in range(n):
+        felt = 0.0
+        for j in range(n):
+            felt += a.inverse[n * i + j] * (a.gap[j] - a.before[j])
+        a.felt[i] = felt
+        share -= a.change[i] * felt
+    if not abs(share) > 1e-300:
+        return
+    for j in range(n):
+        back = 0.0
+        for i in range(n):
+            back += a.change[i] * a.inverse[n * i + j]
+        a.row[j] = back / share
+    for i in range(n):
+        for j in range(n):
+            a.inverse[n * i + j] += (a.change[i] + a.felt[i]) * a.row[j]
+
+
+def forget(a: Answer) -> None:
+    """Begin again as if what the law says did not depend on the inputs."""
+    for i in range(a.commands):
+        for j in range(a.commands):
+            a.inverse[a.commands * i + j] = 1.0 if i == j else 0.0
+
+
+def moved(m: March) -> float:
+    """Return how far the end of the step has moved since the inputs were put right."""
+    most = 0.0 * eight(m.weight)
+    for i in range(0, m.flat.padded, 8):
+        most = larger(most, abs(eight(m.flat.step[i:]) - eight(m.answer.way[i:])) * eight(m.weight[i:]))
+    return largest(most)
+
+
+def take(m: March) -> None:
+    """Go on to the end of the step, and write down inputs and the law's state there."""
+    a = m.answer
+    told = a.told[(a.inputs + 2 * a.states) * m.done :]
+    for i in range(a.inputs):
+        a.trend[i] = (a.u[i] - a.last[i]) / m.h
+        a.last[i] = a.u[i]
+        told[i] = a.u[i]
+    x = a.work[a.outputs :]
+    for i in range(a.states):
+        x[a.states + i] = x[i]
+        x[2 * a.states + i] = a.answer[a.commands + a.states + i]
+        told[a.inputs + i] = x[i]
+        told[a.inputs + a.states + i] = a.answer[a.commands + a.states + i]
+
+
+def recite(a: Answer) -> int:
+    """Ask the law at instants whose states are known."""
+    wide = a.outputs + 3 * a.states + 1 + a.clocks
+    for k in range(a.wanted):
+        asked_now = a.asked[wide * k :]
+        for i in range(wide):
+            a.work[i] = asked_now[i]
+        clear(a.commands + 2 * a.states, a.answer)
+        a.step[0](a.work, a.answer)
+        for i in range(a.commands):
+            a.answers[a.commands * k + i] = a.answer[i]
+    return 0
