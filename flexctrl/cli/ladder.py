@@ -35,7 +35,8 @@ def _data(study: Ladder) -> dict[str, object]:
         for r in study.rungs
     ]
     reference = {"setting": str(study.reference.setting), "agreement": study.reference.agreement}
-    return plain({"scene": study.name, "rungs": rungs, "gains": study.gains, "reference": reference})
+    climb = [rung.name for rung in study.climb]
+    return plain({"scene": study.name, "rungs": rungs, "gains": study.gains, "climb": climb, "reference": reference})
 
 
 __all__ = ["answer"]

@@ -36,7 +36,7 @@ def ladder_figure(ladder: Ladder) -> Figure:
 
 
 def rungs_chart(ax: Axes, ladder: Ladder) -> Axes:
-    """Draw the rungs in their order; within the grey band the reference knows no better.
+    """Draw the rungs, with a line through those worth standing on; within the grey band the reference knows no better.
 
     Parameters
     ----------
@@ -49,7 +49,8 @@ def rungs_chart(ax: Axes, ladder: Ladder) -> Axes:
     """
     ran = [r for r in ladder.rungs if np.isfinite(r.error)]
     times, errors = [r.time_ratio for r in ran], [max(r.error, _LEAST) for r in ran]
-    ax.plot(times, errors, color=PALE, linewidth=1.2, zorder=1)
+    climb = [(r.time_ratio, max(r.error, _LEAST)) for r in ladder.climb]
+    ax.plot(*zip(*climb, strict=True), color=PALE, linewidth=2.5, zorder=1)
     for rung, mark, colour, x, y in zip(ran, _MARKS, CYCLE, times, errors, strict=False):
         ax.plot(x, y, mark, color=colour, markersize=9, alpha=0.85, label=rung.name, zorder=2)
     ax.legend(fontsize="small", frameon=False)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Ladder", "Rung", "ladder", "rungs"]
 
 _REPEATS = 3
+_WORTH = 2.0
 _FINER = 4
 _COARSER = 4.0
 _NIMBLE = (Fidelity.RIGID, Fidelity.RIGID_WITH_SHAFTS, Fidelity.COMPONENT_MODES)
@@ -92,6 +93,19 @@ class Ladder:
         after = [next(filter(np.isfinite, times[i:]), np.inf) for i in range(1, len(times))]
         return tuple(b / a if np.isfinite(a) else np.inf for a, b in zip(times, after, strict=False))
 
+    @property
+    def climb(self) -> tuple[Rung, ...]:
+        """The rungs worth standing on, the cheapest first: each takes less than half the time of the next.
+
+        From the last one downwards: the most accurate of those at least twice as fast. A rung that is left out saves
+        too little, or another is as quick and nearer to the reference.
+        """
+        ran = [rung for rung in self.rungs if np.isfinite(rung.time_ratio)]
+        found = ran[-1:]
+        while cheaper := [r for r in ran if _WORTH * r.time_ratio <= found[0].time_ratio]:
+            found.insert(0, min(cheaper, key=lambda r: (r.error, r.time_ratio)))
+        return tuple(found)
+
     def plot(self) -> Figure:
         """Draw error against time, rung by rung.
 
@@ -113,6 +127,7 @@ class Ladder:
             told = f"{rung.freedoms:>8}  {rung.steps:>7}  {rung.error:9.2e}  {rung.time_ratio:8.3g}"
             beyond = f"  {f'{gain:.1f} ×':>10}" if np.isfinite(gain) else ""
             lines.append(f"{rung.name:<{wide}}  {told}{beyond}")
+        lines.append(f"worth standing on: {', '.join(rung.name for rung in self.climb) or 'none'}")
         return "\n".join([*lines, f"reference: {self.reference.setting}; known to {self.reference.uncertainty:.1e}"])
 
 

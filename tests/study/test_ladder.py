@@ -13,7 +13,8 @@ import flexctrl as fc
 from flexctrl.errors import StructureError
 from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
-from flexctrl.study.ladder import rungs
+from flexctrl.study.ladder import Ladder, Rung, rungs
+from flexctrl.study.settings import Fidelity, Setting
 from flexctrl.study.subject import prepared
 
 
@@ -35,6 +36,17 @@ def test_rungs_go_from_rigid_to_refined(scene, climbed):
     assert climbed["linear"].setting.method == fc.Exact(scene.law.sample_time)
     assert climbed["full"].setting.method == scene.simulation.method
     assert climbed["refined"].setting.method.step == 0.5 * scene.simulation.method.step
+
+
+def test_rungs_worth_standing_on():
+    """Each is twice as fast as the next at least, and none that is left out is better than the one chosen."""
+    times = {"rigid": (1.0, 1.0), "shafts": (1.1, 0.9), "linear": (0.9, 0.4), "modes": (5.0, 1e-2), "full": (8.0, 1e-3)}
+    setting = Setting(Fidelity.FULL, 1, fc.AdaptiveAlpha(), fc.Tolerance())
+    rungs = [Rung(name, setting, error, time, 1, 1) for name, (time, error) in times.items()]
+    failed = Rung("refined", setting, np.inf, np.inf, 0, 0, "it cannot be")
+    assert [r.name for r in Ladder("made up", (*rungs, failed), None).climb] == ["linear", "full"]
+    assert [r.name for r in Ladder("made up", tuple(rungs[:1]), None).climb] == ["rigid"]
+    assert Ladder("made up", (failed,), None).climb == ()
 
 
 def test_every_rung_has_its_own_freedoms():
