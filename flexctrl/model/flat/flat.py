@@ -212,8 +212,9 @@ def place(f: Flat) -> None:
     if f.linking > 0:
         for k in range(f.linking):
             clear(_POSE, f.z[NODE_SLOT * f.linked[k] :])
-    for k in range(f.placed):
-        f.placing[k](f.z, f.z)
+    if f.placed > 0:
+        for k in range(f.placed):
+            f.placing[k](f.z, f.z)
     if f.drives > 0:
         wind(f)
     for i in range(f.drives, f.drives + f.inner):
@@ -269,10 +270,11 @@ def drive(f: Flat) -> None:
     if f.linking > 0:
         for k in range(f.linking):
             clear(_POSE, f.z[NODE_SLOT * f.linked[k] + _POSE :])
-    for k in range(f.levers):
-        f.rating[k](f.z, f.z)
-    for k in range(f.levers):
-        f.changing[k](f.z, f.z)
+    if f.levers > 0:
+        for k in range(f.levers):
+            f.rating[k](f.z, f.z)
+        for k in range(f.levers):
+            f.changing[k](f.z, f.z)
 
 
 def six(x: Reals, y: Reals) -> None:
