@@ -130,6 +130,11 @@ class _Straight:
     ends: tuple[str, ...] = ()
 
     @property
+    def met(self) -> _Straight:
+        """Those that steps end at: none either."""
+        return self
+
+    @property
     def dust(self) -> np.ndarray:
         """Nothing."""
         return np.zeros(0)
