@@ -47,7 +47,7 @@ def test_ten_seconds(record, count):
         start=model.rest.with_(v=np.array([-1.0])),
         until=10.0,
         method=fc.ExplicitRungeKutta(),
-        tolerance=fc.Tolerance(0.0, 1e-10),
+        tolerance=fc.Tolerance(0.0, 1e-11),
     )
     record(
         f"D18 {count}-four-bar at 10 s: place and velocity of the first corner",
