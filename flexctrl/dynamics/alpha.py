@@ -15,7 +15,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.spectrum import told_damping
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Fixed, check_step
 from flexctrl.errors import StructureError
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.structure.freedoms import check_number, check_seconds
 
 __all__ = ["AdaptiveAlpha", "GeneralizedAlpha"]
@@ -85,7 +85,7 @@ class GeneralizedAlpha(_Damped):
     def pace(self) -> Fixed:
         return Fixed(self.step)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
         newton = min(1e-6, max(1e-3 * tolerance.absolute, _LAST))
         return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
 
@@ -127,7 +127,7 @@ class AdaptiveAlpha(_Damped):
     def pace(self) -> Controlled:
         return Controlled(self.first_step, self.largest_step, 3, self.most_steps)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> steps.Stepper[Any]:
         newton = min(_LEFTOVER, max(1e-3 * tolerance.absolute, _LAST))
         # steps too long for what has damping but no mass are seen to be by their error, if it sets out as it does
         return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton, sight=np.inf))

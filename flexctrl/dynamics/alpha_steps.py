@@ -24,7 +24,7 @@ from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
 from flexctrl.dynamics.steps import Counts, StepError
 from flexctrl.dynamics.stiff_lines import STIFF, SURE, Caution, firmest
 from flexctrl.errors import SingularMatrixError
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.solve import Plan, Solve, factorise, plan
 from flexctrl.model.state import State
 
@@ -51,7 +51,7 @@ class Stepper:
 
     Attributes
     ----------
-    model : Model
+    model : Plant
     feed : Feed
         Where the inputs come from.
     coefficients : Coefficients
@@ -61,7 +61,7 @@ class Stepper:
         Time constants of what has damping but no mass up to which a step sees how it sets out.
     """
 
-    model: Model
+    model: Plant
     feed: Feed
     coefficients: Coefficients
     tolerance: float

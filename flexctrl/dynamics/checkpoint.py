@@ -16,11 +16,10 @@ from zipfile import BadZipFile
 import numpy as np
 
 from flexctrl.dynamics.books import Sums
-from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Mark, Point
 from flexctrl.errors import StructureError
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
@@ -170,7 +169,7 @@ class Autosave:
         check_seconds(self.seconds, "seconds", "Autosave", endless=True)
 
 
-def machine_of(model: Model | LinearPlant) -> str:
+def machine_of(model: Plant) -> str:
     """Return a digest of a model: its names, its effects and its parts' numbers."""
     known = model.__dict__.get("_digest")
     if known is None:
@@ -178,15 +177,11 @@ def machine_of(model: Model | LinearPlant) -> str:
     return known
 
 
-def _digest(model: Model | LinearPlant) -> str:
+def _digest(model: Plant) -> str:
     digest = hashlib.sha256(repr((model.coordinates, model.inputs, model.outputs, model.effects)).encode())
-    for numbers in model.numbers if isinstance(model, LinearPlant) else _numbers(model):
+    for numbers in model.numbers:
         digest.update(np.ascontiguousarray(numbers).tobytes())
     return digest.hexdigest()
-
-
-def _numbers(model: Model) -> tuple[np.ndarray, ...]:
-    return (model.rest.x, *(f.parameters for f in model.forces.families))
 
 
 def _packed(value: Any, arrays: dict[str, np.ndarray]) -> Any:

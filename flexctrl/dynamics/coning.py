@@ -14,6 +14,7 @@ import numpy as np
 
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 
 __all__ = ["LARGEST", "Coning", "coning_of", "eta"]
 
@@ -48,18 +49,18 @@ class Coning:
         return turned
 
 
-def coning_of(model: Model) -> Coning:
+def coning_of(model: Plant) -> Coning:
     """Return the rotations of a model that turn all ways: three degrees of freedom of a node about space axes.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
 
     Returns
     -------
     Coning
     """
-    if not model.large:
+    if not (isinstance(model, Model) and model.large):
         return Coning(np.zeros((0, 3), dtype=int))
     motion = model.motion
     cells = np.delete(motion.place, [int(motion.nodes[i]) for i, _ in motion.linkage.lines], axis=0)[:, 3:]

@@ -18,6 +18,7 @@ from flexctrl.dynamics.scales import once, turning, yardsticks
 from flexctrl.dynamics.steps import Point
 from flexctrl.dynamics.watch import Crossing, Watch
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["crossings", "met", "offset"]
@@ -166,6 +167,6 @@ class _Along:
         return self.watch.value(state, self.supply(state).u, self.before.state, gauge)
 
 
-def _turns(model: Model) -> np.ndarray:
+def _turns(model: Plant) -> np.ndarray:
     """Return how far a unit of each degree of freedom turns what it turns [rad]; nothing turns in a linear model."""
     return turning(model) / yardsticks(model) if isinstance(model, Model) else np.zeros(model.n)

@@ -13,7 +13,7 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.local import Local
 from flexctrl.dynamics.steps import Point, Stepper
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["Booked", "Curve", "Dense", "Hermite", "Track", "curves_of"]
@@ -85,7 +85,7 @@ class Booked(Protocol):
         """Return the work of the inputs and what was dissipated [J]; None where that is to be integrated."""
 
 
-def curves_of(model: Model, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:
+def curves_of(model: Plant, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:
     """Return how the motion over a step of a stepper is found: its own way, or `Hermite`."""
     if isinstance(stepper, Dense):
         return stepper.curve

@@ -25,7 +25,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, Stepper, check_step
 from flexctrl.errors import StructureError
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["Exact", "ExactStepper", "ModalPoint"]
@@ -84,7 +84,7 @@ class Exact:
     def pace(self) -> Fixed:
         return Fixed(self.step)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper[Any]:
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> Stepper[Any]:
         if model.large:
             raise StructureError(
                 "Exact: this model moves far (LargeRotation), its equations are not linear; give linearize(model), a "
@@ -102,7 +102,7 @@ class Exact:
         return marched if can_march(model) and not feed.continuous else plain
 
 
-def _modal(model: Model, modes: int | None) -> tuple[ModalEquations, Propagator]:
+def _modal(model: Plant, modes: int | None) -> tuple[ModalEquations, Propagator]:
     """The modal form of a model and its exponentials, worked out once."""
     kept: dict[int | None, tuple[ModalEquations, Propagator]] = model.__dict__.setdefault("_modal", {})
     if modes not in kept:
@@ -130,7 +130,7 @@ class Slope(NamedTuple):
 class ExactStepper:
     """Steps of a modal form."""
 
-    model: Model
+    model: Plant
     feed: Feed
     tolerance: Tolerance
     modes: int | None = None

@@ -20,7 +20,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Pace, Point, StepError, check_step
 from flexctrl.errors import MechanismError, SingularMatrixError
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_number, check_seconds
 
@@ -85,7 +85,7 @@ class ExplicitRungeKutta:
             return Fixed(self.step)
         return Controlled(self.first_step, self.largest_step, _STEEPNESS, self.most_steps)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> _Stepper:
         return _Stepper(model, feed)
 
 
@@ -100,7 +100,7 @@ class _Point(Point):
 class _Stepper:
     """The unknowns of a step are the coordinates, the rates, and the controller's state, in one vector."""
 
-    model: Model
+    model: Plant
     feed: Feed
     counts: Counts = field(default_factory=Counts)
 

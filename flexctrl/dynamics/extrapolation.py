@@ -22,6 +22,7 @@ from flexctrl.dynamics.steps import Counts, Integrator, Joining, Pace, Point, St
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 
@@ -73,7 +74,7 @@ class Richardson:
     def pace(self) -> Pace:
         return self.method.pace
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> _Stepper:
         tight = replace(tolerance, absolute=min(tolerance.absolute, _TIGHT))
         coarse, fine = (self.method.stepper(model, feed, tight) for _ in range(2))
         return _Stepper(model, feed, coarse, fine, 1.0 / 3.0)
@@ -97,7 +98,7 @@ class _Point(Point):
 class _Stepper:
     """Two steppers side by side."""
 
-    model: Model
+    model: Plant
     feed: Feed
     coarse: Stepper[Any]
     fine: Stepper[Any]
@@ -200,14 +201,14 @@ class Difference:
 
     Attributes
     ----------
-    model : Model
+    model : Plant
     """
 
-    model: Model
+    model: Plant
 
     def __call__(self, one: State, other: State) -> np.ndarray:
         """Return the step from one state to the other, shape (n,)."""
-        if not self.model.large:
+        if not (isinstance(self.model, Model) and self.model.large):
             return other.q - one.q
         motion = self.model.motion
         turned = logarithm(other.R @ np.swapaxes(one.R, 1, 2))

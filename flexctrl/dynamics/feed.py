@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import FLOAT, Compiled
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -61,13 +61,13 @@ class Feed:
 
     Attributes
     ----------
-    model : Model
+    model : Plant
     base : numpy.ndarray, shape (inputs,)
         Constant inputs under the controller's.
     controller : Controller or None
     """
 
-    model: Model
+    model: Plant
     base: np.ndarray
     controller: Controller | None
 
@@ -287,7 +287,7 @@ def _trapezoidal(c: Controller, t: float, y: np.ndarray, before: Supply, h: floa
     return x
 
 
-def feed_of(model: Model, controller: Any, inputs: np.ndarray) -> Feed:
+def feed_of(model: Plant, controller: Any, inputs: np.ndarray) -> Feed:
     """Return the feed of a controller, or of constant inputs if there is none.
 
     Raises

@@ -12,7 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["LASTING", "SEEN", "SMALL", "STEPS", "lasts"]
@@ -24,7 +24,7 @@ LASTING = 56
 """Steps an impact is followed for: it takes π/ω, 38 of them, or stays."""
 
 
-def lasts(model: Model, before: State, beyond: State, u: np.ndarray, how: tuple[Tolerance, np.ndarray, float]) -> float:
+def lasts(model: Plant, before: State, beyond: State, u: np.ndarray, how: tuple[Tolerance, np.ndarray, float]) -> float:
     """Return steps that follow an impact at a corner, 1/(12 ω); infinity where steps of their own do, or nothing hits.
 
     ω² = v·ΔK v / v·M v with the stiffness ΔK that the corner has brought about: Rayleigh's quotient of the speeds that
@@ -33,7 +33,7 @@ def lasts(model: Model, before: State, beyond: State, u: np.ndarray, how: tuple[
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     before, beyond : State
         On both sides of the corner.
     u : numpy.ndarray

@@ -30,7 +30,7 @@ from flexctrl.dynamics.watch import Crossing, Watch
 from flexctrl.dynamics.watching import watched
 from flexctrl.errors import ControllerError
 from flexctrl.model.laws.friction_kinds import STUCK
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["Journey", "Plan"]
@@ -44,7 +44,7 @@ class Plan:
 
     Attributes
     ----------
-    model : Model
+    model : Plant
     feed : Feed
     method : Integrator
     tolerance : Tolerance
@@ -56,7 +56,7 @@ class Plan:
         Wall-clock time [s].
     """
 
-    model: Model
+    model: Plant
     feed: Feed
     method: Integrator
     tolerance: Tolerance

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.linear.model import LinearModel
+from flexctrl.model.mixed import Excess
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite
 
@@ -57,6 +58,10 @@ class _Flat:
         """There are no inner freedoms."""
         return {}
 
+    def counted(self, state: State) -> State:
+        """Return the state: nothing is wound up."""
+        return state
+
     def jacobian(self, state: State) -> sp.csr_matrix:
         """Return the identity."""
         return sp.identity(self.n, format="csr")
@@ -78,13 +83,8 @@ class _Flat:
 class _Signals:
     """What a run asks of signals: they are linear."""
 
-    loads: sp.csr_matrix
     places: sp.csr_matrix
     rates: sp.csr_matrix
-
-    def loads_at(self, state: State) -> sp.csr_matrix:
-        """Return forces of unit inputs."""
-        return self.loads
 
     def slopes(self, state: State, rates: np.ndarray, raw: int) -> tuple[sp.csr_matrix, sp.csr_matrix]:
         """Return the output's slopes on coordinates and on rates."""
@@ -97,9 +97,17 @@ class _Smooth:
 
     names: tuple[str, ...] = ()
 
+    def phases(self, state: State) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros(0)
+
     def sticks(self, state: State) -> bool:
         """Nothing sticks."""
         return False
+
+    def freed(self, state: State, force: sp.csr_matrix) -> sp.csr_matrix:
+        """Return the force: nothing holds against it."""
+        return force
 
     def still(self, state: State, motion: np.ndarray) -> np.ndarray:
         """Return the motion: nothing holds it."""
@@ -108,6 +116,10 @@ class _Smooth:
     def gaps(self, state: State, u: np.ndarray) -> np.ndarray:
         """Return nothing."""
         return np.zeros(0)
+
+    def gap(self, state: State, u: np.ndarray, contact: int) -> float:
+        """Return infinity: nothing switches."""
+        return np.inf
 
     def begin(self, state: State, u: np.ndarray) -> State:
         """Return the state."""
@@ -118,6 +130,14 @@ class _Smooth:
         return state
 
     def like(self, state: State, other: State) -> State:
+        """Return the state."""
+        return state
+
+    def after(self, state: State, u: np.ndarray, contact: int) -> State:
+        """Return the state."""
+        return state
+
+    def withheld(self, state: State, contact: int) -> State:
         """Return the state."""
         return state
 
@@ -195,11 +215,11 @@ class LinearPlant:
     @cached_property
     def signals(self) -> _Signals:
         linear = self.linear
-        return _Signals(sp.csr_matrix(linear.B), sp.csr_matrix(linear.Cq), sp.csr_matrix(linear.Cv))
+        return _Signals(sp.csr_matrix(linear.Cq), sp.csr_matrix(linear.Cv))
 
     @property
     def numbers(self) -> tuple[np.ndarray, ...]:
-        """All numbers of the model, to tell it from others."""
+        """What tells the model from others with the same names."""
         m = self.linear
         return (*(np.asarray(A.toarray()) for A in (m.M, m.C, m.K)), m.B, m.Cq, m.Cv, m.D)
 
@@ -221,13 +241,23 @@ class LinearPlant:
         """Return B u."""
         return self.linear.B @ u
 
+    def reach(self, state: State, u: np.ndarray) -> sp.csr_matrix:
+        """Return B."""
+        return sp.csr_matrix(self.linear.B)
+
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return −(M a + C v + K q)."""
         linear = self.linear
         return -(linear.M @ a + linear.C @ v + linear.K @ state.q)
 
     def slope(
-        self, state: State, v: np.ndarray, a: np.ndarray, seeds: tuple[float, float, float], u: np.ndarray
+        self,
+        state: State,
+        v: np.ndarray,
+        a: np.ndarray,
+        seeds: tuple[float, float, float],
+        u: np.ndarray,
+        excess: Excess | None = None,
     ) -> sp.csr_matrix:
         """Return −(s₀ K + s₁ C + s₂ M)."""
         linear = self.linear

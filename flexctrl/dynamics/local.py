@@ -11,6 +11,7 @@ from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.linkages.chart import Chart
 from flexctrl.model.linkages.charting import chart_of
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["Local"]
@@ -25,14 +26,14 @@ class Local:
 
     Attributes
     ----------
-    model : Model
+    model : Plant
     """
 
-    model: Model
+    model: Plant
 
     @cached_property
     def _chart(self) -> Chart | None:
-        return chart_of(self.model, self.model.rest) if self.model.large else None
+        return chart_of(self.model, self.model.rest) if isinstance(self.model, Model) and self.model.large else None
 
     @property
     def count(self) -> int:

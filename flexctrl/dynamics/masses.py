@@ -9,7 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.steps import Counts
 from flexctrl.errors import SingularMatrixError
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.solve import Plan, Solve, factorise, plan
 from flexctrl.model.state import State
 
@@ -25,14 +25,14 @@ class Masses:
 
     Attributes
     ----------
-    model : Model
+    model : Plant
     counts : Counts
         Factorisations are counted here.
     made_at : State or None
         Where the factors in use were made.
     """
 
-    model: Model
+    model: Plant
     counts: Counts
     made_at: State | None = None
     _solve: Solve | None = None

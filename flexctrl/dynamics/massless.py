@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.settling import dragged, quasistatic
 from flexctrl.errors import SingularMatrixError
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 
@@ -56,7 +56,7 @@ class Massless:
     damped: np.ndarray
 
     @property
-    def model(self) -> Model:
+    def model(self) -> Plant:
         """The model."""
         return self.feed.model
 

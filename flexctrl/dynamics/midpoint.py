@@ -27,8 +27,8 @@ from flexctrl.dynamics.settling import settled
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
 from flexctrl.dynamics.stiff_lines import STIFF, Caution, firmest
 from flexctrl.errors import SingularMatrixError, StructureError
-from flexctrl.model.model import Model
-from flexctrl.model.momenta import Momenta
+from flexctrl.model.momenta import momenta_of
+from flexctrl.model.plant import Plant
 from flexctrl.model.solve import Plan, Solve, factorise, plan
 from flexctrl.model.state import State
 
@@ -80,7 +80,7 @@ class ConservingMidpoint:
     def pace(self) -> Fixed:
         return Fixed(self.step)
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> _Stepper:
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> _Stepper:
         if model.motion.flows.size or model.switches.names:
             raise StructureError(
                 "ConservingMidpoint: has no rule for dry friction and motor lag; use AdaptiveAlpha, or leave them out"
@@ -117,7 +117,7 @@ class _Memory:
 class _Stepper:
     """Steps of one model; keeps factors while they are good."""
 
-    model: Model
+    model: Plant
     feed: Feed
     counts: Counts = field(default_factory=Counts)
     tangent: _Tangent | None = None
@@ -125,7 +125,7 @@ class _Stepper:
     _plan: Plan | None = None
 
     def __post_init__(self) -> None:
-        self.momenta = Momenta(self.model)
+        self.momenta = momenta_of(self.model)
         self.weight = 1.0 / yardsticks(self.model)
         self.turning = turning(self.model)
         self.masses = Masses(self.model, self.counts)

@@ -12,7 +12,7 @@ from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.linear.modal import ModalSystem, modal_system
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import FirstOrder, first_order
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 
 __all__ = ["ModalEquations", "closed", "opened"]
 
@@ -42,13 +42,13 @@ class ModalEquations:
     read: np.ndarray
 
 
-def opened(model: Model, modes: int | None = None) -> ModalEquations:
+def opened(model: Plant, modes: int | None = None) -> ModalEquations:
     """Return the modal form of a model that does not move far; the last input carries its constant loads, and where
     it rests.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     modes : int, optional
         Vibrations that are kept, the slowest ones, beside motion that is free or grows; those left out stay where
         the constant loads hold them. Default: all.

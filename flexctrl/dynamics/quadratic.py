@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from flexctrl.dynamics.modal_equations import ModalEquations
 from flexctrl.dynamics.propagator import response
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 
 __all__ = ["Turnover"]
 
@@ -27,11 +27,11 @@ class Turnover:
 
     Attributes
     ----------
-    model : Model
+    model : Plant
     equations : ModalEquations
     """
 
-    model: Model
+    model: Plant
     equations: ModalEquations
     _kept: dict[float, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 

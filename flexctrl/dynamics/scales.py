@@ -9,16 +9,17 @@ import scipy.sparse as sp
 
 from flexctrl.model import units
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 
 __all__ = ["components", "farthest", "largest", "output_yardsticks", "turning", "yardsticks"]
 
 
-def turning(model: Model) -> np.ndarray:
+def turning(model: Plant) -> np.ndarray:
     """Return which degrees of freedom are rotations, shape (n,)."""
     return once(model, units.turning)
 
 
-def yardsticks(model: Model) -> np.ndarray:
+def yardsticks(model: Plant) -> np.ndarray:
     """Return what an error of 1 is in each degree of freedom, shape (n,): a radian, or the size of the machine.
 
     A source angle counts as the motion it drives, or a motor's many turns would excuse any error of the machine;
@@ -27,16 +28,18 @@ def yardsticks(model: Model) -> np.ndarray:
     return once(model, _yardsticks)
 
 
-def _yardsticks(model: Model) -> np.ndarray:
+def _yardsticks(model: Plant) -> np.ndarray:
     return units.yardsticks(model, model.structure.size)
 
 
-def output_yardsticks(model: Model, time: float) -> np.ndarray:
+def output_yardsticks(model: Plant, time: float) -> np.ndarray:
     """Return how large each output is where every node and motor moves by a yardstick, within a time.
+
+    Coordinates of a linear model move by 1.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     time : float
         What rates are of [s].
 
@@ -44,16 +47,21 @@ def output_yardsticks(model: Model, time: float) -> np.ndarray:
     -------
     numpy.ndarray, shape (outputs,)
     """
+    raw = _raw_yardsticks(model) if isinstance(model, Model) else np.ones(model.motion.raw)
+    on_place, on_rates = model.signals.slopes(model.rest, np.zeros(raw.size), raw.size)
+    return abs(on_place) @ raw + abs(on_rates) @ raw / time
+
+
+def _raw_yardsticks(model: Model) -> np.ndarray:
     size, motion = model.structure.size, model.motion
     raw = np.ones(motion.raw)
     raw[: motion.source_base].reshape(-1, 6)[:, :3] = size
     gears = units.geared(model, size)
     raw[motion.source_base : motion.source_base + gears.size] = gears
-    on_place, on_rates = model.signals.slopes(model.rest, np.zeros(motion.raw), motion.raw)
-    return abs(on_place) @ raw + abs(on_rates) @ raw / time
+    return raw
 
 
-def components(model: Model) -> np.ndarray:
+def components(model: Plant) -> np.ndarray:
     """Return to which part of a machine each degree of freedom belongs, counted from 0, shape (n,).
 
     What elements, joints, ropes and drives connect is one part; what stands beside it, uncoupled, is another one.
@@ -61,7 +69,7 @@ def components(model: Model) -> np.ndarray:
     return once(model, _components)
 
 
-def _components(model: Model) -> np.ndarray:
+def _components(model: Plant) -> np.ndarray:
     if not isinstance(model, Model):  # coordinates of a linear model may be modes of one machine
         return np.zeros(model.n, dtype=int)
     motion, n = model.motion, model.n
@@ -84,7 +92,7 @@ def _joined(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
     return lead
 
 
-def farthest(model: Model, moved: np.ndarray) -> np.ndarray:
+def farthest(model: Plant, moved: np.ndarray) -> np.ndarray:
     """Return how far the freedom has moved that has moved most: what relative tolerances are relative to.
 
     In each part of a machine that is not coupled to others, that of the part; and a radian, or the size of the
@@ -92,7 +100,7 @@ def farthest(model: Model, moved: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     moved : numpy.ndarray, shape (n,)
         Largest distance of each degree of freedom from where it began.
 
@@ -126,7 +134,7 @@ def largest(correction: np.ndarray) -> tuple[float, int]:
     return float(sizes[worst]), worst
 
 
-def once(model: Model, found: Callable[[Model], np.ndarray]) -> np.ndarray:
+def once(model: Plant, found: Callable[[Plant], np.ndarray]) -> np.ndarray:
     """Return what is found of a model, kept with it."""
     kept = model.__dict__.setdefault("_scales", {})
     if found not in kept:

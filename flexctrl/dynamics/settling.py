@@ -14,6 +14,7 @@ from flexctrl.dynamics.scales import once, yardsticks
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.flows import flowing
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 
@@ -23,32 +24,32 @@ _EXACT = 1e-12
 _ITERATIONS = 25
 
 
-def quasistatic(model: Model) -> np.ndarray:
+def quasistatic(model: Plant) -> np.ndarray:
     """Return the degrees of freedom with stiffness but neither mass nor damping, shape (k,)."""
     return once(model, _quasistatic)
 
 
-def dragged(model: Model) -> np.ndarray:
+def dragged(model: Plant) -> np.ndarray:
     """Return the degrees of freedom with damping but no mass, shape (k,)."""
     return once(model, _dragged)
 
 
-def weightless(model: Model) -> np.ndarray:
+def weightless(model: Plant) -> np.ndarray:
     """Return the degrees of freedom that stiffness or damping holds without mass, shape (k,)."""
     return np.concatenate([quasistatic(model), dragged(model)])
 
 
-def _quasistatic(model: Model) -> np.ndarray:
+def _quasistatic(model: Plant) -> np.ndarray:
     stiffness, damping, light = once(model, _light)
     return np.flatnonzero((light > 0.0) & (damping == 0.0) & (stiffness > 0.0))
 
 
-def _dragged(model: Model) -> np.ndarray:
+def _dragged(model: Plant) -> np.ndarray:
     _, damping, light = once(model, _light)
     return np.flatnonzero((light > 0.0) & (damping > 0.0))
 
 
-def _light(model: Model) -> np.ndarray:
+def _light(model: Plant) -> np.ndarray:
     """Stiffness and damping of each degree of freedom, these zero where they are rounding, and whether it is light."""
     if not isinstance(model, Model) or model.switches.names:
         return np.zeros((3, 0))
@@ -61,13 +62,13 @@ def _light(model: Model) -> np.ndarray:
     return np.array([stiffness, damping, light])
 
 
-def _own(model: Model, seeds: tuple[float, float, float]) -> np.ndarray:
+def _own(model: Plant, seeds: tuple[float, float, float]) -> np.ndarray:
     """Size of each degree of freedom's own entry in a slope at rest."""
     zero, u = np.zeros(model.n), np.zeros(len(model.inputs))
     return np.abs(model.slope(model.rest, zero, zero, seeds, u).diagonal())
 
 
-def settled(model: Model, state: State, feed: Feed, supply: Supply) -> tuple[State, Supply]:
+def settled(model: Plant, state: State, feed: Feed, supply: Supply) -> tuple[State, Supply]:
     """Return a state with its quasi-static freedoms where they balance under the inputs, and the inputs there.
 
     Inputs of a continuous controller follow what it reads. The state is left as it is where it is balanced, or where
@@ -75,7 +76,7 @@ def settled(model: Model, state: State, feed: Feed, supply: Supply) -> tuple[Sta
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     state : State
     feed : Feed
     supply : Supply

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import HUGE
 
@@ -110,21 +111,23 @@ def simulate(
     if until < 1.0 / HUGE:
         raise StructureError(f"simulate: until = {until} s; expected {1.0 / HUGE:g} s at least: give a longer time")
     record = record or InMemory()
+    plant: Plant
     if isinstance(model, LinearModel):
         plant, method = _plant(model, method, every or until / _ROWS)
-        model = cast(Model, plant)
-    elif isinstance(start, State) and model.__dict__.get("_begun") is not start:
-        check_state(model, start, "simulate: start")
-        model.__dict__["_begun"] = start
-    feed = feed_of(model, controller, _base(model, start, inputs))
+    else:
+        plant = model
+        if isinstance(start, State) and model.__dict__.get("_begun") is not start:
+            check_state(model, start, "simulate: start")
+            model.__dict__["_begun"] = start
+    feed = feed_of(plant, controller, _base(plant, start, inputs))
     spacing = every if record.every is None else record.every
     tell = progress or _untold
     plan = Plan(
-        model, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, tell, autosave, time.perf_counter()
+        plant, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, tell, autosave, time.perf_counter()
     )
-    stepper = plan.method.stepper(model, feed, plan.tolerance)
-    curve = curves_of(model, stepper)
-    recorder = record.start((*model.outputs, *model.inputs), start.rows if isinstance(start, Checkpoint) else 0)
+    stepper = plan.method.stepper(plant, feed, plan.tolerance)
+    curve = curves_of(plant, stepper)
+    recorder = record.start((*plant.outputs, *plant.inputs), start.rows if isinstance(start, Checkpoint) else 0)
     try:
         rows = Rows(feed, spacing, until, recorder, curve)
         track = Track(feed, record.states, curve)
@@ -150,7 +153,7 @@ def _untold(share: float) -> None:
     return
 
 
-def _base(model: Model, start: State | Rest | Checkpoint | None, inputs: Mapping[str, float] | None) -> np.ndarray:
+def _base(model: Plant, start: State | Rest | Checkpoint | None, inputs: Mapping[str, float] | None) -> np.ndarray:
     if inputs is not None:
         return model.input_vector(inputs)
     if isinstance(start, Checkpoint):
@@ -188,7 +191,7 @@ def _begun(
     """A run from a state."""
     model, pace = plan.model, plan.method.pace
     state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
-    state = model.motion.counted(state) if isinstance(model, Model) else state
+    state = model.motion.counted(state)
     supply = plan.feed.first(state)
     state = model.switches.begin(state, supply.u)
     stops = Stops(plan.feed.sample_time, plan.feed.breaks)

@@ -15,7 +15,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
 
@@ -224,12 +224,12 @@ class Integrator(Protocol):
     @property
     def pace(self) -> Pace: ...
 
-    def stepper(self, model: Model, feed: Feed, tolerance: Tolerance) -> Stepper[Any]:
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> Stepper[Any]:
         """Return the steps of a model under a feed.
 
         Parameters
         ----------
-        model : Model
+        model : Plant
         feed : Feed
             Where the inputs come from.
         tolerance : Tolerance

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from flexctrl.dynamics.newton import small_enough
 from flexctrl.dynamics.scales import once
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.rounding import DIGITS
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope, Spring
@@ -62,12 +63,12 @@ class Caution:
         return False
 
 
-def firmest(model: Model) -> float:
+def firmest(model: Plant) -> float:
     """Return the highest frequency of a line against the masses at its ends [rad/s]; 0 where none turns.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
 
     Returns
     -------
@@ -76,10 +77,10 @@ def firmest(model: Model) -> float:
     return float(once(model, _frequencies).max(initial=0.0))
 
 
-def _frequencies(model: Model) -> np.ndarray:
+def _frequencies(model: Plant) -> np.ndarray:
     """Frequencies of the lines as drawn, each as if the others let go, shape (lines,)."""
     lines = _lines(model)
-    if not lines:
+    if not (lines and isinstance(model, Model)):
         return np.zeros(0)
     still = np.zeros(model.n)
     slope = model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs)))
@@ -90,7 +91,7 @@ def _frequencies(model: Model) -> np.ndarray:
     return np.sqrt(pulls.power(2) @ mobility * [_stiffness(line) for line in lines])
 
 
-def _lines(model: Model) -> tuple[Line, ...]:
+def _lines(model: Plant) -> tuple[Line, ...]:
     """What pulls along a line between two nodes and turns with it: nothing in small motion."""
     if not (isinstance(model, Model) and model.large):
         return ()
@@ -120,12 +121,12 @@ def _pulls(model: Model, lines: tuple[Line, ...]) -> sp.csr_matrix:
     return sp.csr_matrix((values, (rows, columns)), shape=(len(lines), model.motion.raw))
 
 
-def stiffest(model: Model) -> tuple[str, float]:
+def stiffest(model: Plant) -> tuple[str, float]:
     """Return the name and the stiffness [N/m] of the stiffest line; 0 for none.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
 
     Returns
     -------
@@ -134,12 +135,12 @@ def stiffest(model: Model) -> tuple[str, float]:
     return max(((p.name, _stiffness(p)) for p in _lines(model)), key=lambda found: found[1], default=("", 0.0))
 
 
-def noise(model: Model) -> float:
+def noise(model: Plant) -> float:
     """Return what force the last digits of places make in the stiffest line [N].
 
     Parameters
     ----------
-    model : Model
+    model : Plant
 
     Returns
     -------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["flow_rates", "flowing", "without"]
@@ -13,12 +13,12 @@ __all__ = ["flow_rates", "flowing", "without"]
 _SHARE = 1e-3
 
 
-def flowing(model: Model, state: State, u: np.ndarray) -> State:
+def flowing(model: Plant, state: State, u: np.ndarray) -> State:
     """Return a state with the rates that inner freedoms of first order have under its inputs.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     state : State
     u : numpy.ndarray, shape (inputs,)
 
@@ -38,12 +38,12 @@ def flowing(model: Model, state: State, u: np.ndarray) -> State:
     return state.with_(v=v)
 
 
-def flow_rates(model: Model, state: State, u: np.ndarray, step: float) -> np.ndarray:
+def flow_rates(model: Plant, state: State, u: np.ndarray, step: float) -> np.ndarray:
     """Return how fast these rates change while nothing else accelerates.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     state : State
         A `flowing` one.
     u : numpy.ndarray, shape (inputs,)

@@ -198,6 +198,11 @@ class Model:
         """Mass of each degree of freedom that is but rounding of the terms it is the sum of, at most, shape (n,)."""
         return self.forces.rounding((0.0, 0.0, 1.0))
 
+    @property
+    def numbers(self) -> tuple[np.ndarray, ...]:
+        """What tells the model from others with the same names and effects."""
+        return (self.rest.x, *(f.parameters for f in self.forces.families))
+
     def bends(self, part: Part | Drive) -> bool:
         """Tell whether some effect lets a part deform.
 

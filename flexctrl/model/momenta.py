@@ -23,19 +23,20 @@ from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, move
 from flexctrl.model.laws.part_kinds import BEAM, HEAVY_ROPE, ROPE, SPRING
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["Momenta"]
+__all__ = ["LinearMomenta", "Momenta", "momenta_of"]
 
 _LINES = (SPRING, ROPE, HEAVY_ROPE)
 
 
 @dataclass(frozen=True, eq=False)
 class Momenta:
-    """Momenta of the degrees of freedom, and the forces that change them.
+    """Momenta of the degrees of freedom of a model that may move far, and the forces that change them.
 
     Attributes
     ----------
@@ -60,8 +61,6 @@ class Momenta:
         momenta, change : numpy.ndarray, shape (n,)
         """
         model, v = self.model, state.v
-        if not model.large:
-            return self.of(state, v), model.balance(state, v, np.zeros(model.n)) + model.loads(state, u)
         motion, both = model.motion, self._raw(state, v, span)
         momenta, change = both[: motion.raw], both[motion.raw :]
         pushed = motion.collect(state, change + model.pushes(state, u))
@@ -73,10 +72,8 @@ class Momenta:
 
     def of(self, state: State, v: np.ndarray) -> np.ndarray:
         """Return the momenta of some rates in the place of a state, shape (n,)."""
-        model = self.model
-        if not model.large:
-            return model.balance(state, v, np.zeros(model.n)) - model.balance(state, v, v)
-        return model.motion.collect(state, self._raw(state, v)[: model.motion.raw])
+        motion = self.model.motion
+        return motion.collect(state, self._raw(state, v)[: motion.raw])
 
     def _raw(self, state: State, v: np.ndarray, span: float = 0.0) -> np.ndarray:
         forces = self.model.forces
@@ -95,7 +92,7 @@ class Momenta:
         span : float
             Its duration [s].
         """
-        if not (self.model.large and self._lines):
+        if not self._lines:
             return None
         forces, raw = self.model.forces, self.model.motion.raw
         z = np.append(forces.slots(middle, middle.v, np.zeros(self.model.n)), span)
@@ -133,6 +130,45 @@ class Momenta:
             kernel = _kernel_of(f.kernels.kind, f.kernels.effects)
             found.append(forces.backend.bind(kernel, self._gather(f), f.parameters, scatter))
         return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearMomenta:
+    """Momenta where masses are constant: M v; `Momenta` says what each method gives.
+
+    Attributes
+    ----------
+    model : Plant
+    """
+
+    model: Plant
+
+    def at(self, state: State, u: np.ndarray, span: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the momenta of a state and their rates of change."""
+        model, v = self.model, state.v
+        return self.of(state, v), model.balance(state, v, np.zeros(model.n)) + model.loads(state, u)
+
+    def of(self, state: State, v: np.ndarray) -> np.ndarray:
+        """Return the momenta of some rates."""
+        model = self.model
+        return model.balance(state, v, np.zeros(model.n)) - model.balance(state, v, v)
+
+    def excess(self, middle: State, span: float) -> None:
+        """Return None: lines keep their directions."""
+
+
+def momenta_of(model: Plant) -> Momenta | LinearMomenta:
+    """Return the momenta of a model.
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    Momenta or LinearMomenta
+    """
+    return Momenta(model) if isinstance(model, Model) and model.large else LinearMomenta(model)
 
 
 @cache

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from flexctrl.model.model import Model
+    from flexctrl.model.plant import Plant
 
 __all__ = ["TURNS", "geared", "turning", "units", "yardsticks"]
 
@@ -15,12 +15,12 @@ TURNS = ("_rx", "_ry", "_rz", "_turn")
 _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
 
 
-def turning(model: Model) -> np.ndarray:
+def turning(model: Plant) -> np.ndarray:
     """Return which degrees of freedom are rotations, shape (n,).
 
     Parameters
     ----------
-    model : Model
+    model : Plant
 
     Returns
     -------
@@ -30,7 +30,7 @@ def turning(model: Model) -> np.ndarray:
     return np.array([not name.endswith(other) for name in model.coordinates], dtype=bool)
 
 
-def yardsticks(model: Model, size: float) -> np.ndarray:
+def yardsticks(model: Plant, size: float) -> np.ndarray:
     """Return what an error of one is in each degree of freedom: a radian, or a size.
 
     A source angle counts as the motion it drives: its unit is what the motor turns by then. Inner freedoms of effects
@@ -38,7 +38,7 @@ def yardsticks(model: Model, size: float) -> np.ndarray:
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     size : float
         [m].
 
@@ -47,17 +47,17 @@ def yardsticks(model: Model, size: float) -> np.ndarray:
     numpy.ndarray, shape (n,)
     """
     gears = {f"{d.name}_source": gear for d, gear in zip(model.structure.drives, geared(model, size), strict=True)}
-    known = gears | model.motion.scales
+    known = gears | dict(model.motion.scales)
     pairs = zip(model.coordinates, turning(model), strict=True)
     return np.array([known.get(name, 1.0 if turns else size) for name, turns in pairs])
 
 
-def units(model: Model, size: float) -> np.ndarray:
+def units(model: Plant, size: float) -> np.ndarray:
     """Return what a displacement of one is in each degree of freedom; a size in those that have no yardstick.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     size : float
         [m].
 
@@ -69,12 +69,12 @@ def units(model: Model, size: float) -> np.ndarray:
     return np.where(np.isfinite(found), found, size)
 
 
-def geared(model: Model, size: float) -> np.ndarray:
+def geared(model: Plant, size: float) -> np.ndarray:
     """Return by how much each motor turns as what it drives turns by a radian or travels a size, shape (drives,).
 
     Parameters
     ----------
-    model : Model
+    model : Plant
     size : float
         [m].
 

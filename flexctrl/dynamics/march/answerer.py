@@ -15,7 +15,7 @@ from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.answering import recite
 from flexctrl.dynamics.march.calling import Remembered
 from flexctrl.dynamics.march.making import CAPACITY, Method
-from flexctrl.dynamics.march.marching import Marcher, Pacing
+from flexctrl.dynamics.march.marching import Marcher, Pacing, can_march
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.settling import weightless
@@ -254,6 +254,7 @@ class AnsweringStepper(MarchingStepper):
     def marcher(self) -> Answerer:
         """The model on a march."""
         p = self.plain
+        assert can_march(p.model)
         found = Answerer.of(p.model, Method(p.coefficients, p.tolerance, p.weight, p.turning))
         assert isinstance(found, Answerer)
         return found.listening(p.feed)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import can_be_flat
 from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["Marcher", "Pacing", "can_march"]
@@ -44,12 +45,12 @@ __all__ = ["Marcher", "Pacing", "can_march"]
 _SPARE = 2
 
 
-def can_march(model: Model) -> bool:
+def can_march(model: Plant) -> TypeGuard[Model]:
     """Tell whether a model can be marched through time in compiled loops.
 
     Parameters
     ----------
-    model : Model
+    model : Plant
 
     Returns
     -------

@@ -12,7 +12,7 @@ from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.calling import Remembered
 from flexctrl.dynamics.march.making import Method
-from flexctrl.dynamics.march.marching import Marcher
+from flexctrl.dynamics.march.marching import Marcher, can_march
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
@@ -53,6 +53,7 @@ class MarchingStepper:
     def marcher(self) -> Marcher:
         """The model on a march."""
         p = self.plain
+        assert can_march(p.model)
         return Marcher.of(p.model, Method(p.coefficients, p.tolerance, p.weight, p.turning))
 
     def done(self) -> None:

@@ -1,0 +1,186 @@
+"""What a run asks of what it runs: a model of a machine, or linear equations in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.model.mixed import Excess
+from flexctrl.model.state import State
+
+__all__ = ["Kinked", "Machine", "Moving", "Plant", "Signalled", "Switching"]
+
+
+class Machine(Protocol):
+    """A name, how large it is [m], and its drives."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def size(self) -> float: ...
+
+    @property
+    def drives(self) -> Sequence[Any]: ...
+
+
+class Moving(Protocol):
+    """How degrees of freedom move what forces act on; `Motion` says what each gives."""
+
+    @property
+    def raw(self) -> int: ...
+
+    @property
+    def inner(self) -> np.ndarray: ...
+
+    @property
+    def flows(self) -> np.ndarray: ...
+
+    @property
+    def settling(self) -> np.ndarray: ...
+
+    @property
+    def scales(self) -> Mapping[str, float]: ...
+
+    def counted(self, state: State) -> State: ...
+
+    def jacobian(self, state: State) -> sp.csr_matrix: ...
+
+    def dead_point(self, state: State) -> bool: ...
+
+    def turned_back(self, before: State, pull: np.ndarray, after: State, pulled: np.ndarray) -> bool: ...
+
+    def closure_error(self, state: State) -> float: ...
+
+
+class Signalled(Protocol):
+    """How outputs hang on places and rates; see `Signals`."""
+
+    def slopes(self, state: State, rates: np.ndarray, raw: int) -> tuple[sp.csr_matrix, sp.csr_matrix]: ...
+
+
+class Switching(Protocol):
+    """Laws of force that switch; `Switches` says what each gives."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    def phases(self, state: State) -> np.ndarray: ...
+
+    def sticks(self, state: State) -> bool: ...
+
+    def freed(self, state: State, force: sp.csr_matrix) -> sp.csr_matrix: ...
+
+    def still(self, state: State, motion: np.ndarray) -> np.ndarray: ...
+
+    def gaps(self, state: State, u: np.ndarray) -> np.ndarray: ...
+
+    def gap(self, state: State, u: np.ndarray, contact: int) -> float: ...
+
+    def begin(self, state: State, u: np.ndarray) -> State: ...
+
+    def under(self, state: State, u: np.ndarray) -> State: ...
+
+    def like(self, state: State, other: State) -> State: ...
+
+    def after(self, state: State, u: np.ndarray, contact: int) -> State: ...
+
+    def withheld(self, state: State, contact: int) -> State: ...
+
+
+class Kinked(Protocol):
+    """Corners in laws of force; `Kinks` says what each gives."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def ends(self) -> tuple[str, ...]: ...
+
+    @property
+    def dust(self) -> np.ndarray: ...
+
+    @property
+    def met(self) -> Kinked: ...
+
+    def values(self, state: State, before: State) -> np.ndarray: ...
+
+
+class Plant(Protocol):
+    """All that methods of integration, controllers, books and events ask; `Model` says what each gives."""
+
+    @property
+    def coordinates(self) -> tuple[str, ...]: ...
+
+    @property
+    def n(self) -> int: ...
+
+    @property
+    def inputs(self) -> tuple[str, ...]: ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]: ...
+
+    @property
+    def effects(self) -> tuple[Any, ...]: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+    @property
+    def large(self) -> bool: ...
+
+    @property
+    def rest(self) -> State: ...
+
+    @property
+    def dust(self) -> np.ndarray: ...
+
+    @property
+    def numbers(self) -> tuple[np.ndarray, ...]: ...
+
+    @property
+    def structure(self) -> Machine: ...
+
+    @property
+    def motion(self) -> Moving: ...
+
+    @property
+    def signals(self) -> Signalled: ...
+
+    @property
+    def switches(self) -> Switching: ...
+
+    @property
+    def kinks(self) -> Kinked: ...
+
+    def input_vector(self, inputs: Mapping[str, float]) -> np.ndarray: ...
+
+    def loads(self, state: State, u: np.ndarray) -> np.ndarray: ...
+
+    def reach(self, state: State, u: np.ndarray) -> sp.csr_matrix: ...
+
+    def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray: ...
+
+    def slope(
+        self,
+        state: State,
+        v: np.ndarray,
+        a: np.ndarray,
+        seeds: tuple[float, float, float],
+        u: np.ndarray,
+        excess: Excess | None = None,
+    ) -> sp.csr_matrix: ...
+
+    def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State: ...
+
+    def apart(self, state: State) -> str: ...
+
+    def rates(self, state: State) -> np.ndarray: ...
+
+    def measure(self, state: State) -> np.ndarray: ...
+
+    def energy(self, state: State) -> tuple[float, float, float]: ...
