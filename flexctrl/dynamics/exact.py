@@ -258,7 +258,7 @@ class ExactStepper:
 
     def _answer(self, point: ModalPoint, course: np.ndarray, share: float, h: float, z: np.ndarray) -> Supply:
         """What the controller answers there."""
-        return self.feed.evaluate(self.at(point, course, share, h), z)
+        return self.feed.within(self.at(point, course, share, h), z)
 
     def _check(self, point: ModalPoint, h: float, course: np.ndarray, f: np.ndarray) -> None:
         """Refuse a step over which the commands are not the polynomial through the nodes."""

@@ -147,7 +147,7 @@ class _Stepper:
     def _slope(self, point: _Point, y: np.ndarray, t: float, guess: np.ndarray) -> np.ndarray:
         xi, v, x = self._split(y)
         state = self.local.place(point.state, xi, v, t)
-        supply = self.feed.evaluate(state, x) if self.feed.continuous else point.supply
+        supply = self.feed.within(state, x) if self.feed.continuous else point.supply
         turned, swirl = self.local.rates(point.state, xi, state)
         rate = self.masses.accelerations(state, supply.u, guess)
         return np.concatenate([turned, rate + swirl, supply.rate[: x.size]])
@@ -187,7 +187,7 @@ class _Stepper:
         state = self.local.place(point.state, xi, v, t)
         if self.model.motion.dead_point(state):
             raise StepError(0, f"a loop of rigid parts is at a dead point at t = {t:.6g} s; let a part of it bend")
-        supply = self.feed.evaluate(state, x) if self.feed.continuous else point.supply
+        supply = self.feed.within(state, x) if self.feed.continuous else point.supply
         rate = self._split(K[-1])[1]
         if self.local.swirls:
             rate = rate - self.local.rates(point.state, xi, state)[1]

@@ -180,7 +180,7 @@ class _Stepper:
     def _supply(self, held: Supply, state: State, coarse: Point, fine: Point) -> Supply:
         if not self.feed.continuous:
             return held
-        return self.feed.evaluate(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
+        return self.feed.within(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
 
     def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the error that the step added to the finer run, over what is allowed."""

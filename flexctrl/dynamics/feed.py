@@ -176,7 +176,7 @@ class Feed:
         return self.evaluate(state, supply.x) if self.continuous else supply
 
     def evaluate(self, state: State, x: np.ndarray) -> Supply:
-        """Return the inputs that a continuous controller in state x gives."""
+        """Return the inputs that a continuous controller in state x gives from now on."""
         assert self.controller is not None
         return self._answered(state.t, self.measured(state), x)
 
@@ -192,6 +192,10 @@ class Feed:
         except Exception as error:
             raise _blamed(error)  # noqa: B904 - its cause is set
 
+    def within(self, state: State, x: np.ndarray) -> Supply:
+        """Return these inputs within a step or at its end: one that ends where the command jumps does not feel it."""
+        return self.evaluate(state.with_(t=self._short_of_break(state.t)), x)
+
     def between(self, before: Supply, after: Supply, share: tuple[float, float], state: State) -> Supply:
         """Return the inputs within a step: ``share`` of it done, and its length; the state there."""
         if not self.continuous:
@@ -200,7 +204,7 @@ class Feed:
         first, last = h * before.rate, h * after.rate
         step = after.x - before.x
         x = before.x + s * (first + s * (3.0 * step - 2.0 * first - last + s * (first + last - 2.0 * step)))
-        return self.evaluate(state, x)
+        return self.within(state, x)
 
     def _total(self, command: Any) -> list[float]:
         u = self._base.copy()

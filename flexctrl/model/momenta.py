@@ -153,8 +153,9 @@ class LinearMomenta:
         model = self.model
         return model.balance(state, v, np.zeros(model.n)) - model.balance(state, v, v)
 
-    def excess(self, middle: State, span: float) -> None:
+    def excess(self, middle: State, span: float) -> Excess | None:
         """Return None: lines keep their directions."""
+        return None
 
 
 def momenta_of(model: Plant) -> Momenta | LinearMomenta:
