@@ -197,13 +197,14 @@ class Stepper:
             self._plan = plan(matrix)
         return factorise(matrix, self._plan)
 
-    def error(self, before: AlphaPoint, after: AlphaPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
-        """Return the local error of a step over what is allowed: |β − 1/6| h² |Δa| (Zienkiewicz & Xie 1991)."""
-        h = after.state.t - before.state.t
-        c = self.coefficients
-        local = abs(c.beta - 1.0 / 6.0) * h * h * np.abs(after.algorithmic - before.algorithmic) * self.weight
+    def error(self, before: AlphaPoint, after: AlphaPoint, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
+        """Return the local error of a step over what is allowed: |β − 1/6| h² |Δa| (Zienkiewicz & Xie 1991).
+
+        In the order of the compiled loops: whether a step is one of them must make no difference to the next one.
+        """
+        change = np.abs(after.algorithmic - before.algorithmic) * self.weight
         allowed = tolerance.of(farthest(self.model, moved))
-        return float((local / allowed).max(initial=0.0))
+        return abs(self.coefficients.beta - 1.0 / 6.0) * h * h * float((change / allowed).max(initial=0.0))
 
 
 def _lean(change: np.ndarray, before: np.ndarray) -> float:

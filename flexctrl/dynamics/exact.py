@@ -271,7 +271,7 @@ class ExactStepper:
         if not worst <= self.tolerance.absolute:
             raise StepError(0, f"commands change too fast for a step of {h:.3g} s at t = {point.state.t:.6g} s")
 
-    def error(self, before: ModalPoint, after: ModalPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
+    def error(self, before: ModalPoint, after: ModalPoint, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Steps are of one length; what is not exact is refused."""
         return 0.0
 

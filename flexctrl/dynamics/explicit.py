@@ -193,9 +193,9 @@ class _Stepper:
             rate = rate - self.local.rates(point.state, xi, state)[1]
         return _Point(state, rate, supply, K)
 
-    def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
+    def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error over what is allowed; errors of rates count over the step."""
-        h, n, c = after.state.t - before.state.t, self.model.n, self.local.count
+        n, c = self.model.n, self.local.count
         K, table = after.slopes, self.table
         high, low = table.E5 @ K, table.E3 @ K
         weight = self.weight / tolerance.of(farthest(self.model, moved))

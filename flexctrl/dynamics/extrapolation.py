@@ -182,7 +182,7 @@ class _Stepper:
             return held
         return self.feed.within(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
 
-    def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
+    def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the error that the step added to the finer run, over what is allowed."""
         local = self.weight * np.abs(after.gap - before.gap) * self.yard
         allowed = tolerance.of(farthest(self.model, moved))

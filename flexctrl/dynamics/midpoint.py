@@ -294,7 +294,7 @@ class _Stepper:
         self.counts.factorisations += 1
         self.tangent = at
 
-    def error(self, before: _Point, after: _Point, moved: np.ndarray, tolerance: Tolerance) -> float:
+    def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Steps are of one length; nothing is estimated."""
         return 0.0
 

@@ -87,7 +87,7 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
             mark.rejected += 1
             size = h = 0.25 * h
             continue
-        error = journey.stepper.error(journey.point, after, journey.books.sums.moved, journey.plan.tolerance)
+        error = journey.stepper.error(journey.point, after, h, journey.books.sums.moved, journey.plan.tolerance)
         factor = 0.9 * max(error, 1e-9) ** (-1.0 / pace.steepness)
         if error <= 1.0:
             return after, h, size, factor

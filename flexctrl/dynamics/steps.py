@@ -177,8 +177,11 @@ class Stepper(Protocol[P]):
             If it does not converge.
         """
 
-    def error(self, before: P, after: P, moved: np.ndarray, tolerance: Tolerance) -> float:
-        """Return the local error of the step just taken over what is allowed; ``moved`` is the reach so far (n,)."""
+    def error(self, before: P, after: P, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
+        """Return the local error of the step just taken over what is allowed.
+
+        ``h`` is its length, which times differ by but for round-off; ``moved`` is the reach so far (n,).
+        """
 
 
 @runtime_checkable

@@ -20,27 +20,28 @@ def growth(error: float) -> float:
 
 
 def judge(m: March) -> None:
-    """Work out the error: by how much the method's own acceleration changes."""
+    """Work out what errors go by: how much the method's own acceleration changes."""
     f = m.flat
     local = 0.0 * eight(m.weight)
     for i in range(0, f.padded, 8):
         own = eight(m.algorithmic[i:])
         lead = blended(m, eight(f.rate[i:]), eight(m.rate[i:]), own)
         local = larger(local, abs(lead - own) * eight(m.weight[i:]))
-    m.error = abs(m.beta - 1.0 / 6.0) * m.h * m.h * largest(local)
+    m.error = largest(local)
 
 
 def compared(m: March) -> float:
     """Return the error over what is allowed: in every part of the machine by how far that has been."""
+    scale = abs(m.beta - 1.0 / 6.0) * m.h * m.h
     if m.parts == 1:
-        return m.error / (m.absolute + m.relative * m.reached)
+        return scale * (m.error / (m.absolute + m.relative * m.reached))
     f = m.flat
     worst = 0.0
     for i in range(f.n):
         rate = (1.0 - m.alpha_f) * f.rate[i] + m.alpha_f * m.rate[i] - m.alpha_m * m.algorithmic[i]
         local = abs(rate * (1.0 / (1.0 - m.alpha_m)) - m.algorithmic[i]) * m.weight[i]
         worst = max(worst, local / (m.absolute + m.relative * m.farthest[m.part[i]]))
-    return abs(m.beta - 1.0 / 6.0) * m.h * m.h * worst
+    return scale * worst
 
 
 def follow(m: March) -> None:

@@ -117,7 +117,7 @@ class LeapingStepper(MarchingStepper):
         """Return the point a step later."""
         return self.plain.step(point, h)
 
-    def error(self, before: Any, after: Any, moved: np.ndarray, tolerance: Any) -> float:
+    def error(self, before: Any, after: Any, h: float, moved: np.ndarray, tolerance: Any) -> float:
         """Steps are of one length."""
         return 0.0
 

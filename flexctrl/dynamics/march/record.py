@@ -161,7 +161,7 @@ class March:
     least, loosest, share : float
         Newton's tolerance: a share of the method's own error, within these bounds.
     tolerance, error : float
-        That tolerance; the method's error in the last step (see `Stepper.error`).
+        That tolerance; by how much the method's own acceleration has changed over the last step.
     h, t : float
         Step; time.
     size, largest, stop, until : float

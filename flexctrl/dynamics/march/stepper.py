@@ -125,9 +125,9 @@ class MarchingStepper:
         self.count()
         return self.leave(point.supply) if done else self.plain.step(point, h)
 
-    def error(self, before: AlphaPoint, after: AlphaPoint, moved: np.ndarray, tolerance: Tolerance) -> float:
+    def error(self, before: AlphaPoint, after: AlphaPoint, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error of the step just taken over what is allowed."""
-        return self.plain.error(before, after, moved, tolerance)
+        return self.plain.error(before, after, h, moved, tolerance)
 
     def enter(self, point: AlphaPoint) -> None:
         """Put the march at a point, unless it is there."""
