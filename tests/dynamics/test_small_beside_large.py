@@ -1,0 +1,40 @@
+"""What moves little beside what it is coupled to: its errors are relative to that, and a note says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import flexctrl as fc
+
+
+def hoisted(sway, until, tolerance=None):
+    """A load hoisted at 1 m/s from 10 m by a motor too heavy to be slowed: its sway, and that of its equation."""
+    at = (10.0 * np.sin(sway), 0.0, -10.0 * np.cos(sway))
+    trolley, load = fc.PointMass("trolley", (0, 0, 0), 1.0), fc.PointMass("load", at, 1.0)
+    winch = fc.Winch("winch", load.node, trolley.node, EA=1e7, radius=1.0, inertia=1e4)
+    held = [fc.Support(trolley.node), fc.Support(load.node, "v")]
+    outputs = [fc.SwayAngle("sway", trolley.node, load.node, "x")]
+    structure = fc.Structure([trolley, load], held, [winch], [fc.MotorTorque("torque", winch)], outputs)
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity()])
+    start = fc.project(model, model.rest, {load.node: (-np.sin(sway), 0.0, np.cos(sway))}).state
+    run = fc.simulate(model, until=until, start=start, tolerance=tolerance, inputs={"torque": -9.81})
+
+    def slope(t, y):
+        return [y[1], (2.0 * y[1] - 9.81 * np.sin(y[0])) / (10.0 - t)]
+
+    return run, solve_ivp(slope, (0.0, until), [sway, 0.0], method="DOP853", rtol=1e-11, atol=1e-13).y[0, -1]
+
+
+@pytest.mark.parametrize("until", [9.0, 9.9])
+def test_a_sway_that_the_tolerance_does_not_tell_from_errors_is_named(until):
+    run, exact = hoisted(1e-3, until)
+    assert abs(run["sway"][-1] - exact) > 1e-3
+    assert any(note.startswith("sway has moved by") and "give a smaller one" in note for note in run.report.notes)
+
+
+def test_nothing_is_said_where_it_is_right():
+    run, exact = hoisted(0.05, 9.0, fc.Tolerance(1e-6, 1e-9))
+    assert run["sway"][-1] == pytest.approx(exact, abs=1e-3)
+    assert not run.report.notes
