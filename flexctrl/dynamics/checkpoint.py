@@ -17,14 +17,14 @@ import numpy as np
 
 from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.steps import Counts, Mark, Point
+from flexctrl.dynamics.steps import Counts, Mark, Pace, Point
 from flexctrl.errors import StructureError
 from flexctrl.model.plant import Plant
 from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
 
-_FORMAT = 6
+_FORMAT = 7
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
@@ -41,6 +41,8 @@ class Checkpoint:
         Digest of the model it belongs to.
     method : str
         The method, as text.
+    pace : Fixed or Controlled
+        How long its steps are.
     tolerance : Tolerance
         That of the run.
     base : numpy.ndarray, shape (inputs,)
@@ -74,6 +76,7 @@ class Checkpoint:
 
     machine: str
     method: str
+    pace: Pace
     tolerance: Tolerance
     base: np.ndarray
     point: Point

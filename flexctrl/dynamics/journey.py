@@ -233,6 +233,7 @@ class Journey:
         return Checkpoint(
             machine_of(self.plan.model),
             repr(self.plan.method),
+            self.plan.method.pace,
             self.plan.tolerance,
             self.plan.feed.base,
             self.point,

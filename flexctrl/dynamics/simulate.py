@@ -76,7 +76,7 @@ def simulate(
         Constant inputs, applied as a step at the start; a controller's commands add to them.
     method : Integrator, optional
         Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``; for a linear model `Exact`, with a state at
-        every row.
+        every row, or at the steps of the run that it goes on from.
     tolerance : Tolerance, optional
         For error-controlled methods.
     every : float, optional
@@ -115,7 +115,7 @@ def simulate(
     record = record or InMemory()
     plant: Plant
     if isinstance(model, LinearModel):
-        plant, method = _plant(model, method, every or until / _ROWS)
+        plant, method = _plant(model, method, _spacing(start, every, until))
     else:
         plant = model
         if isinstance(start, State) and model.__dict__.get("_begun") is not start:
@@ -148,6 +148,13 @@ def _plant(linear: LinearModel, method: Integrator | None, step: float) -> tuple
     if linear.D.any() and not isinstance(method, Exact):
         raise StructureError(f"simulate: an output of {linear.name} feels inputs at once (D ≠ 0); use the method Exact")
     return LinearPlant(linear), method
+
+
+def _spacing(start: State | Rest | Checkpoint | None, every: float | None, until: float) -> float:
+    """The step of the default method of linear models: a run that goes on keeps its own."""
+    if isinstance(start, Checkpoint) and isinstance(start.pace, Fixed):
+        return start.pace.step
+    return every or until / _ROWS
 
 
 def _untold(share: float) -> None:

@@ -150,3 +150,12 @@ def test_every_method_runs_it_under_every_controller(name, method):
     assert rest.report.energy == once.report.energy
     assert [e.t for e in once.events] == [e.t for e in (*half.events, *rest.events)]
     assert len(once.events) == 1
+
+
+def test_a_run_of_the_default_method_goes_on_to_another_end(tmp_path):
+    half = fc.simulate(chain(), until=0.5, inputs={"push": PUSH})
+    half.checkpoint.save(tmp_path / "half")
+    rest = fc.simulate(chain(), until=1.0, start=fc.load_checkpoint(tmp_path / "half"))
+    whole = fc.simulate(chain(), until=1.0, inputs={"push": PUSH}, method=fc.Exact(0.5 / 1000))
+    assert rest.report.steps == 2000
+    assert np.array_equal(rest.final.q, whole.final.q)
