@@ -153,6 +153,8 @@ class OpenLoop(Stateless):
 
     def __post_init__(self) -> None:
         _check_functions(self.commands, "OpenLoop")
+        if self.sample_time:
+            _check_grids(self.commands, self.sample_time)
 
     @cached_property
     def _signals(self) -> tuple[Signal, ...]:
@@ -185,7 +187,6 @@ class OpenLoop(Stateless):
         -------
         OpenLoop
         """
-        _check_grids(self.commands, sample_time)
         return OpenLoop(self.commands, sample_time)
 
 

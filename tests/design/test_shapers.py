@@ -293,6 +293,8 @@ def test_a_coarsely_sampled_shaped_command_warns():
         Sampled(law, 0.1)
     with pytest.warns(CoarseGridWarning):
         Sampled(OpenLoop({"torque": shaped.derivative}), 0.1)
+    with pytest.warns(CoarseGridWarning):
+        OpenLoop({"torque": shaped}, 0.1)
 
 
 def test_a_fine_grid_does_not_warn(recwarn):
