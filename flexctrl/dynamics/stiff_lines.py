@@ -27,6 +27,8 @@ STIFF = 10.0
 SURE = 1e-11
 """Size of the last correction of steps over such lines."""
 
+_HEAVY = 3e7
+
 TURNING, SHORT = 0.5, 1.0 / 64.0
 """Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
 shortened by that share from then on."""
@@ -66,6 +68,8 @@ class Caution:
 def firmest(model: Plant) -> float:
     """Return the highest frequency of a line against the masses at its ends [rad/s]; 0 where none turns.
 
+    Infinite where a rigid rope hangs from a motor beside whose inertia its load is nothing.
+
     Parameters
     ----------
     model : Plant
@@ -74,7 +78,25 @@ def firmest(model: Plant) -> float:
     -------
     float
     """
-    return float(once(model, _frequencies).max(initial=0.0))
+    return float(max(once(model, _frequencies).max(initial=0.0), once(model, _heavy).max(initial=0.0)))
+
+
+def _heavy(model: Plant) -> np.ndarray:
+    """Infinite for each winch with a rigid rope like a wall to its load, zero for others, shape (winches,)."""
+    if not (isinstance(model, Model) and model.large):
+        return np.zeros(0)
+    winches = [d for d in model.structure.drives if isinstance(d, Winch) and not model.bends(d)]
+    if not winches:
+        return np.zeros(0)
+    still = np.zeros(model.n)
+    mass = -model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs)))
+    moves, found = sp.csr_matrix(model.motion.jacobian(model.rest)), []
+    for winch in winches:
+        first = 6 * model.structure.number(winch.node)
+        own = np.unique(moves[first : first + 3].indices)
+        spread = np.linalg.eigvalsh(mass[own][:, own].toarray()) if own.size else np.ones(1)
+        found.append(np.inf if spread[-1] > _HEAVY * max(spread[0], 0.0) else 0.0)
+    return np.array(found)
 
 
 def _frequencies(model: Plant) -> np.ndarray:
