@@ -95,7 +95,8 @@ def certify(
     if slope < _SLOPE:
         raise LinearizationError(
             f"linearize: the forces have no derivative here (Taylor slope {slope:.2f}, 2 expected): on one side of "
-            "this place they are others than on the other. Linearise beside it"
+            "this place they are others than on the other. Linearise beside it; if what is next to such a corner is a "
+            "taut line so stiff that its load hardly stretches it, make that softer, or rigid"
         )
     even, gap = symmetric(linear.K)
     linear = linear if gap == 0.0 else replace(linear, K=even)

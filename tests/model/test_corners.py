@@ -79,3 +79,12 @@ def test_the_taylor_remainder_sees_a_corner_from_either_side(seed):
             K = sp.csc_matrix(K + np.eye(6))
             slope = taylor_slope(lambda d, side=side: -max(side @ d, 0.0) * side - d, K, np.ones(6))
             assert slope == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("EA", [1e12, 1e13])
+def test_a_taut_rope_too_stiff_for_the_digits_of_places_is_named_as_such(EA):
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -1), EA=EA)
+    load = fc.PointMass("load", rope.end, 1.0)
+    structure = fc.Structure([rope, load], [fc.Support(rope.start), fc.Pin(rope.end, load.node)])
+    with pytest.raises(LinearizationError, match=r"so stiff that .* make (it|that) softer, or rigid"):
+        fc.linearize(fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.RopeStretch()]))

@@ -287,7 +287,10 @@ class Kinks:
             return self.ends[corner] + "; pay some out"
         if name in self._loose:
             return f"{name} stands exactly on a flank of its gap; load it, or move it off the flank"
-        return f"{name} is exactly at its natural length; prestress it, or hold it slack or taut"
+        return (
+            f"{name} is exactly at its natural length; prestress it, or hold it slack or taut (if it is taut, but so "
+            "stiff that the last digits of places do not show by how much it is stretched: make it softer, or rigid)"
+        )
 
 
 def _down(d: Winch) -> str:
