@@ -98,11 +98,12 @@ class Ladder:
         """The rungs worth standing on, the cheapest first: each takes less than half the time of the next.
 
         From the last one downwards: the most accurate of those at least twice as fast. A rung that is left out saves
-        too little, or another is as quick and nearer to the reference.
+        too little, or another is as quick and nearer to the reference, or it is no nearer to that than no motion at
+        all.
         """
         ran = [rung for rung in self.rungs if np.isfinite(rung.time_ratio)]
-        found = ran[-1:]
-        while cheaper := [r for r in ran if _WORTH * r.time_ratio <= found[0].time_ratio]:
+        found, near = ran[-1:], [rung for rung in ran if rung.error < 1.0]
+        while cheaper := [r for r in near if _WORTH * r.time_ratio <= found[0].time_ratio]:
             found.insert(0, min(cheaper, key=lambda r: (r.error, r.time_ratio)))
         return tuple(found)
 
@@ -135,7 +136,8 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     """Return the rungs that a scene has, by name, from the least physics to the most.
 
     Rungs are run as the scene is, but for the linear one, which is integrated exactly (of a scene that begins as drawn,
-    from there too, to first order about the equilibrium), and the refined one: four times the elements and half the
+    from there too, to first order about the equilibrium; under a continuous law it is run as the scene is), and the
+    refined one: four times the elements and half the
     steps. Where steps are controlled, these follow from an eighth of the tolerance, and none is longer than half a
     sample of the controller. Where they are not, rigid parts and component modes, which leave out what moves fast, take
     one step for four, none longer than a sample.
@@ -150,7 +152,8 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     """
     method, tolerance = scene.simulation.method or AdaptiveAlpha(), scene.simulation.tolerance
     found = [(s.fidelity.value, s) for s in sweep(scene, meshes=(1,), methods=[(method, tolerance)])]
-    exact = Exact(spacing_of(scene))
+    follows = scene.law is not None and not scene.law.sample_time
+    exact = method if follows else Exact(spacing_of(scene))
     fewest = dict(reversed(found))  # component modes of the lowest order
     ways = {Fidelity.LINEAR: exact} | dict.fromkeys(_NIMBLE, _coarser(scene, method))
     named = [(n, replace(s, method=ways.get(s.fidelity, method))) for n, s in reversed(fewest.items())]

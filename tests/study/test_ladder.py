@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 from scenes import TROLLEY
@@ -40,7 +41,14 @@ def test_rungs_go_from_rigid_to_refined(scene, climbed):
 
 def test_rungs_worth_standing_on():
     """Each is twice as fast as the next at least, and none that is left out is better than the one chosen."""
-    times = {"rigid": (1.0, 1.0), "shafts": (1.1, 0.9), "linear": (0.9, 0.4), "modes": (5.0, 1e-2), "full": (8.0, 1e-3)}
+    times = {
+        "rigid": (1.0, 1.0),
+        "shafts": (1.1, 0.9),
+        "linear": (0.9, 0.4),
+        "off": (0.2, 1.7),
+        "modes": (5.0, 1e-2),
+        "full": (8.0, 1e-3),
+    }
     setting = Setting(Fidelity.FULL, 1, fc.AdaptiveAlpha(), fc.Tolerance())
     rungs = [Rung(name, setting, error, time, 1, 1) for name, (time, error) in times.items()]
     failed = Rung("refined", setting, np.inf, np.inf, 0, 0, "it cannot be")
@@ -176,3 +184,10 @@ def test_small_motion_begins_as_drawn_too():
     assert linear["z"] == pytest.approx(-1.0 - 0.5 * fall * (1.0 - np.cos(np.sqrt(200.0) * linear.t)), abs=1e-9)
     entries = {entry.name: entry for entry in fc.ledger(scene, 0.05).entries}
     assert entries["large_rotation"].change.outputs["z"] < 1e-3
+
+
+def test_under_a_continuous_law_the_linear_rung_is_run_as_the_scene_is(scene):
+    """`Exact` would have to find commands that change within its steps, and is not marched then."""
+    law = control.ss([], [], [], [[-50.0]], inputs=["travel"], outputs=["push"])
+    smooth = scene.with_(controller=law)
+    assert dict(rungs(smooth))["linear"].method == scene.simulation.method

@@ -42,8 +42,10 @@ class Answer:
         One row a step: inputs, state and rate of the law at its end.
     asked, answers : Reals
         Rows of what the law reads, and of its commands.
-    tries, wanted : int
-        How often the inputs were put right in this step; rows to be answered.
+    tries, still, wanted : int
+        How often the inputs were put right in this step, how often that moved nothing; rows to be answered.
+    most : float
+        The largest gap.
     """
 
     outputs: int
@@ -74,7 +76,9 @@ class Answer:
     asked: Reals
     answers: Reals
     tries: int = 0
+    still: int = 0
     wanted: int = 0
+    most: float = 0.0
 
 
 def no_answer() -> Answer:

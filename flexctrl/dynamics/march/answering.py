@@ -18,8 +18,8 @@ from flexctrl.model.gauges import read
 
 __all__ = ["commanded", "forget", "recite", "take"]
 
-_AFRESH, _MOST = 20, 40
-"""Tries until what has been learned of the law is forgotten, and until the step is given up."""
+_AFRESH, _MOST, _STILL = 20, 40, 3
+"""Tries until what has been learned of the law is forgotten, until the step is given up, and that move nothing."""
 
 
 def commanded(m: March) -> int:
@@ -33,15 +33,12 @@ def commanded(m: March) -> int:
             return status
         if status == DONE:
             reach(m)
-            if a.tries > 0 and moved(m) <= m.tolerance:
-                a.tries = 0
-                return DONE
             status = asked(m)
         if status != DONE or a.tries == _MOST:
             a.tries = 0
             forget(a)
             return FAILED if status == DONE else status
-        if unlike(a) == 0.0:
+        if settled_inputs(m, unlike(a)):
             a.tries = 0
             return DONE
         correct_inputs(m)
@@ -50,6 +47,7 @@ def commanded(m: March) -> int:
 def foresee(m: March) -> None:
     """Guess the inputs and the law's state at the end of the step, and set the clocks of the law."""
     a = m.answer
+    a.still = 0
     for i in range(a.inputs):
         a.u[i] = a.last[i] + m.h * a.trend[i]
     load(m.flat)
@@ -97,6 +95,25 @@ def unlike(a: Answer) -> float:
         a.gap[k] = a.said[a.writes[k]] - a.u[a.writes[k]]
         most = max(most, abs(a.gap[k]))
     return most
+
+
+def settled_inputs(m: March, gap: float) -> bool:
+    """Tell whether inputs need not be put right any more.
+
+    What was put right has moved nothing, and brought them nearer to what the law says: they would not come nearer by
+    changes that are too small because the law answers otherwise than before, as one that has come to a limit. What
+    comes no nearer in three tries is round-off.
+    """
+    a = m.answer
+    before = a.most
+    a.most = gap
+    if gap == 0.0:
+        return True
+    if a.tries == 0 or moved(m) > m.tolerance:
+        a.still = 0
+        return False
+    a.still += 1
+    return gap <= 0.5 * before or a.still >= _STILL
 
 
 def correct_inputs(m: March) -> None:
