@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from numbers import Real
 
 import numpy as np
 
@@ -153,7 +154,7 @@ class OpenLoop(Stateless):
 
     def __post_init__(self) -> None:
         _check_functions(self.commands, "OpenLoop")
-        if self.sample_time:
+        if isinstance(self.sample_time, Real) and self.sample_time > 0.0:
             _check_grids(self.commands, self.sample_time)
 
     @cached_property

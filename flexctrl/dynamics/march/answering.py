@@ -18,6 +18,7 @@ from flexctrl.model.gauges import read
 
 __all__ = ["commanded", "forget", "recite", "take"]
 
+_EXACT = 1e-11
 _AFRESH, _MOST, _STILL = 20, 40, 3
 """Tries until what has been learned of the law is forgotten, until the step is given up, and that move nothing."""
 
@@ -85,7 +86,7 @@ def asked(m: March) -> int:
 
 
 def unlike(a: Answer) -> float:
-    """Find by how much the law says others than the inputs in force; return the largest difference."""
+    """Find by how much the law says others than the inputs in force; return the largest difference, 0 for round-off."""
     for i in range(a.inputs):
         a.said[i] = a.base[i]
     for k in range(a.commands):
@@ -93,7 +94,8 @@ def unlike(a: Answer) -> float:
     most = 0.0
     for k in range(a.commands):
         a.gap[k] = a.said[a.writes[k]] - a.u[a.writes[k]]
-        most = max(most, abs(a.gap[k]))
+        if abs(a.gap[k]) > _EXACT * abs(a.said[a.writes[k]]):
+            most = max(most, abs(a.gap[k]))
     return most
 
 
