@@ -5,14 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from flexctrl.dynamics.ending import ends_before
 from flexctrl.dynamics.landing import Missed
-from flexctrl.dynamics.layers import haste, overleaps
 from flexctrl.dynamics.nearing import SHORTEST, SMALLEST
 from flexctrl.dynamics.run import Status
-from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Controlled, Point, StepError
 from flexctrl.dynamics.switching import lead
 
@@ -22,7 +18,6 @@ if TYPE_CHECKING:
 __all__ = ["controlled", "fixed"]
 
 _NEAR = 1e-9
-_HASTY = 1e9
 
 
 def fixed(journey: Journey, stop: float, until: float) -> None:
@@ -37,7 +32,7 @@ def fixed(journey: Journey, stop: float, until: float) -> None:
         if not ends_before(journey, stop):
             _take(journey, until - t, stop)
         return
-    (_take if mark.steps else _set_out)(journey, mark.size, stop)
+    _take(journey, mark.size, stop)
     if mark.left > 0:
         mark.left -= 1
 
@@ -78,8 +73,7 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
         if mark.led and h != mark.led:
             lead(journey, h)
         if h < SMALLEST * max(SHORTEST * journey.plan.until, t):
-            why = f"the step fell to {h:.1e} s at t = {t:.6g} s{why}{_massless(journey)}"
-            raise StepError(journey.stepper.counts.worst, why)
+            raise StepError(journey.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
         try:
             after = journey.stepper.step(journey.point, h)
         except StepError as failure:
@@ -93,16 +87,6 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
             return after, h, size, factor
         mark.rejected += 1
         size = h = h * max(0.2, factor)
-
-
-def _set_out(journey: Journey, h: float, stop: float) -> None:
-    """The first step of fixed length; where a speed comes about within it, in parts that double."""
-    if not overleaps(journey.plan.model, journey.point, h):
-        return _take(journey, h, stop)
-    end = journey.point.state.t + h
-    _set_out(journey, 0.5 * h, stop)
-    if journey.status is Status.FINISHED:
-        _take(journey, end - journey.point.state.t, stop)
 
 
 def _take(journey: Journey, h: float, stop: float) -> None:
@@ -130,15 +114,3 @@ def _halved(journey: Journey, h: float, stop: float) -> None:
     _take(journey, 0.5 * h, stop)
     if journey.status is Status.FINISHED and (left := end - journey.point.state.t) > SMALLEST * h:
         _take(journey, left, stop)
-
-
-def _massless(journey: Journey) -> str:
-    """What is to be said where accelerations are over before any step is; empty where they are not."""
-    model, point = journey.plan.model, journey.point
-    if haste(model, point) * journey.plan.until < _HASTY:
-        return ""
-    light = model.coordinates[int(np.argmax(np.abs(point.rate) / yardsticks(model)))]
-    return (
-        f": what {light} moves has next to no mass against what damps it (its accelerations are over in "
-        f"{1.0 / haste(model, point):.1e} s); give it more, or take GeneralizedAlpha(step), which passes over that"
-    )

@@ -18,7 +18,6 @@ from flexctrl.dynamics.events import Event
 from flexctrl.dynamics.feed import Supply, feed_of
 from flexctrl.dynamics.first_step import first_step
 from flexctrl.dynamics.journey import Journey, Plan
-from flexctrl.dynamics.layers import overleaps
 from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.nearing import SMALLEST
 from flexctrl.dynamics.record import InMemory, Record, Unwritten
@@ -220,7 +219,6 @@ def _begun(
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
         journey.notes = (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
-    journey.balked = isinstance(pace, Fixed) and books.dissipates and overleaps(model, point, size)
     rows.here(point, 0.0)
     return journey
 
