@@ -14,7 +14,7 @@ import numpy as np
 
 from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.hardware import AntiWindup, Saturated
-from flexctrl.design.lowering import LAWS, NotLowered, Told, Tracer
+from flexctrl.design.lowering import LAWS, NotLowered, Told, Tracer, once
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, simplified
 from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Together, Tracking
 from flexctrl.kernels.kernel import Kernel
@@ -70,12 +70,7 @@ def answering(law: Controller) -> Answering | None:
     Answering or None
         None for one that cannot be written down, or is too large to gain by it.
     """
-    try:
-        if law not in _known:
-            _known[law] = _answering(law)
-        return _known[law]
-    except TypeError:  # no weak reference to it can be had
-        return _answering(law)
+    return once(_known, _answering, law)
 
 
 def _answering(law: Controller) -> Answering | None:

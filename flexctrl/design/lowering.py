@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,10 +23,12 @@ from flexctrl.kernels.kernel import Backend, Kernel, Run
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["LAWS", "Lowered", "NotLowered", "Told", "Tracer", "lowered"]
+__all__ = ["LAWS", "Lowered", "NotLowered", "Told", "Tracer", "lowered", "once"]
 
 Told = tuple["ca.SX", "ca.SX"]
 """A command and the state at the next sample."""
+
+T = TypeVar("T")
 
 _MOST = 4000
 _REMEMBERED = 8
@@ -208,12 +210,17 @@ def lowered(law: Controller) -> Lowered | None:
     Lowered or None
         None for one that cannot be written down, or is too large to gain by it.
     """
+    return once(_known, _lowered, law)
+
+
+def once(known: WeakKeyDictionary[Any, T], make: Callable[[Controller], T], law: Controller) -> T:
+    """Return what is made of a law, made once as long as there is that law."""
     try:
-        if law not in _known:
-            _known[law] = _lowered(law)
-        return _known[law]
+        if law not in known:
+            known[law] = make(law)
+        return known[law]
     except TypeError:  # no weak reference to it can be had
-        return _lowered(law)
+        return make(law)
 
 
 def _lowered(law: Controller) -> Lowered | None:
