@@ -26,6 +26,7 @@ from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
+from flexctrl.dynamics.straying import strayed
 from flexctrl.dynamics.unsure import unsure
 from flexctrl.dynamics.watch import Watch
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
@@ -273,7 +274,7 @@ def _result(journey: Journey) -> Run:
         journey.fail(error)
         rows = journey.rows.recorder.table()
     width = len(plan.model.outputs)
-    journey.notes += unsure(journey, rows[:, 1 : 1 + width])
+    journey.notes += strayed(journey) + unsure(journey, rows[:, 1 : 1 + width])
     return Run(
         rows[:, 0],
         plan.model.outputs,

@@ -1,0 +1,47 @@
+"""A machine that leaves is told as one that leaves; one that stays, or hurries round, is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.design import pd
+
+
+def crane() -> fc.Model:
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -2.0), EA=1e6)
+    cart, load = fc.PointMass("cart", rope.start, 5.0), fc.PointMass("load", rope.end, 20.0)
+    structure = fc.Structure(
+        [rope, cart, load],
+        [fc.Support(cart.node, "v w"), fc.Pin(cart.node, rope.start), fc.Pin(rope.end, load.node)],
+        inputs=[fc.Force("force", cart.node, "x")],
+        outputs=[fc.Position("x", cart.node, "x"), fc.Velocity("rate", cart.node, "x")],
+    )
+    return fc.assemble(structure, [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
+
+
+@pytest.mark.parametrize(("kp", "told"), [(-4000.0, True), (100.0, False)])
+@pytest.mark.parametrize("linear", [False, True])
+def test_a_loop_that_is_not_stable_is_named(kp, told, linear):
+    model = crane()
+    plant = fc.linearize(model) if linear else model
+    law = fc.Sampled(pd(kp=kp, kd=40.0, measured="x", rate="rate", command="force"), 0.01)
+    run = fc.simulate(plant, law, until=3.0, inputs={"force": 1.0}, every=0.5)
+    gone = bool(abs(run["x"]).max() > 2e6)
+    assert gone is told
+    assert any("as if the loop is not stable" in note for note in run.report.notes) is told
+
+
+def test_what_nothing_holds_is_told_so_and_many_turns_are_none():
+    ball = fc.RigidBody("ball", (0, 0, 0), 1.0, (0.1, 0.1, 0.1))
+    structure = fc.Structure([ball], outputs=[fc.Position("z", ball.node, "z")])
+    model = fc.assemble(structure, [fc.LargeRotation()])
+    rates = np.zeros(model.n)
+    rates[model.coordinate("ball_0_w")] = 1e8
+    away = fc.simulate(model, until=1.0, start=model.rest.with_(v=rates))
+    assert any("as if nothing holds it" in note for note in away.report.notes)
+    rates[:] = 0.0
+    rates[model.coordinate("ball_0_rz")] = 1e7
+    around = fc.simulate(model, until=1.0, start=model.rest.with_(v=rates), method=fc.GeneralizedAlpha(0.1, 1.0))
+    assert not any("as if nothing holds it" in note for note in around.report.notes)
