@@ -218,7 +218,8 @@ def test_no_equilibrium_is_a_failed_run(call, scene):
     scene.write_text(TROLLEY + "\n[equilibrium]\ninputs = { push = 2.0 }\n", encoding="utf-8")
     code, out, err = call("modes", scene)
     assert (code, out) == (1, "")
-    assert "equilibrium" in err
+    assert err.startswith(f"flexctrl: {scene}: no equilibrium found")
+    assert "[equilibrium] hold = " in err
 
 
 INTERRUPTED = """

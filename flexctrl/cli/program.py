@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import flexctrl
-from flexctrl.errors import FlexctrlError, MechanismError, SceneError, did_you_mean
+from flexctrl.errors import EquilibriumError, FlexctrlError, MechanismError, SceneError, did_you_mean
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -159,7 +159,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         0, 1 for a run that failed or was interrupted, 2 for bad input.
     """
     arguments = vars(_parser().parse_args(argv))
-    command, as_json = COMMANDS[arguments.pop("command")], arguments.pop("json")
+    command, as_json, scene = COMMANDS[arguments.pop("command")], arguments.pop("json"), arguments["scene"]
     try:
         request = Request(**arguments)
         if request.out is not None:
@@ -167,7 +167,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         answer = importlib.import_module(command.module).answer(request)
         print(json.dumps(answer.data, allow_nan=False, ensure_ascii=False) if as_json else answer.text, flush=True)
     except FlexctrlError as error:
-        return _complain(error, BAD_INPUT if isinstance(error, ValueError | MechanismError) else FAILED)
+        return _complain(_told_of(scene, error), BAD_INPUT if isinstance(error, ValueError | MechanismError) else FAILED)
     except BrokenPipeError:
         sys.stdout = None  # the reader has gone; nothing is left to flush
         return OK
@@ -178,6 +178,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     if answer.problem:
         return _complain(answer.problem, FAILED)
     return OK
+
+
+def _told_of(scene: str, error: FlexctrlError) -> str:
+    """What is wrong, in which file, and where in it an equilibrium can be helped."""
+    told = str(error)
+    where = "" if scene in told or told.startswith("--") else f"{scene}: "
+    if not isinstance(error, EquilibriumError):
+        return where + told
+    help = "in the file: [equilibrium] hold = { \"part.start.u\" = 0.0 } holds a freedom, inputs = { … } balances the load"
+    return f"{where}{told} ({help})"
 
 
 def _complain(problem: object, code: int) -> int:

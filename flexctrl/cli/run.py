@@ -18,6 +18,7 @@ from flexctrl.plots.run import comparison_curves, panels, run_curves, units
 from flexctrl.plots.style import FLEXIBLE
 from flexctrl.scene import Scene, load_scene
 from flexctrl.study.compare import Comparison, numbers
+from flexctrl.study.rounding import beyond, of_signal
 
 
 def answer(request: Request) -> Answer:
@@ -120,16 +121,22 @@ def _text(scene: Scene, run: Run, twin: Run | None) -> str:
     )
     names = (*run.outputs, *run.inputs)
     if twin is None:
-        rows = [(name, *asdict(numbers(run.t, run[name])).values()) for name in names]
+        rows = [(name, *_row(name, [run])) for name in names]
         return f"{head}\n\n{grid(('signal', 'final', 'largest', 'rms'), rows)}"
     beside = (*twin.outputs, *twin.inputs)
     rows = []
     for name in names:
-        f, g = numbers(run.t, run[name]), numbers(twin.t, twin[name]) if name in beside else None
-        pairs = ((f.final, g and g.final), (f.max_abs, g and g.max_abs), (f.rms, g and g.rms))
-        rows.append((name, *("–" if value is None else value for pair in pairs for value in pair)))
+        found = _row(name, [run, twin] if name in beside else [run])
+        rows.append((name, *(found if name in beside else [cell for value in found for cell in (value, "–")])))
     heads = ("signal", "final", "rigid", "largest", "rigid", "rms", "rigid")
     return f"{head}\n\n{grid(heads, rows)}"
+
+
+def _row(name: str, runs: list[Run]) -> list[float]:
+    """Each number of a signal, run by run; 0 where it is but rounding."""
+    rounding = of_signal(name, runs)
+    each = [asdict(numbers(run.t, run[name])).values() for run in runs]
+    return [beyond(rounding, value) for number in zip(*each, strict=True) for value in number]
 
 
 __all__ = ["answer", "curves", "draw", "problem", "run_both", "told"]

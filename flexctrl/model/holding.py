@@ -13,7 +13,7 @@ from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
 from flexctrl.structure.naming import node_of
 from flexctrl.structure.structure import Structure
 
-__all__ = ["held_at", "own_coordinate"]
+__all__ = ["check_free", "held_at", "own_coordinate"]
 
 _ROUNDING = 1e-9
 
@@ -85,13 +85,34 @@ def own_coordinate(model: Model, name: str) -> str:
     return model.coordinates[number] if number < model.n else ""
 
 
+def check_free(model: Model, name: str) -> None:
+    """Refuse a name that no equilibrium of a model can hold.
+
+    Parameters
+    ----------
+    model : Model
+    name : str
+        ``"girder.start.u"`` or a coordinate's name.
+
+    Raises
+    ------
+    StructureError
+        For what is not there, or not left free by the joints.
+    """
+    if not own_coordinate(model, name):
+        _raw_place(model, name)
+
+
 def _raw_place(model: Model, name: str) -> int:
     """Where a freedom that the joints leave free stands in raw vectors, or one that all that can bend would have."""
     structure = model.structure
     if "." in name:
         node, column = _cell(structure, name)
-        if structure.join_table.rows[node][column]:
+        row = structure.join_table.rows[node]
+        if row[column]:
             return 6 * node + column
+        free = [IDENTIFIERS[i] for i in range(6) if row[i]]
+        raise StructureError(f"hold {name!r}: the joints leave no such freedom there; free: {', '.join(free) or 'none'}")
     else:
         from flexctrl.model.assemble import assemble  # which holds freedoms itself
 

@@ -6,12 +6,16 @@ import runpy
 import tomllib
 import traceback
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Tolerance
+from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.errors import FlexctrlError, SceneError, check_kind
+from flexctrl.model.assemble import assemble
+from flexctrl.model.holding import check_free
 from flexctrl.scene import laws, parts, physics
 from flexctrl.scene.reading import (
     Kind,
@@ -87,6 +91,8 @@ def _from_python(file: Path) -> Scene:
     if not isinstance(found, Scene):
         got = "defines no 'scene'" if found is None else f"its 'scene' is a {type(found).__name__}"
         raise SceneError(f"{file}: {got}; expected scene = flexctrl.Scene(structure, …)")
+    place = Place(str(file))
+    _check_held(found, place.at("scene").at("hold"), place.at("scene").at("GeometricStiffness").at("hold"))
     return found
 
 
@@ -116,7 +122,7 @@ def scene_from(content: Mapping[str, Any], place: Place, name: str) -> Scene:
     rest = keys(content.get("equilibrium", {}), place.at("equilibrium"), rests)
     channel = Kind(Channel, {"input": driven, "output": known("output", outputs)})
     notes = several(text)(content.get("notes", []), place.at("notes"))
-    return checked(
+    scene = checked(
         lambda: Scene(
             structure=structure,
             effects=physics.effects(content.get("effects", {}), place.at("effects"), structure),
@@ -130,6 +136,20 @@ def scene_from(content: Mapping[str, Any], place: Place, name: str) -> Scene:
         ),
         place,
     )
+    _check_held(scene, place.at("equilibrium").at("hold"), place.at("effects").at("geometric_stiffness").at("hold"))
+    return scene
+
+
+def _check_held(scene: Scene, equilibrium: Place, effect: Place) -> None:
+    """Refuse to hold what is not there or not free, before anything is computed."""
+    own = [(name, equilibrium.at(name)) for name in scene.hold]
+    laid = [e for e in scene.effects if isinstance(e, GeometricStiffness)]
+    wanted = [*own, *((name, effect.at(name)) for e in laid for name, _ in e.hold)]
+    if not wanted:
+        return
+    model = assemble(scene.structure, [e for e in scene.effects if e not in laid]) if laid else scene.model
+    for name, place in wanted:
+        checked(partial(check_free, model, name), place)
 
 
 _TOLERANCE = Kind(Tolerance, {"relative": number, "absolute": positive})

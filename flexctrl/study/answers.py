@@ -10,13 +10,13 @@ from scipy.optimize import linear_sum_assignment
 
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.run import Run
-from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.errors import ControllerError, FlexctrlError
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import modal_first_order
 from flexctrl.study.broken_loop import broken_loop, linear_law
 from flexctrl.study.frequency import margins
 from flexctrl.study.gain_family import gain_family
+from flexctrl.study.rounding import of_outputs
 from flexctrl.study.subject import Subject
 
 __all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
@@ -26,7 +26,6 @@ _SURELY, _PARTED, _LOOKS = 1e-6, 30.0, 3
 _TURN = 0.01
 """By how much a pole must turn or decay over the run not to count as at the origin: |s| times its length."""
 _GROWS = 1e-6  # of a pole's magnitude; of an undamped one rounding leaves less
-_ROUNDING = 1e-12  # of the machine's size; thousands of roundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +49,7 @@ class Curves:
     @classmethod
     def of(cls, run: Run) -> Curves:
         """Take those of a run."""
-        step = max(float(run.t[-1] - run.t[0]), 1e-300) / max(run.report.steps, 1)
-        return cls(run.t, run.outputs, run.y, _ROUNDING * output_yardsticks(run.track.feed.model, step))
+        return cls(run.t, run.outputs, run.y, of_outputs(run))
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.y[:, self.outputs.index(name)]

@@ -19,6 +19,7 @@ from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
+from flexctrl.study.rounding import beyond, of_signal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -221,9 +222,10 @@ class Comparison:
         lines = [" " * wide + "".join(f"{head:>12}" for head in heads)]
         for s in self.signals:
             values = (s.flexible.final, s.rigid.final, s.flexible.max_abs, s.rigid.max_abs, s.rms_difference)
-            cells = [f"{value:12.5g}" for value in values] + [
-                f"{s.frequency_hz:12.4g}" if s.frequency_hz else f"{'–':>12}"
-            ]
+            rounding = of_signal(s.name, [self.flexible, self.rigid])
+            swings = s.frequency_hz and s.flexible.max_abs >= rounding
+            cells = [f"{beyond(rounding, value):12.5g}" for value in values]
+            cells.append(f"{s.frequency_hz:12.4g}" if swings else f"{'–':>12}")
             lines.append(f"{s.name:<{wide}}" + "".join(cells))
         return "\n".join(lines)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -13,6 +15,7 @@ from flexctrl.linear import eigen
 from flexctrl.linear.krylov import _orthonormal
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import PartMatrices
+from flexctrl.linear.statespace import PhysicalForm
 
 CLAMPED_FREE = np.array([1.87510406871, 4.69409113297, 7.85475743824, 10.9955407349, 14.1371683910])
 FREE_FREE = np.array([4.73004074486, 7.8532046241, 10.9956078380, 14.1371654913])
@@ -316,6 +319,25 @@ def test_participation_is_the_share_of_the_immediate_acceleration():
     closed = 4 / 13 * np.sin((2 * j - 1) * np.pi / 13) ** 2
     np.testing.assert_allclose(modes.input_participation[:, 0], closed, rtol=1e-11)
     np.testing.assert_allclose(modes.damping, 0.01 * modes.omega, rtol=1e-12)
+
+
+def test_outputs_are_moved_by_modes_as_the_state_space_says():
+    """C times an eigenvector of A, of unit mass, is what its mode gives the output; participation is its square."""
+    Cq, given = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, -2.0, 0, 0, 5.0]]), s.six_mass_chain()
+    D = np.zeros((2, len(given.inputs)))
+    linear = replace(given, Cq=Cq, Cv=np.zeros((2, 6)), D=D, outputs=("first", "apart"))
+    modes, plant = linear.modes(), linear.to_ss(PhysicalForm())
+    poles, vectors = np.linalg.eig(plant.A)
+    upper = np.flatnonzero(poles.imag > 0.0)
+    upper = upper[np.argsort(np.abs(poles[upper]))]
+    shapes = vectors[:6, upper]
+    gain = plant.C @ vectors[:, upper] / np.sqrt(np.sum(shapes * (linear.M @ shapes), axis=0))
+    shares = np.abs(gain) ** 2 / (np.abs(gain) ** 2).sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(modes.output_participation, shares, rtol=1e-9)
+    np.testing.assert_allclose(modes.output_participation.sum(axis=1), 1.0, rtol=1e-13)
+    j = np.arange(1, 7)
+    closed = 4 / 13 * np.sin((2 * j - 1) * np.pi / 13) ** 2
+    np.testing.assert_allclose(modes.output_participation[0], closed, rtol=1e-10)
 
 
 def test_energy_shares_by_part():

@@ -151,12 +151,26 @@ def test_files_that_are_not_there_or_no_scenes(tmp_path, written):
 def test_a_freedom_to_hold_that_is_not_there(written):
     for name, said in (
         ("trolley.q", "no freedom 'q'"),
-        ("trolley_0_x", "no free coordinate"),
-        ("trolley.v", "no free"),
+        ("trolley_0_x", "no free coordinate 'trolley_0_x'; did you mean 'trolley_0_u'"),
+        ("trolly.u", "did you mean 'trolley'"),
+        ("trolley.v", "no such freedom there; free: u$"),
+        ("travel_sorce", "did you mean 'travel_drive_source'"),
     ):
-        scene = load_scene(written(TROLLEY + f'\n[equilibrium]\nhold = {{ "{name}" = 0.0 }}\n'))
-        with pytest.raises(SceneError, match=said):
-            _ = scene.rest
+        with pytest.raises(SceneError, match=said) as refused:
+            load_scene(written(TROLLEY + f'\n[equilibrium]\nhold = {{ "{name}" = 0.0 }}\n'))
+        assert f"[equilibrium.hold] {name}: " in str(refused.value)
+
+
+def test_what_prestress_is_to_hold_is_looked_up_as_well(written):
+    laid = TROLLEY.replace("large_rotation = true", 'geometric_stiffness = { hold = { "trolley.q" = 0.0 } }')
+    with pytest.raises(SceneError, match=r"\[effects.geometric_stiffness.hold\] trolley.q: .*no freedom 'q'"):
+        load_scene(written(laid))
+
+
+def test_what_a_scene_in_python_is_to_hold_is_looked_up_at_once(written):
+    text = "import flexctrl as fc\nscene = fc.Scene(fc.cranes.ceiling_crane(), hold={'girder.strat.u': 0.0})\n"
+    with pytest.raises(SceneError, match=r"scene.py: \[scene.hold\] girder.strat.u: .*names no node of 'girder'"):
+        load_scene(written(text, "scene.py"))
 
 
 def test_a_scene_without_a_simulation_cannot_be_run(written):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict, replace
+
 import numpy as np
 import pytest
 
@@ -80,6 +83,36 @@ def test_saved_columns_are_both_runs(tmp_path):
     columns = np.genfromtxt(tmp_path / "both.csv", delimiter=",", names=True)
     np.testing.assert_allclose(columns["height"], found.flexible["height"])
     np.testing.assert_allclose(columns["height_rigid"], -2.0)
+
+
+def test_saved_numbers_are_those_of_every_signal(tmp_path):
+    model = fc.assemble(bouncing(), EFFECTS)
+    found = compare(model, until=0.05, method=fc.GeneralizedAlpha(1e-3), every=1e-3)
+    found.save_json(tmp_path / "both.json")
+    assert json.loads((tmp_path / "both.json").read_text(encoding="utf-8")) == [asdict(s) for s in found.signals]
+    (height,) = json.loads((tmp_path / "both.json").read_text(encoding="utf-8"))
+    assert height["flexible"]["max_abs"] == np.abs(found.flexible["height"]).max()
+
+
+@pytest.mark.parametrize(("size", "shown"), [(1e-20, "0"), (1e-9, "1e-09")])
+def test_rounding_is_shown_as_nothing_and_kept_in_the_numbers(tmp_path, size, shown):
+    """Beside a load that hangs 2 m below, a rigid twin at nearly zero: a nanometre is none."""
+    found = compare(fc.assemble(bouncing(), EFFECTS), until=0.02, method=fc.GeneralizedAlpha(1e-3), every=1e-3)
+    twin = replace(found.rigid, y=np.full_like(found.rigid.y, size))
+    again = Comparison.between(found.flexible, twin)
+    row = str(again).splitlines()[1].split()
+    assert row[2] == row[4] == shown
+    again.save_json(tmp_path / "both.json")
+    assert json.loads((tmp_path / "both.json").read_text(encoding="utf-8"))[0]["rigid"]["max_abs"] == size
+
+
+def test_a_signal_that_is_rounding_in_both_runs_does_not_swing():
+    """An output at zero by symmetry: its curve is what the machine's size leaves of rounding, and has no frequency."""
+    model = fc.assemble(bouncing(), EFFECTS)
+    found = compare(model, until=0.05, method=fc.GeneralizedAlpha(1e-3), every=1e-3)
+    faint = 1e-15 * np.sin(400.0 * found.flexible.t)[:, None]
+    row = str(Comparison.between(replace(found.flexible, y=faint), replace(found.rigid, y=-faint))).splitlines()[1]
+    assert row.split()[1:] == ["0", "0", "0", "0", "0", "–"]
 
 
 def test_what_only_the_flexible_machine_measures_is_left_out():
