@@ -167,7 +167,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         answer = importlib.import_module(command.module).answer(request)
         print(json.dumps(answer.data, allow_nan=False, ensure_ascii=False) if as_json else answer.text, flush=True)
     except FlexctrlError as error:
-        return _complain(_told_of(scene, error), BAD_INPUT if isinstance(error, ValueError | MechanismError) else FAILED)
+        return _complain(
+            _told_of(scene, error), BAD_INPUT if isinstance(error, ValueError | MechanismError) else FAILED
+        )
     except BrokenPipeError:
         sys.stdout = None  # the reader has gone; nothing is left to flush
         return OK
@@ -186,7 +188,9 @@ def _told_of(scene: str, error: FlexctrlError) -> str:
     where = "" if scene in told or told.startswith("--") else f"{scene}: "
     if not isinstance(error, EquilibriumError):
         return where + told
-    help = "in the file: [equilibrium] hold = { \"part.start.u\" = 0.0 } holds a freedom, inputs = { … } balances the load"
+    help = (
+        'in the file: [equilibrium] hold = { "part.start.u" = 0.0 } holds a freedom, inputs = { … } balances the load'
+    )
     return f"{where}{told} ({help})"
 
 

@@ -112,7 +112,9 @@ def _raw_place(model: Model, name: str) -> int:
         if row[column]:
             return 6 * node + column
         free = [IDENTIFIERS[i] for i in range(6) if row[i]]
-        raise StructureError(f"hold {name!r}: the joints leave no such freedom there; free: {', '.join(free) or 'none'}")
+        raise StructureError(
+            f"hold {name!r}: the joints leave no such freedom there; free: {', '.join(free) or 'none'}"
+        )
     else:
         from flexctrl.model.assemble import assemble  # which holds freedoms itself
 
