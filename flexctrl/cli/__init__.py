@@ -1,4 +1,4 @@
-"""The command line: ``flexctrl table|run|modes|bode|rlocus|compare SCENE``."""
+"""The command line: ``flexctrl COMMAND SCENE``, one module a command (`program.COMMANDS`)."""
 
 from __future__ import annotations
 
