@@ -273,35 +273,39 @@ def bowing(m: BeamMotion) -> ca.SX:
 def deformations(m: BeamMotion) -> ca.SX:
     """Return what `stresses` work on: stretch, twist, and end rotations against the chord about y (two), z (two).
 
-    To second order in the end rotations. A beam that shears has its sections turned against the chord however short
-    the element is; their strains are measured in the sections' own axes (Reissner 1981), averaged over the element
-    with Timoshenko's shapes.
+    To second order in the end rotations.
     """
     import casadi as ca
 
+    if SHEARING[0] in m.p:
+        return _sheared(m)
     (x1, y1, z1), (x2, y2, z2) = (components(t) for t in m.theta)
-    L = m.p["L"]
-    if SHEARING[0] not in m.p:
-        return ca.vertcat(m.stretch + L * bowing(m), x2 - x1, y1, y2, z1, z2)
-    twist, strain = 0.5 * (x2 - x1), m.stretch / L
-    (mean_y, half_y), (mean_z, half_z) = ((0.5 * (a + b), 0.5 * (b - a)) for a, b in ((y1, y2), (z1, z2)))
-    r_y, r_z = m.p["r_y"], m.p["r_z"]
-    drawn = sum(
-        (r - 0.5 - 0.4 * r * r) * mean * mean + half * half / 6.0
-        for r, mean, half in ((r_y, mean_y, half_y), (r_z, mean_z, half_z))
-    )
-    across_y, across_z = (1.0 - 2.0 * r_y) * mean_y, (1.0 - 2.0 * r_z) * mean_z
-    # what shears the middle of the element: turned sections that are stretched, or twisted while they bend
-    middle_y = strain * (1.0 - r_y) * mean_y - twist * half_z / 6.0
-    middle_z = strain * (1.0 - r_z) * mean_z + twist * half_y / 6.0
-    return ca.vertcat(
-        m.stretch + L * drawn,
-        2.0 * twist - across_y * half_z + across_z * half_y,
-        y1 + middle_y + 0.5 * twist * across_z,
-        y2 + middle_y - 0.5 * twist * across_z,
-        z1 + middle_z - 0.5 * twist * across_y,
-        z2 + middle_z + 0.5 * twist * across_y,
-    )
+    return ca.vertcat(m.stretch + m.p["L"] * bowing(m), x2 - x1, y1, y2, z1, z2)
+
+
+def _sheared(m: BeamMotion) -> ca.SX:
+    """Return the `deformations` of a beam that shears: its sections are turned against the chord however short it is.
+
+    Their strains are measured in the sections' own axes (Reissner 1981), averaged over the element with Timoshenko's
+    shapes: to second order in what bends, to third in the turn ψ of the sections by shear, so that short elements have
+    Γ = (1 + ε) exp(−ψ) e₁ − e₁ and the curvature T(ψ)ᵀ θ'.
+    """
+    import casadi as ca
+
+    mean, half, L = 0.5 * (m.theta[0] + m.theta[1]), 0.5 * (m.theta[1] - m.theta[0]), m.p["L"]
+    bent = ca.vertcat(0, m.p["r_y"] * mean[1], m.p["r_z"] * mean[2])
+    y, z = mean[1] - bent[1], mean[2] - bent[2]
+    turn = ca.vertcat(-0.5 * y * z, y, z)  # no twist: the sections' second axes stay across the frame's third
+    square, across = y * y + z * z, ca.vertcat(0, z, -y)
+    axis = 0.5 * ca.cross(turn, across) - (1.0 - square / 6.0) * across  # exp(−ψ) e₁ − e₁
+    turned = half - 0.5 * ca.cross(turn - bent, half) + ca.cross(turn, ca.cross(turn, half)) / 6.0
+    gamma = (1.0 + m.stretch / L) * axis
+    drawn = 0.1 * ca.dot(bent, bent) + (half[1] * half[1] + half[2] * half[2]) / 6.0
+    # what is twisted while it bends shears its middle
+    middle_y = bent[1] + gamma[2] - half[0] * half[2] / 6.0
+    middle_z = bent[2] - gamma[1] + half[0] * half[1] / 6.0
+    ends = (middle_y - turned[1], middle_y + turned[1], middle_z - turned[2], middle_z + turned[2])
+    return ca.vertcat(m.stretch + L * (gamma[0] + drawn), 2.0 * turned[0], *ends)
 
 
 def stresses(m: BeamMotion) -> ca.SX:
