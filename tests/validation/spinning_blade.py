@@ -8,9 +8,9 @@ N = EA (λ − 1)/λ that the spin gives the blade. ``stretched`` False leaves �
 from __future__ import annotations
 
 import numpy as np
-from numpy.polynomial import Legendre, Polynomial
+from numpy.polynomial import Legendre
 
-SHAPES, POINTS = 14, 60
+SHAPES, POINTS = 20, 60
 
 
 def lagging(spin: float, slenderness: float, stretched: bool) -> float:
@@ -22,9 +22,9 @@ def lagging(spin: float, slenderness: float, stretched: bool) -> float:
     stretch = np.cos(k * x) / np.cos(k) if stretched else np.ones_like(x)
     grows = -k * np.sin(k * x) / np.cos(k) if stretched else np.zeros_like(x)
     pull = EA * (stretch - 1.0) / stretch if stretched else 0.5 * spin**2 * (1.0 - x * x)
-    polynomials = [Legendre.basis(i, domain=[0, 1]).convert(kind=Polynomial) for i in range(SHAPES)]
-    along = [Polynomial([0, 1]) * p for p in polynomials]
-    across = [Polynomial([0, 0, 1]) * p for p in polynomials]
+    place = Legendre.identity(domain=[0, 1])
+    along = [place * Legendre.basis(i, domain=[0, 1]) for i in range(SHAPES)]
+    across = [place * p for p in along]
     s, ds, v, dv, ddv = (
         np.column_stack([f.deriv(order)(x) if order else f(x) for f in family])
         for family, order in ((along, 0), (along, 1), (across, 0), (across, 1), (across, 2))
