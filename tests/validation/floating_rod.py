@@ -1,8 +1,8 @@
 """Simeon's slider crank with an elastic rod in a floating frame, written independently of the package, by SUNDIALS.
 
 The crank turns at a constant rate; the rod's points are p = l₁ (cos φ₁, sin φ₁) + R(φ₂)(x + u, w) with u and w sums of
-a few shapes along it; its end slides on the x axis, which gives φ₂. Lagrange's equations of what is left, by automatic
-differentiation. ``bowing`` 0 leaves the strain at u′, as the IVP Test Set does; 1 adds w′²/2.
+a few shapes along it; its end slides on the x axis, which gives φ₂ and the place of the slider. Lagrange's equations of
+what is left, by automatic differentiation; those of all coordinates then give the forces of the joints.
 """
 
 from __future__ import annotations
@@ -34,33 +34,80 @@ class Shapes:
         return np.sin(k * s), k * np.cos(k * s) / ROD, -((k / ROD) ** 2) * np.sin(k * s), along, strain
 
 
-def ends(bends: int, stretches: int, bowing: float, until: float, tolerance: float) -> tuple[float, float, np.ndarray]:
-    """φ₂, the place of the slider and the amplitudes (bending; stretch at middle and end; more stretch) at a time."""
-    n = bends + 2 + stretches
-    q, v, t = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("t")
-    pin = CRANK * ca.vertcat(ca.cos(SPEED * t), ca.sin(SPEED * t))
-    phi = ca.asin(-pin[1] / (ROD + q[bends + 1]))
-    e = ca.vertcat(ca.cos(phi), ca.sin(phi))
+@dataclass(frozen=True)
+class Rod:
+    """How the rod is modelled.
 
-    def rate(of: ca.SX) -> ca.SX:
-        return ca.jacobian(of, t) + ca.jacobian(of, q) @ v
+    ``bowing`` 0 leaves its strain at u′, 1 adds w′²/2; ``heavy`` is a factor on the mass that stretching moves, and
+    ``rotary`` the rotary inertia of a section, over ρA, that turns as the rod's chord does.
+    """
 
-    action = 0.5 * SLIDER * rate((pin + (ROD + q[bends + 1]) * e)[0]) ** 2
-    for point, weight in zip(*np.polynomial.legendre.leggauss(8), strict=True):
+    bends: int
+    stretches: int
+    bowing: float
+    heavy: float = 1.0
+    rotary: float = 0.0
+
+
+TEST_SET = Rod(2, 0, 0.0, 15.0, WIDTH**2 / 12)
+"""As in the program of the Test Set (crank.f), whose mass matrix of the stretches, 8, 1, 2, lacks a 1/15."""
+
+
+def action(rod: Rod, places: ca.SX, rates: ca.SX) -> ca.SX:
+    """T − V of rod and slider; coordinates φ₁, φ₂, place of the slider, bends, stretches."""
+    crank = CRANK * ca.vertcat(ca.cos(places[0]), ca.sin(places[0]))
+    e = ca.vertcat(ca.cos(places[1]), ca.sin(places[1]))
+    bends, stretches = places[3 : 3 + rod.bends], places[3 + rod.bends :]
+    total = 0.5 * SLIDER * rates[2] ** 2 + 0.5 * DENSITY * AREA * ROD * rod.rotary * rates[1] ** 2
+    for point, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True):
         s, piece = 0.5 * (point + 1.0), 0.5 * ROD * weight
-        bend, slope, curvature, along, strain = Shapes(bends, stretches).at(s)
-        w, u = ca.dot(bend, q[:bends]), ca.dot(along, q[bends:])
-        moving = rate(pin + (s * ROD + u) * e + w * ca.vertcat(-e[1], e[0]))
-        pulled = ca.dot(strain, q[bends:]) + 0.5 * bowing * ca.dot(slope, q[:bends]) ** 2
-        stored = YOUNG * AREA * pulled**2 + YOUNG * INERTIA * ca.dot(curvature, q[:bends]) ** 2
-        action += 0.5 * piece * (DENSITY * AREA * ca.dot(moving, moving) - stored)
-    momentum = ca.jacobian(action, v).T
-    forces = ca.jacobian(action, q).T - ca.jacobian(momentum, q) @ v - ca.jacobian(momentum, t)
-    ode = ca.vertcat(v, ca.solve(ca.jacobian(momentum, v), forces))
+        bend, slope, curvature, along, strain = Shapes(rod.bends, rod.stretches).at(s)
+        w, u = ca.dot(bend, bends), ca.dot(along, stretches)
+        moving = ca.jtimes(crank + (s * ROD + u) * e + w * ca.vertcat(-e[1], e[0]), places, rates)
+        swollen = (rod.heavy - 1.0) * (ca.dot(along, rates[3 + rod.bends :]) ** 2 + (u * rates[1]) ** 2)
+        pulled = ca.dot(strain, stretches) + 0.5 * rod.bowing * ca.dot(slope, bends) ** 2
+        stored = YOUNG * AREA * pulled**2 + YOUNG * INERTIA * ca.dot(curvature, bends) ** 2
+        total += 0.5 * piece * (DENSITY * AREA * (ca.dot(moving, moving) + swollen) - stored)
+    return total
+
+
+def equations(rod: Rod, places: ca.SX, rates: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """M and f of Lagrange's equations M a = f in all coordinates, the joints' forces left out."""
+    total = action(rod, places, rates)
+    momentum = ca.jacobian(total, rates).T
+    return ca.jacobian(momentum, rates), ca.jacobian(total, places).T - ca.jacobian(momentum, places) @ rates
+
+
+def motion(rod: Rod, times: list[float], tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """All coordinates and their rates at some times, shape (coordinates, times)."""
+    n = rod.bends + 2 + rod.stretches
+    q, v, t = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("t")
+    length = ROD + q[rod.bends + 1]
+    phi = ca.asin(-CRANK * ca.sin(SPEED * t) / length)
+    places = ca.vertcat(SPEED * t, phi, CRANK * ca.cos(SPEED * t) + length * ca.cos(phi), q)
+    hang, drive = ca.jacobian(places, q), ca.jacobian(places, t)
+    rates = hang @ v + drive
+    own = ca.jacobian(rates, q) @ v + ca.jacobian(rates, t)
+    P, V = ca.SX.sym("P", 3 + n), ca.SX.sym("V", 3 + n)
+    M, f = ca.substitute(list(equations(rod, P, V)), [P, V], [places, rates])
+    ode = ca.vertcat(v, ca.solve(hang.T @ M @ hang, hang.T @ (f - M @ own)))
     how = {"reltol": tolerance, "abstol": 1e-3 * tolerance, "max_num_steps": 10**6}
-    march = ca.integrator("march", "cvodes", {"x": ca.vertcat(q, v), "t": t, "ode": ode}, 0.0, [until], how)
-    still, more = [0.0] * (bends - 2), [0.0] * stretches
+    march = ca.integrator("march", "cvodes", {"x": ca.vertcat(q, v), "t": t, "ode": ode}, 0.0, times, how)
+    still, more = [0.0] * (rod.bends - 2), [0.0] * rod.stretches
     start = [*BENDS, *still, *STRETCH, *more, *BEND_RATES, *still, *STRETCH_RATES, *more]
-    found = march(x0=start)["xf"][:n]
-    place = ca.Function("place", [t, q], [phi, pin[0] + (ROD + q[bends + 1]) * e[0]])(until, found)
-    return float(place[0]), float(place[1]), found.full().ravel()
+    found = march(x0=start)["xf"]
+    seen = ca.Function("seen", [t, ca.vertcat(q, v)], [places, rates]).map(len(times))(times, found)
+    return seen[0].full(), seen[1].full()
+
+
+def multipliers(rod: Rod, places: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """λ in M a + Gᵀλ = f of the conditions: end on the axis, slider at the end, crank at its rate."""
+    P, V = ca.SX.sym("P", places.size), ca.SX.sym("V", places.size)
+    M, f = equations(rod, P, V)
+    length = ROD + P[4 + rod.bends]
+    across = CRANK * ca.sin(P[0]) + length * ca.sin(P[1])
+    along = P[2] - CRANK * ca.cos(P[0]) - length * ca.cos(P[1])
+    G = ca.jacobian(ca.vertcat(across, along, P[0]), P)
+    M, f, G, gamma = (x.full() for x in ca.Function("all", [P, V], [M, f, G, ca.jtimes(G @ V, P, V)])(places, rates))
+    held = np.linalg.solve(np.block([[M, G.T], [G, np.zeros((3, 3))]]), np.concatenate([f, -gamma]))
+    return np.asarray(held[-3:, 0])
