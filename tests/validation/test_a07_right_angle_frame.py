@@ -88,11 +88,14 @@ def test_critical_load_of_a_rectangle(record, direction):
     )
 
 
-def test_critical_load_of_legs_rigid_in_the_plane(record):
-    rigid = replace(strip(), EI_z=1e4 * strip().EI_z)
+@pytest.mark.parametrize(
+    ("names", "factor"), [(("EI_z",), 1e4), (("EI_z", "EA", "GA_y"), 1e6)], ids=["bending", "bending, stretch, shear"]
+)
+def test_critical_load_of_legs_rigid_in_the_plane(record, names, factor):
+    rigid = replace(strip(), **{name: factor * getattr(strip(), name) for name in names})
     path = fc.equilibrium_path(frame(rigid), load={"load": 1.0}, until=1.5 * RIGID)
     record(
-        "Right-angle frame, opening, bending in the plane 1e4 times as stiff, 16 elements a leg: P_cr",
+        f"Right-angle frame, opening, {', '.join(names)} times {factor:g}, 16 elements a leg: P_cr",
         ours=path.branchings[0].factor,
         reference=RIGID,
         source="zero of the shooting determinant",

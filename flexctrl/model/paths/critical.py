@@ -24,15 +24,17 @@ def limit_between(course: Course, start: Station, length: float) -> Station:
 
 def branching_between(course: Course, start: Station, length: float) -> Station:
     """Return the station within a step at which the stiffness is singular though the load goes on."""
-    border = softest(course, course.step(start, start.tangent, length) or start)
+    there = course.step(start, start.tangent, length) or start
+    scale = _evening(course.stiffness(there.state, there.factor))
+    border = softest(course, there) / scale
+    column = sp.csr_matrix((border / np.linalg.norm(border))[:, None])
 
     def singular(station: Station) -> float:
         """What a force along the softest shape must be for that shape to be displaced by one: ∝ det K."""
-        K = course.stiffness(station.state, station.factor)
-        size = float(np.abs(K.diagonal()).max())
-        column = sp.csr_matrix(size * border[:, None])
+        K = sp.diags(scale) @ course.stiffness(station.state, station.factor) @ sp.diags(scale)
         system = sp.bmat([[K, column], [column.T, None]], "csr")
-        return float(factorise(system)(np.append(np.zeros(len(border)), size))[-1])
+        force = abs(float(factorise(system)(np.append(np.zeros(len(border)), 1.0))[-1]))
+        return force if station.turned == start.turned else -force
 
     return reached(course, start, length, singular)[0]
 
@@ -63,16 +65,21 @@ def softest(course: Course, station: Station) -> np.ndarray:
     from scipy.sparse.linalg import splu
 
     K = course.stiffness(station.state, station.factor)
-    K = (0.5 * (K + K.T)).tocsc()
-    scale = 1.0 / np.sqrt(course.weight)
-    scaled = sp.diags(scale) @ K @ sp.diags(scale)
-    scaled = (scaled + 1e-14 * float(np.abs(scaled.data).max()) * sp.identity(K.shape[0])).tocsc()
-    solve = splu(scaled).solve
+    scale = _evening(K)
+    scaled = sp.diags(scale) @ (0.5 * (K + K.T)) @ sp.diags(scale)
+    solve = splu((scaled + 1e-14 * sp.identity(K.shape[0])).tocsc()).solve
     shape = np.random.default_rng(0).standard_normal(K.shape[0])
     for _ in range(8):
         shape = solve(shape)
         shape /= np.linalg.norm(shape)
-    return np.asarray(scale * shape)
+    shape = scale * shape
+    return np.asarray(shape / np.sqrt(shape @ (course.weight * shape)))
+
+
+def _evening(K: sp.csr_matrix) -> np.ndarray:
+    """Return what rows and columns times that have a diagonal of ones, however stiff and soft freedoms are."""
+    size = np.sqrt(np.abs(K.diagonal()))
+    return 1.0 / np.where(size > 0.0, size, 1.0)
 
 
 def across(course: Course, station: Station, shape: np.ndarray) -> Direction:
