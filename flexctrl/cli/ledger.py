@@ -43,7 +43,7 @@ def _data(found: Ledger) -> dict[str, object]:
             "scene": found.name,
             "tolerance": found.within.outputs,
             "within": asdict(found.within),
-            "effects": [_entry(e) for e in found.entries],
+            "effects": [_entry(found, e) for e in found.entries],
             "minimal_set": found.minimal_set,
             "minimal": minimal,
             "full": {
@@ -59,7 +59,7 @@ def _data(found: Ledger) -> dict[str, object]:
     )
 
 
-def _entry(e: Entry) -> dict[str, object]:
+def _entry(found: Ledger, e: Entry) -> dict[str, object]:
     base: dict[str, object] = {
         "name": e.name,
         "output_change": None,
@@ -70,6 +70,7 @@ def _entry(e: Entry) -> dict[str, object]:
     base |= {"against_without": list(e.first)}
     if e.change is None or e.size is None:
         return {**base, "failure": e.failure}
+    base |= {"cost_told": found.told_apart(e)}
     change = {"output_change": e.change.outputs_worst, "outputs": e.change.outputs, "poles_change": e.change.poles}
     change |= {"pole": e.change.pole}
     size = {"states": e.size.states, "nonzeros": e.size.nonzeros, "instructions": e.size.instructions}

@@ -82,8 +82,9 @@ def cost_bars(ax: Axes, ledger: Ledger) -> Axes:
     times = np.array([1.0 / e.cost_ratio if np.isfinite(e.cost_ratio) else 1.0 for e in ledger.entries])
     ax.barh(rows, times - 1.0, left=1.0, color=[_colour(e) for e in ledger.entries], height=0.66)
     ax.axvline(1.0, color=INK, linewidth=0.8)
+    ax.axvspan(1.0 / (1.0 + ledger.noise), 1.0 + ledger.noise, color=INK, alpha=0.12, linewidth=0)
     ax.set_xscale("log")
-    tidy(ax).set(xlabel="time without it, over that of the full scene")
+    tidy(ax).set(xlabel="time without it, over that of the full scene (grey: none that can be measured)")
     return ax
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Entry", "Ledger", "Size"]
 
+_SAME = "≈ 1"
+
 
 @dataclass(frozen=True)
 class Size:
@@ -106,7 +108,8 @@ class Ledger:
         Processor time of the full scene over that of the minimal set.
     minimal_size : Size
     noise : float
-        Relative spread of the times of the full scene, run several times: smaller differences of times say nothing.
+        How much longer than the shortest time of the full scene, run several times, the longest is, over the shortest:
+        smaller differences of times say nothing.
     accuracy : Accuracy
         How well the outputs of the full run are known.
     scene : Scene
@@ -133,6 +136,19 @@ class Ledger:
         if factor <= 1.0 + self.noise:
             return "as fast"
         return f"{factor:.1f} × {'faster' if self.speedup > 1.0 else 'slower'}"
+
+    def told_apart(self, entry: Entry) -> bool:
+        """Tell whether leaving an effect out takes another time, beyond what the clock is known to.
+
+        Parameters
+        ----------
+        entry : Entry
+
+        Returns
+        -------
+        bool
+        """
+        return abs(np.log(entry.cost_ratio)) > np.log1p(self.noise)
 
     @property
     def modes(self) -> int | None:
@@ -189,7 +205,10 @@ class Ledger:
         heads = ("outputs", "poles", "of pole", "margins", "time", "states", "nonzeros")
         lines = [f"{'without':<{wide}}" + "".join(f"  {head:>{_width(head)}}" for head in heads)]
         lines += [self._line(e, wide) for e in self.entries]
-        lines.append(f"time: of a run without it over that of the full scene, known to {_percent(self.noise)}")
+        lines.append(
+            f"time: of a run without it over that of the full scene; {_SAME}: no difference that can be measured, to "
+            f"within {_percent(self.noise)}"
+        )
         lines.append(str(self.accuracy))
         kept = ", ".join(self.minimal_set) or "nothing"
         size = f"{self.minimal_size.states} of {self.size.states} states"
@@ -210,7 +229,8 @@ class Ledger:
             return f"{e.name:<{wide}}  {'kept' if e.keep else 'gone with others'}: {e.failure}"
         outputs, poles, margins = (_percent(c) for c in (e.change.outputs_worst, e.change.poles, e.change.margins))
         pole = f"{e.change.pole:.2g}" if e.change.poles > 0.0 else "–"
-        cells = [f"{c:>10}" for c in (margins, f"{1.0 / e.cost_ratio:.2f}", e.size.states, e.size.nonzeros)]
+        time = f"{1.0 / e.cost_ratio:.2f}" if self.told_apart(e) else _SAME
+        cells = [f"{c:>10}" for c in (margins, time, e.size.states, e.size.nonzeros)]
         places = [f"{outputs:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}"]
         line = "  ".join([f"{e.name:<{wide}}", *places, *cells])
         before = f"  (both without {', '.join(e.first)})" if e.first else ""

@@ -10,7 +10,7 @@ from flexctrl.study.trials import Bench, Refused, Trial
 
 __all__ = ["Choice", "smallest"]
 
-DEARER, SAVES_NOTHING = "dearer without it", "saves nothing"
+DEARER, SAVES_NOTHING = "dearer without it", "as much to compute without it"
 _CHEAPER = 0.95
 
 

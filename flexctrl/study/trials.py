@@ -28,6 +28,8 @@ _ROUNDS, _CLEARLY = 3, 2.0
 _SHORT = 0.05
 _REPEATS = 4
 LONG = 5.0
+_ONCE = 0.2
+"""What the processor time of a run that is not repeated is known to: a busy machine slows it by as much."""
 
 
 @dataclass
@@ -81,6 +83,12 @@ class Trial:
     def time(self) -> float:
         """The shortest [s]."""
         return min(self.times)
+
+    @property
+    def scatter(self) -> float:
+        """How much longer than the shortest of its times the longest is, without the first, which may have compiled."""
+        later = self.times[1:]
+        return max(later) / min(later) - 1.0 if len(later) > 1 else _ONCE
 
     def again(self) -> None:
         """Run once more, unless that takes long: the first run may have compiled; short runs several times."""
@@ -168,7 +176,8 @@ class Bench:
         """Tell whether a run takes longer than another, by what is counted and by the clock.
 
         Exact integration costs by its modes. Else the clock tells what is not counted, such as a controller that is
-        asked by Python; both are run in turn until it is clear.
+        asked by Python; both are run in turn until it is clear. What is within the scatter of their times is no
+        difference.
         """
         if trial.modes is not None and best.modes is not None:
             return trial.modes > best.modes
@@ -177,7 +186,7 @@ class Bench:
         for _ in range(_ROUNDS):
             best.again()
             trial.again()
-            if trial.time <= _SLOWER * best.time:
+            if trial.time <= max(_SLOWER, 1.0 + best.scatter, 1.0 + trial.scatter) * best.time:
                 return False
             if trial.time > _CLEARLY * best.time:
                 return True
