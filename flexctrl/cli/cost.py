@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from flexctrl.cli.answer import Answer, plain, write_json
 from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
 from flexctrl.scene import load_scene
+from flexctrl.study.store import timed
 from flexctrl.study.work_precision import WorkPrecision, work_precision
 
 
@@ -19,8 +22,17 @@ def answer(request: Request) -> Answer:
     write_json(request.out, "cost.json", data)
     if request.out is not None:
         study.plot().savefig(request.out / "cost.png", dpi=150)
-    problem = "" if study.complete else "interrupted: not all settings were tried"
-    return Answer(f"{scene.name}: error against time\n\n{study}", data, problem)
+    return Answer(f"{scene.name}: error against time\n\n{study}", data, _problem(study, store))
+
+
+def _problem(study: WorkPrecision, store: Path | None) -> str:
+    """How far it came before it was stopped, and how to go on."""
+    if study.complete:
+        return ""
+    times = sum(map(timed, study.points))
+    found = f"errors of {len(study.points)} settings and times of {times} were found"
+    kept = f"are kept in {store}; the same command goes on from there" if store else "are lost; --out DIR keeps them"
+    return f"interrupted: {found if study.reference else 'no reference was found yet'}; runs so far {kept}"
 
 
 def _data(study: WorkPrecision) -> dict[str, object]:

@@ -7,11 +7,15 @@ import importlib
 import json
 import math
 import re
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from types import FrameType
+from typing import Any, NoReturn
 
 import flexctrl
 from flexctrl.errors import EquilibriumError, FlexctrlError, MechanismError, SceneError, did_you_mean
@@ -159,6 +163,30 @@ def main(argv: Sequence[str] | None = None) -> int:
         0, 1 for a run that failed or was interrupted, 2 for bad input.
     """
     arguments = vars(_parser().parse_args(argv))
+    with _ending_as_by_ctrl_c():
+        return _answered(arguments)
+
+
+@contextmanager
+def _ending_as_by_ctrl_c() -> Iterator[None]:
+    """Let a signal to end do what Ctrl-C does: stop where things fit together, keep what was found, say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: FrameType | None) -> None:
+        asked = signal.getsignal(signal.SIGINT)
+        (asked if callable(asked) else signal.default_int_handler)(number, frame)
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _answered(arguments: dict[str, Any]) -> int:
+    """Give a command's answer, or say why there is none; return how the process ends."""
     command, as_json, scene = COMMANDS[arguments.pop("command")], arguments.pop("json"), arguments["scene"]
     try:
         request = Request(**arguments)

@@ -1,4 +1,4 @@
-"""A line on the terminal that says how far a run is."""
+"""How far a run is: a bar on a terminal, a line now and then in a log."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from flexctrl.study.compare import Progress
 
 _WIDTH = 30
+_SILENT = 10.0
+"""Between lines of a log, and before the first [s]."""
 _AT_ONCE = 5e-3
 """Within this, what is told was known before [s]."""
 
@@ -53,8 +55,8 @@ class Pace:
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Progress | None]:
-    """Show a bar on the error stream while a run goes on, if that is a terminal.
+def progress(what: str) -> Iterator[Progress]:
+    """Show on the error stream how far a run is: a bar if that is a terminal, else a line every ten seconds.
 
     Parameters
     ----------
@@ -63,12 +65,36 @@ def progress(what: str) -> Iterator[Progress | None]:
 
     Yields
     ------
-    callable or None
-        To be told the fraction done; None if there is nobody to see it.
+    callable
+        To be told the fraction done.
     """
-    if not sys.stderr.isatty():
-        yield None
-        return
+    if sys.stderr.isatty():
+        with _bar(what) as tell:
+            yield tell
+    else:
+        yield _lines(what)
+
+
+def _lines(what: str) -> Progress:
+    """What writes lines into a log, none of what is over soon."""
+    pace, written = Pace(), [time.monotonic()]
+
+    def tell(done: float) -> None:
+        now = time.monotonic()
+        left = pace.left(done, now)
+        if now - written[0] >= _SILENT:
+            written[0] = now
+            print(f"{what}: {100 * done:.0f} % done{_told(left)}", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def _told(left: float) -> str:
+    return f", {left:.0f} s left" if math.isfinite(left) else ""
+
+
+@contextmanager
+def _bar(what: str) -> Iterator[Progress]:
     pace = Pace()
 
     def tell(done: float) -> None:

@@ -26,9 +26,11 @@ class Interruption:
             self._before = signal.signal(signal.SIGINT, self._note)
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
+        if kind is None:
+            self.check()  # it may have been pressed in the last step
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         if self.asked:

@@ -106,6 +106,10 @@ class Plan(ABC):
         """Return the controller for a scene."""
 
 
+_PHYSICS = ("model", "twin", "rest", "twin_rest", "linear", "twin_linear")
+"""What follows from structure, effects and what is held, and is worked out once."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything a command needs to know.
@@ -178,7 +182,7 @@ class Scene:
         loads: Mapping[str, float | Signal] | None = None,
         simulation: Simulation | None = None,
     ) -> Scene:
-        """Return a copy with some fields replaced; what is left out stays.
+        """Return a copy with some fields replaced; what is left out stays, models of the same physics too.
 
         Parameters
         ----------
@@ -196,7 +200,10 @@ class Scene:
             "loads": loads,
             "simulation": simulation,
         }
-        return replace(self, **{name: value for name, value in given.items() if value is not None})
+        found = replace(self, **{name: value for name, value in given.items() if value is not None})
+        if structure is None and effects is None:
+            found.__dict__.update({name: self.__dict__[name] for name in _PHYSICS if name in self.__dict__})
+        return found
 
     @cached_property
     def settled(self) -> Scene:

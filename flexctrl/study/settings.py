@@ -170,11 +170,28 @@ class Setting:
         """
         structure = self.fidelity.structure(scene.structure)
         structure = refine(structure, self.mesh) if self.mesh > 1 else structure
-        simulation = replace(scene.simulation, method=self.method, tolerance=self.tolerance)
         effects = self.fidelity.effects(scene.effects, scene.structure)
         if self.fidelity is Fidelity.COMPONENT_MODES:
             effects = _modes([part for e in scene.effects for part in e.parts()], scene.structure, self.modes)
-        return scene.with_(structure=structure, effects=effects, simulation=simulation)
+        return self.run(scene.with_(structure=structure, effects=effects))
+
+    def run(self, scene: Subject) -> Subject:
+        """Return a scene that has these physics already, integrated this way.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        Scene
+        """
+        return scene.with_(simulation=replace(scene.simulation, method=self.method, tolerance=self.tolerance))
+
+    @property
+    def physics(self) -> tuple[Fidelity, int, int]:
+        """What tells the machine that is assembled from those of other settings."""
+        return self.fidelity, self.mesh, self.modes if self.fidelity is Fidelity.COMPONENT_MODES else _MODES
 
 
 def sweep(

@@ -18,7 +18,7 @@ from flexctrl.study.reference import Reference, Traced, certified, trace
 from flexctrl.study.settings import Setting, sweep
 from flexctrl.study.store import Point, Store, fingerprint, timed
 from flexctrl.study.subject import Subject, prepared
-from flexctrl.study.tryouts import errors, time_of, workers_of
+from flexctrl.study.tryouts import Workshop, errors, time_of, workers_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -131,8 +131,9 @@ def work_precision(
     The reference is the full physics on a mesh twice as fine as the finest tried, with steps four times as short as
     the shortest; it is run again on the coarser mesh, with longer steps and with another integrator, and refined
     until these agree. Errors are found in several processes at once; times afterwards, one setting after the other on
-    a core that does nothing else: the shortest of several runs over that of a fixed calculation made in between. The
-    cheapest that are as near as times scatter are timed again, in turn.
+    a core that does nothing else: the shortest of several runs over that of a fixed calculation made in between, of
+    fewer runs, down to one, where a setting that is more accurate is clearly quicker. The cheapest that are as near as
+    times scatter are timed again, in turn.
 
     Parameters
     ----------
@@ -206,6 +207,8 @@ class _Study:
     ) -> None:
         self.scene, self.tolerance, self.settings, self.store = scene, tolerance, settings, store
         self.workers, self.progress, self.notes = workers, progress, notes
+        self.referred = 0.0
+        self.shop = Workshop(scene.with_(simulation=replace(scene.simulation, every=scene.simulation.until)))
 
     def made(self) -> WorkPrecision:
         reference: Reference | None = None
@@ -229,15 +232,18 @@ class _Study:
     def _traced(self, setting: Setting) -> Traced:
         """A run of the reference, unless it is known."""
         known = self.store.run(setting)
-        return known if known is not None else self.store.keep_run(setting, trace(self.scene, setting))
+        found = known if known is not None else self.store.keep_run(setting, trace(self.scene, setting))
+        self.referred = min(self.referred + 0.25, 1.0)
+        self._tick(self.referred - 1.0)
+        return found
 
     def _points(self, reference: Reference) -> Iterator[Point]:
         """Those that are known."""
         known = (self.store.known(setting, reference.setting) for setting in self.settings)
         yield from (point for point in known if point is not None)
 
-    def _tick(self, done: int) -> None:
-        """Errors and times of so many settings are found."""
+    def _tick(self, done: float) -> None:
+        """Errors and times of so many settings are found, and before that the reference."""
         self.progress((done + 1.0) / (2.0 * len(self.settings) + 3.0))
 
     def _errors(self, reference: Reference) -> None:
@@ -250,11 +256,15 @@ class _Study:
             self._tick(done := done + 1)
 
     def _times(self, reference: Reference) -> None:
-        """Of those that ran, on this processor alone."""
-        for i, point in enumerate(tuple(self._points(reference))):
-            if not timed(point):
-                self.store.keep(replace(point, time_ratio=time_of(self.scene, point.setting)), reference.setting)
-            self._tick(len(self.settings) + i + 1)
+        """Of those that ran, on this processor alone; coarse meshes first: they show what the others are beaten by."""
+        found = list(self._points(reference))
+        order = sorted(range(len(found)), key=lambda i: found[i].setting.mesh)
+        for done, i in enumerate(order, 1):
+            if not timed(found[i]):
+                better = (p.time_ratio for p in found if p.error <= found[i].error and timed(p))
+                time = time_of(self.shop, found[i].setting, min(better, default=np.inf))
+                found[i] = self.store.keep(replace(found[i], time_ratio=time), reference.setting)
+            self._tick(len(self.settings) + done)
 
     def _close(self, reference: Reference) -> None:
         """Those between which the choice lies are timed again, in turn: their times are as near as times scatter."""
@@ -266,7 +276,7 @@ class _Study:
         for setting in _ROUNDS * near:
             point = self.store.known(setting, reference.setting)
             assert point is not None
-            time = min(point.time_ratio, time_of(self.scene, setting))
+            time = min(point.time_ratio, time_of(self.shop, setting))
             self.store.keep(replace(point, time_ratio=time), reference.setting)
         self.store.tell_apart(near, reference.setting)
 

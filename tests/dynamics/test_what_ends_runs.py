@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
+
 import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.errors import ControllerError, StructureError
 
 
@@ -131,3 +135,13 @@ def test_a_run_that_an_event_ended_goes_on_past_it_to_the_next(method):
         assert [event.t for event in run.events] == [pytest.approx((2 * count + 1) * np.pi / 20, rel=2e-3)]
         run = fc.simulate(swing(), until=1.0, start=run.checkpoint, method=method, events=how["events"])
     assert run.status is fc.Status.FINISHED
+
+
+def test_ctrl_c_in_the_last_step_is_not_lost():
+    """Nothing asks for it any more within the run: whoever runs several, one after the other, is to stop."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
+    try:
+        with pytest.raises(KeyboardInterrupt), Interruption():
+            os.kill(os.getpid(), signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
