@@ -188,10 +188,10 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
     """
     [small] = [e for e in parts if isinstance(e, GeometricStiffness)]
     large = assemble(structure, [*(e for e in parts if e is not small), LargeRotation()], backend)
-    from flexctrl.model.linearize import all_free, linearize  # brings all that modes need
+    from flexctrl.model.linearize import all_free, linearize, released  # brings all that modes need
 
     found = rest_held(large, dict(small.hold), dict(small.inputs))
-    linear = all_free(linearize(large, at=found), found)
+    linear = released(found) if found.brakes else all_free(linearize(large, at=found), found)
     about = Small(np.zeros(large.n), linear.K, linear.C.tocsr(), linear.M, found.inputs)
     motion = replace(large.motion, rest=found.state)
     unloaded = replace(large, effects=parts, motion=motion, viscous=0.0 * large.viscous, about=about)

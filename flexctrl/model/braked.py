@@ -6,7 +6,8 @@ it that is found with the shape, K δq − Gᵀ δτ = f, G δq = θ − θ(q), 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as la
@@ -18,7 +19,7 @@ from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.inputs import MotorTorque
 
-__all__ = ["rest_held"]
+__all__ = ["rest_held", "with_brakes"]
 
 _STEPS = 60
 _REACH = 0.2
@@ -48,11 +49,41 @@ def rest_held(model: Model, hold: Mapping[str, float], inputs: Mapping[str, floa
     places, winches = held_at(model, hold), _winches(model, hold)
     if winches and model.large:
         own = {model.coordinate(n): at for n, at in held_at(model, _others(model, hold, winches)).items()}
-        if (state := _hung(model, places, own, winches, inputs)) is not None:
+        if (hung := _hung(model, places, own, winches, inputs)) is not None:
+            state, torques = hung
             led = np.flatnonzero(_slope(model, state, list(winches)).any(axis=0))
             places = {model.coordinates[i]: float(state.q[i]) for i in {*led.tolist(), *own}}
-            return equilibrium(model, hold=places, inputs=inputs, start=state)
+            names = (model.structure.drives[i].name for i in winches)
+            brakes = tuple(zip(names, torques.tolist(), strict=True))
+            return replace(equilibrium(model, hold=places, inputs=inputs, start=state), brakes=brakes)
     return equilibrium(model, hold=places, inputs=inputs)
+
+
+def with_brakes(rest: Rest) -> Rest:
+    """Return an equilibrium whose brakes are torques of motors, inputs behind those that its model has.
+
+    Parameters
+    ----------
+    rest : Rest
+
+    Returns
+    -------
+    Rest
+        Itself without brakes.
+    """
+    if not rest.brakes:
+        return rest
+    drives, torques = zip(*rest.brakes, strict=True)
+    model = _with_torques(rest.model, drives)
+    return replace(rest, model=model, inputs=np.concatenate([rest.inputs, torques]), brakes=())
+
+
+def _with_torques(model: Model, drives: Sequence[str]) -> Model:
+    """The machine with a torque on the motor of each of some drives, the last of its inputs."""
+    from flexctrl.model.assemble import assemble  # which finds equilibria itself
+
+    brakes = [MotorTorque(f"brake_of_{name}", name) for name in drives]
+    return assemble(model.structure.with_(inputs=[*model.structure.inputs, *brakes]), model.effects, model.backend)
 
 
 def _winches(model: Model, hold: Mapping[str, float]) -> dict[int, float]:
@@ -79,13 +110,10 @@ def _hung(
     own: Mapping[int, float],
     winches: Mapping[int, float],
     inputs: Mapping[str, float],
-) -> State | None:
-    """Return the shape in which brakes hold the winches; None if Newton's method does not find it."""
-    from flexctrl.model.assemble import assemble  # which finds equilibria itself
-
+) -> tuple[State, np.ndarray] | None:
+    """Return the shape in which brakes hold the winches, and their torques; None if Newton's method finds none."""
     structure, drives, wanted = model.structure, list(winches), np.array(list(winches.values()))
-    brakes = [MotorTorque(f"brake_of_{structure.drives[i].name}", structure.drives[i].name) for i in drives]
-    held = assemble(structure.with_(inputs=[*structure.inputs, *brakes]), model.effects, model.backend)
+    held = _with_torques(model, [structure.drives[i].name for i in drives])
     u, still = held.input_vector(dict(inputs)), np.zeros(held.n)
     free = np.setdiff1d(np.arange(held.n), list(own))
     state, motion, k = held.displace(dict(places)), held.motion, len(drives)
@@ -106,5 +134,5 @@ def _hung(
         if not np.isfinite(state.x).all():
             return None
         if np.abs(moved).max(initial=0.0) <= _CLOSE * structure.size:
-            return state
+            return state, u[-k:]
     return None

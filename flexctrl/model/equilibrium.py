@@ -43,6 +43,8 @@ class Rest:
     model : Model
     held : tuple of str
         Coordinates that were held.
+    brakes : tuple of (str, float)
+        Drives that brakes hold whose ropes do not stretch, and the brakes' torques [N m]: they keep these ropes taut.
     """
 
     state: State
@@ -52,6 +54,7 @@ class Rest:
     iterations: int
     model: Model = field(repr=False)
     held: tuple[str, ...] = ()
+    brakes: tuple[tuple[str, float], ...] = ()
 
     @cached_property
     def unstable(self) -> int:
@@ -68,10 +71,12 @@ class Rest:
             Under loads without a potential, if the poles cannot be told: beyond 1000 freedoms, for a motion with
             neither mass nor stiffness, or where massless freedoms are damped.
         """
-        held = (self.model.coordinate(name) for name in self.held)
+        from flexctrl.model.braked import with_brakes  # which finds equilibria itself
         from flexctrl.model.stability import leaving  # brings all that modes need
 
-        return leaving(Balance(self.model, self.inputs, {i: float(self.state.q[i]) for i in held}), self.state)
+        whole = with_brakes(self)
+        held = (whole.model.coordinate(name) for name in whole.held)
+        return leaving(Balance(whole.model, whole.inputs, {i: float(self.state.q[i]) for i in held}), self.state)
 
     @property
     def stable(self) -> bool:

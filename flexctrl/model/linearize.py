@@ -12,6 +12,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.place import Place
 from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
+from flexctrl.model.braked import with_brakes
 from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
@@ -65,6 +66,9 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
             "linearize: the machine has no degrees of freedom, so there is nothing to linearise: its supports hold all "
             "that no effect lets bend"
         )
+    if isinstance(at, Rest) and at.brakes and inputs is None:
+        whole = with_brakes(at)
+        return _without_brakes(linearize(whole.model, at=whole), at)
     _refuse_spins(model, () if not isinstance(at, Rest) else at.held)
     rest = equilibrium(model, inputs=inputs) if at is None else at
     state = (rest.state if isinstance(rest, Rest) else rest).loose
@@ -127,15 +131,25 @@ def released(rest: Rest) -> LinearModel:
     LinearizationError, MechanismError
         As `linearize`.
     """
+    if rest.brakes:  # what they hold may be all there is
+        whole = with_brakes(rest)
+        return _without_brakes(_let_go(whole), rest)
     linear = linearize(rest.model, at=rest)
-    if not rest.held:
-        return linear
+    return _let_go(rest) if rest.held else linear
+
+
+def _let_go(rest: Rest) -> LinearModel:
     model, inputs = rest.model, dict(zip(rest.model.inputs, rest.inputs.tolist(), strict=True))
     try:
         return linearize(model, at=rest.state, inputs=inputs)
     except LinearizationError:  # it takes a force to hold it
         balance = Balance(model, rest.inputs)
         return _derivative(balance, rest.state.loose, _free(model, rest.state), _unsymmetric(rest))[0]
+
+
+def _without_brakes(linear: LinearModel, rest: Rest) -> LinearModel:
+    """What was linearised with brakes as inputs, these constant: with the inputs of the machine itself."""
+    return linear.select(rest.model.inputs)
 
 
 def _unsymmetric(rest: Rest) -> bool:

@@ -73,12 +73,12 @@ def test_two_motors_on_a_rigid_girder_hold_its_travel_and_its_turn():
         _ = held(right=0.0).twin_rest
 
 
-@pytest.mark.parametrize("turned", [0.0, 20.0, -20.0])
-@pytest.mark.parametrize("speed", [0.0, 20.0, 40.0])
-def test_a_held_winch_leans_its_load_into_a_side_wind(speed, turned):
-    """tan φ = k w²/(m g), at the length ℓ + r θ/R that is paid out; an elastic rope is longer by the share T/EA."""
-    mass, length, EA, out = 1000.0, 10.0, 1e7, 0.2 * turned / 4.0
-    crab, load = fc.PointMass("crab", (0, 0, length), 50.0), fc.PointMass("load", (0, 0, 0), mass)
+MASS, LENGTH, EA = 1000.0, 10.0, 1e7
+
+
+def hoist(speed: float, turned: float, small: bool = False) -> fc.Scene:
+    """A load on a rope that a braked winch has paid out, in a side wind."""
+    crab, load = fc.PointMass("crab", (0, 0, LENGTH), 50.0), fc.PointMass("load", (0, 0, 0), MASS)
     winch = fc.Winch("winch", load.node, crab.node, EA=EA, radius=0.2, ratio=4.0, inertia=0.05)
     structure = fc.Structure(
         [crab, load],
@@ -89,8 +89,15 @@ def test_a_held_winch_leans_its_load_into_a_side_wind(speed, turned):
     )
     wind = fc.Wind({"load": 8.0}, (speed, 0.0, 0.0))
     plan = fc.Simulation(0.1, fc.GeneralizedAlpha(1e-2), start=fc.Start.EQUILIBRIUM)
-    effects = (fc.Gravity(), fc.Flexible(), fc.LargeRotation(), wind)
-    scene = fc.Scene(structure, effects, hold={"winch_source": turned}, simulation=plan)
+    effects = (fc.Gravity(), fc.Flexible(), fc.GeometricStiffness() if small else fc.LargeRotation(), wind)
+    return fc.Scene(structure, effects, hold={"winch_source": turned}, simulation=plan)
+
+
+@pytest.mark.parametrize("turned", [0.0, 20.0, -20.0])
+@pytest.mark.parametrize("speed", [0.0, 20.0, 40.0])
+def test_a_held_winch_leans_its_load_into_a_side_wind(speed, turned):
+    """tan φ = k w²/(m g), at the length ℓ + r θ/R that is paid out; an elastic rope is longer by the share T/EA."""
+    mass, length, out, scene = MASS, LENGTH, 0.2 * turned / 4.0, hoist(speed, turned)
     push, weight = 0.5 * 1.25 * 8.0 * speed**2, mass * 9.81
     lean, pull = math.atan2(push, weight), math.hypot(push, weight)
     for rest, rope in ((scene.twin_rest, length + out), (scene.rest, (length + out) * (1.0 + pull / EA))):
@@ -99,3 +106,26 @@ def test_a_held_winch_leans_its_load_into_a_side_wind(speed, turned):
         assert rest.outputs["y"] == pytest.approx(0.0, abs=1e-9)
     start = scene.run(scene.twin)
     assert (start["x"][0], start["z"][0]) == pytest.approx((scene.twin_rest.outputs["x"], scene.twin_rest.outputs["z"]))
+
+
+@pytest.mark.parametrize("turned", [0.0, 20.0])
+@pytest.mark.parametrize(("speed", "small"), [(0.0, False), (20.0, False), (0.0, True)])
+def test_on_a_braked_winch_a_load_sways_as_on_a_rope_of_that_length(speed, turned, small):
+    """Both ways ω² = T/(m ℓ), T all that the brake holds, along wind and weight; along the rope it is free."""
+    scene, out = hoist(speed, turned, small), 0.2 * turned / 4.0
+    pull = math.hypot(0.5 * 1.25 * 8.0 * speed**2, MASS * 9.81)
+    for linear, rope in ((scene.twin_linear, LENGTH + out), (scene.linear, (LENGTH + out) * (1.0 + pull / EA))):
+        found = linear.modes().omega_squared
+        assert found[0] == pytest.approx(0.0, abs=1e-9)
+        assert found[1:3] == pytest.approx(pull / (MASS * rope), rel=1e-6)
+        assert linear.inputs == ("torque",)
+
+
+def test_linearised_with_its_brake_on_the_twin_still_sways():
+    """Hanging straight, sway is what the brake leaves free: √(g/ℓ), and stable; the torque is weight times r/R."""
+    rest = hoist(0.0, 20.0).twin_rest
+    assert dict(rest.brakes) == pytest.approx({"winch": -MASS * 9.81 * 0.2 / 4.0}, rel=1e-9)
+    linear = fc.linearize(rest.model, at=rest)
+    assert linear.modes().omega_squared == pytest.approx([9.81 / 11.0] * 2, rel=1e-9)
+    assert linear.certificate is not None
+    assert rest.stable
