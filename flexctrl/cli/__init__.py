@@ -1,4 +1,4 @@
-"""The command line: ``flexctrl COMMAND SCENE``, one module a command (`program.COMMANDS`)."""
+"""The command line: ``flexctrl COMMAND SCENE``."""
 
 from __future__ import annotations
 

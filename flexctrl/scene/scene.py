@@ -29,6 +29,7 @@ from flexctrl.model.linearize import released
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds, listed
+from flexctrl.structure.refine import renamed
 from flexctrl.structure.structure import Structure
 from flexctrl.study.bookkeeping import ledger
 
@@ -201,9 +202,23 @@ class Scene:
             "simulation": simulation,
         }
         found = replace(self, **{name: value for name, value in given.items() if value is not None})
+        if structure is not None:
+            found = found._on_mesh_of(self.structure)
         if structure is None and effects is None:
             found.__dict__.update({name: self.__dict__[name] for name in _PHYSICS if name in self.__dict__})
         return found
+
+    def _on_mesh_of(self, before: Structure) -> Scene:
+        """The scene with what is held where it was before beams had other numbers of elements."""
+
+        def there(hold: Mapping[str, float]) -> dict[str, float]:
+            return {renamed(name, before, self.structure): at for name, at in hold.items()}
+
+        laid = [
+            e if not isinstance(e, GeometricStiffness) else GeometricStiffness(there(dict(e.hold)), dict(e.inputs))
+            for e in self.effects
+        ]
+        return replace(self, hold=there(self.hold), effects=tuple(laid))
 
     @cached_property
     def settled(self) -> Scene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from math import gcd
@@ -86,6 +87,41 @@ def coarsen(structure: Structure, of: Sequence[str] = ()) -> Structure:
         if not of or name in of
     }
     return _meshed(structure, wanted)
+
+
+def renamed(name: str, before: Structure, after: Structure) -> str:
+    """Return what a freedom is called, of a node within a beam, where the beam has another number of elements.
+
+    Parameters
+    ----------
+    name : str
+        ``"girder.3.u"``, or a coordinate's name as ``"girder_3_u"``.
+    before, after : Structure
+        The same machine on two meshes.
+
+    Returns
+    -------
+    str
+        The name itself where its node is not told by a number.
+
+    Raises
+    ------
+    StructureError
+        If there is no node at that place any more.
+    """
+    counts = {b.name: b.elements for b in _beams(after)}
+    for beam in _beams(before):
+        match = re.fullmatch(rf"{re.escape(beam.name)}([._])(-?\d+)([._]\w+)", name)
+        if not match or counts.get(beam.name, beam.elements) == beam.elements:
+            continue
+        place, rest = divmod(beam.node(int(match[2])).index * counts[beam.name], beam.elements)
+        if rest:
+            raise StructureError(
+                f"hold {name!r}: beam {beam.name!r} has no node there with {counts[beam.name]} elements, for "
+                f"{beam.elements}; hold one of its ends, or a node that something is joined to"
+            )
+        return f"{beam.name}{match[1]}{place}{match[3]}"
+    return name
 
 
 def _beams(structure: Structure) -> list[Beam]:

@@ -126,10 +126,15 @@ class Ladder:
                 lines.append(f"{rung.name:<{wide}}  {rung.failure}")
                 continue
             told = f"{rung.freedoms:>8}  {rung.steps:>7}  {rung.error:9.2e}  {rung.time_ratio:8.3g}"
-            beyond = f"  {f'{gain:.1f} ×':>10}" if np.isfinite(gain) else ""
+            beyond = f"  {_times(gain):>10}" if np.isfinite(gain) else ""
             lines.append(f"{rung.name:<{wide}}  {told}{beyond}")
         lines.append(f"worth standing on: {', '.join(rung.name for rung in self.climb) or 'none'}")
         return "\n".join([*lines, f"reference: {self.reference.setting}; known to {self.reference.uncertainty:.1e}"])
+
+
+def _times(factor: float) -> str:
+    """A factor to one decimal, or two digits where that is less than 1."""
+    return f"{factor:.1f} ×" if factor >= 1.0 else f"{factor:.2g} ×"
 
 
 def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
@@ -213,7 +218,7 @@ def ladder(
     base = prepared(scene, tolerance, "ladder")
     chosen, tell = tuple(rungs) or _rungs(base), progress or (lambda done: None)
     reference = certified(base, [setting for _, setting in chosen], tolerance)
-    tried = [_Tried(name, setting, setting.of(base)) for name, setting in chosen]
+    tried = [_Tried(name, setting, base) for name, setting in chosen]
     for i in range(_REPEATS):
         for k, one in enumerate(tried):
             tell((1.0 + i * len(tried) + k) / (1.0 + _REPEATS * len(tried)))
@@ -242,6 +247,7 @@ class _Tried:
             return
         try:
             if self.run is None:
+                self.scene = self.setting.of(self.scene)
                 self.run = finished(self.scene)  # compiles what is new
             unit = calibration()
             began = time.process_time()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.structure.refine import coarsen, refine
 
 WIND = fc.Wind({"load": 1.0}, speed=(10.0, 0.0, 0.0))
 PUSH, WEIGHT = 0.5 * 1.25 * 10.0**2, 50.0 * 9.81
@@ -129,3 +130,33 @@ def test_linearised_with_its_brake_on_the_twin_still_sways():
     assert linear.modes().omega_squared == pytest.approx([9.81 / 11.0] * 2, rel=1e-9)
     assert linear.certificate is not None
     assert rest.stable
+
+
+def propped(name: str) -> fc.Scene:
+    """A cantilever of four elements that is held up in its middle, or elsewhere."""
+    beam = fc.Beam("beam", (0, 0, 0), (4, 0, 0), fc.Section(1e6, 1e3, 1e3, 1e3, 2.0, 0.1), elements=4)
+    outputs = [fc.Position("tip", beam.end, "z"), fc.Position("middle", beam.node(2), "z")]
+    structure = fc.Structure([beam], [fc.Support(beam.start, "u v w rx ry rz")], outputs=outputs)
+    plan = fc.Simulation(0.1, fc.GeneralizedAlpha(1e-2), start=fc.Start.EQUILIBRIUM)
+    return fc.Scene(structure, hold={name: 0.1}, simulation=plan)
+
+
+@pytest.mark.parametrize("name", ["beam.2.w", "beam.-3.w", "beam_2_w"])
+def test_a_node_within_a_beam_is_held_where_it_is_on_every_mesh(name):
+    """Held at 0.1 m the middle stays there, and the tip where it was but for the mesh."""
+    scene = propped(name)
+    laid = scene.with_(effects=[fc.Gravity(), fc.Flexible(), fc.GeometricStiffness({name: 0.1})])
+    for factor in (2, 3):
+        finer = scene.with_(structure=refine(scene.structure, factor))
+        assert finer.rest.outputs["middle"] == pytest.approx(0.1, abs=1e-12)
+        assert finer.rest.outputs["tip"] == pytest.approx(scene.rest.outputs["tip"], rel=1e-4)
+        small = laid.with_(structure=finer.structure).model
+        assert small.measure(small.rest)[1] == pytest.approx(0.1, abs=1e-12)
+
+
+def test_a_held_node_that_a_coarser_mesh_has_not_is_told():
+    scene = propped("beam.2.w")
+    with pytest.raises(
+        fc.errors.StructureError, match=r"hold 'beam.2.w': beam 'beam' has no node there with 1 elements"
+    ):
+        scene.with_(structure=coarsen(scene.structure.with_(outputs=[])))

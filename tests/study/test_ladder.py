@@ -153,6 +153,9 @@ def test_gains_pass_over_rungs_that_did_not_run(climbed):
 
     assert ladder_of(1.0, np.inf, 3.0, 12.0).gains == (3.0, np.inf, 4.0)
     assert ladder_of(1.0, 2.0, np.inf).gains == (2.0, np.inf)
+    told = str(ladder_of(100.0, 3.0, 12.0))
+    assert "0.03 ×" in told  # not 0.0
+    assert "4.0 ×" in told
 
 
 def test_a_machine_without_an_equilibrium_has_the_rungs_that_need_none():
