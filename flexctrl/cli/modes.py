@@ -65,7 +65,8 @@ def _share(modes: Modes, k: int, part: str) -> float:
 
 def _text(scene: Scene, data: dict, loose: Sequence[Vanishing]) -> str:
     rest = data["equilibrium"]
-    head = f"{scene.name}: equilibrium of {data['dofs']} degrees of freedom, residual {rest['residual']:.2g}"
+    left = f"residual {rest['residual']:.2g}" if rest["residual"] else "balanced to rounding"
+    head = f"{scene.name}: equilibrium of {data['dofs']} degrees of freedom, {left}"
     outputs = grid(("output", "at rest"), rest["outputs"].items())
     columns = zip(*(data[k] for k in ("frequencies_hz", "damping", "kinds", "parts", "shares")), strict=True)
     names = {v.mode + 1: "of the mesh" for v in loose}

@@ -117,7 +117,7 @@ def _text(scene: Scene, run: Run, twin: Run | None) -> str:
     head = (
         f"{scene.name}: {run.status.value} at t = {run.t[-1]:.6g} s, {r.steps} steps ({r.rejected_steps} rejected), "
         f"{r.newton_iterations} Newton iterations, {r.dofs} degrees of freedom, {r.wall_s:.2f} s\n"
-        f"energy residual {r.energy_residual:.2g}"
+        f"energy residual {r.energy_residual:.2g}: made or lost by the integrator, over the largest energy turned over"
     )
     names = (*run.outputs, *run.inputs)
     if twin is None:

@@ -128,6 +128,9 @@ class Ladder:
             told = f"{rung.freedoms:>8}  {rung.steps:>7}  {rung.error:9.2e}  {rung.time_ratio:8.3g}"
             beyond = f"  {_times(gain):>10}" if np.isfinite(gain) else ""
             lines.append(f"{rung.name:<{wide}}  {told}{beyond}")
+        lines.append(
+            "error: largest of an output, over its largest magnitude; time: of a run, over that of a fixed calculation"
+        )
         lines.append(f"worth standing on: {', '.join(rung.name for rung in self.climb) or 'none'}")
         return "\n".join([*lines, f"reference: {self.reference.setting}; known to {self.reference.uncertainty:.1e}"])
 

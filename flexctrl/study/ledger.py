@@ -108,8 +108,8 @@ class Ledger:
         Processor time of the full scene over that of the minimal set.
     minimal_size : Size
     noise : float
-        How much longer than the shortest time of the full scene, run several times, the longest is, over the shortest:
-        smaller differences of times say nothing.
+        How much longer than the shortest time of the full scene, run in several rounds, the longest is, over the
+        shortest: smaller differences of times say nothing.
     accuracy : Accuracy
         How well the outputs of the full run are known.
     scene : Scene
@@ -212,7 +212,12 @@ class Ledger:
         lines.append(str(self.accuracy))
         kept = ", ".join(self.minimal_set) or "nothing"
         size = f"{self.minimal_size.states} of {self.size.states} states"
-        lines += [f"kept: {kept}", f"{self.changes} (asked: {self.within}), {self.pace}, {size}{self._way}"]
+        gone = ", ".join(e.name for e in self.entries if not e.keep) or "nothing"
+        lines += [
+            f"kept: {kept}",
+            f"left out: {gone}",
+            f"{self.changes} (asked: {self.within}), {self.pace}, {size}{self._way}",
+        ]
         if all(e.keep for e in self.entries):
             lines.append("the full set: no smaller one keeps the answer and is as fast")
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])

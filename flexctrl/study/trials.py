@@ -47,6 +47,8 @@ class Trial:
         What is compared: the run, or a finer one of the same scene.
     whole : Trial or None
         The same machine with all its modes; it has the same poles and margins.
+    rounds : list of float
+        The shortest time of each round of runs one after the other, after the first run [s].
     """
 
     scene: Subject
@@ -55,6 +57,7 @@ class Trial:
     model: Model = field(repr=False)
     judged: Run
     whole: Trial | None = None
+    rounds: list[float] = field(default_factory=list)
 
     @cached_property
     def answer(self) -> Answer:
@@ -86,16 +89,14 @@ class Trial:
 
     @property
     def scatter(self) -> float:
-        """How much longer than the shortest of its times the longest is, without the first, which may have compiled."""
-        later = self.times[1:]
-        return max(later) / min(later) - 1.0 if len(later) > 1 else _ONCE
+        """How far apart its times are, each the shortest of runs one after the other: the longest over the shortest."""
+        return max(self.rounds) / min(self.rounds) - 1.0 if len(self.rounds) > 1 else _ONCE
 
     def again(self) -> None:
         """Run once more, unless that takes long: the first run may have compiled; short runs several times."""
         if self.times[0] >= LONG:
             return
-        for _ in range(_REPEATS if self.time < _SHORT else 1):
-            self.once()
+        self.rounds.append(min(self.once() for _ in range(_REPEATS if self.time < _SHORT else 1)))
 
     def once(self) -> float:
         """Run once more and return the time [s]."""

@@ -93,6 +93,10 @@ class WorkPrecision:
         if self.reference is not None:
             agreed = ", ".join(f"{name} {value:.1e}" for name, value in self.reference.agreement.items())
             lines.append(f"reference: {self.reference.setting}; apart from {agreed}")
+            lines.append(
+                "error: largest of an output, over its largest magnitude; time: of a run, over that of a fixed "
+                "calculation; *: none that was tried is both quicker and nearer"
+            )
         return "\n".join([*lines, *self._passed_over, self._verdict, *self.notes])
 
     @property
