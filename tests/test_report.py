@@ -14,6 +14,7 @@ from scenes import TROLLEY
 
 import flexctrl as fc
 from flexctrl.cli import main
+from flexctrl.cli.answer import Answer
 from flexctrl.report.modes import animation
 from flexctrl.report.page import Section, page
 from flexctrl.scene.files import scene_from
@@ -79,6 +80,23 @@ def test_the_animation_is_of_the_machine_with_the_nodes_that_effects_give_it():
         assert np.abs(mode["moved"]).max() < 0.2 * structure.size
 
 
+def test_ctrl_c_ends_the_report_and_not_the_chapter_alone(tmp_path, monkeypatch, capsys):
+    """A study that was stopped has an answer of its own; the chapters after it are not asked for."""
+    (tmp_path / "trolley.toml").write_text(TROLLEY, encoding="utf-8")
+    asked = []
+
+    def stopped(request):
+        asked.append(request)
+        return Answer("", {}, "interrupted", interrupted=True)
+
+    for command in ("table", "modes", "bode"):
+        monkeypatch.setattr(f"flexctrl.cli.{command}.answer", stopped)
+    assert main(["report", str(tmp_path / "trolley.toml"), "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err == "flexctrl: interrupted\n"
+    assert len(asked) == 1
+    assert not (tmp_path / "trolley.html").exists()
+
+
 @pytest.mark.slow
 def test_the_page_needs_nothing_else(report):
     text = report.read_text(encoding="utf-8")
@@ -88,7 +106,9 @@ def test_the_page_needs_nothing_else(report):
     assert len(re.findall(r"<details>", text)) == 1
     cost = re.search(r'<section id="cost".*?<pre>(.*?)</pre>', text, re.DOTALL)[1].splitlines()
     assert "cheapest within 0.1" in cost[-1] or "no setting" in cost[-1]
-    assert all(line.endswith("*") for line in cost[3:] if not re.match("reference|error|passed|cheapest|no setting", line))
+    assert all(
+        line.endswith("*") for line in cost[3:] if not re.match("reference|error|passed|cheapest|no setting", line)
+    )
     for title in (
         "Machine",
         "Modes",

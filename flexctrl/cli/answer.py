@@ -25,11 +25,14 @@ class Answer:
         The same for programs, ready for JSON.
     problem : str
         Why the command failed although it has results; empty if it did not.
+    interrupted : bool
+        Whether it was stopped, and nothing is to be done after it.
     """
 
     text: str
     data: dict[str, Any] = field(default_factory=dict)
     problem: str = ""
+    interrupted: bool = False
 
 
 def plain(value: Any) -> Any:

@@ -22,7 +22,7 @@ def answer(request: Request) -> Answer:
     write_json(request.out, "cost.json", data)
     if request.out is not None:
         study.plot().savefig(request.out / "cost.png", dpi=150)
-    return Answer(f"{scene.name}: error against time\n\n{study}", data, _problem(study, store))
+    return Answer(f"{scene.name}: error against time\n\n{study}", data, _problem(study, store), not study.complete)
 
 
 def _problem(study: WorkPrecision, store: Path | None) -> str:

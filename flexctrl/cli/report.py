@@ -87,6 +87,8 @@ def _chapter(name: str, title: str, request: Request, folder: Path) -> Chapter:
         found = importlib.import_module(COMMANDS[name].module).answer(replace(request, out=own))
     except FlexctrlError as error:
         return Chapter(Section(name, title, str(error), failed=True), {})
+    if found.interrupted:
+        raise KeyboardInterrupt
     pictures = () if name == "run" else tuple(sorted(own.glob("*.png"), key=_rank))
     text, more = _front(found.text) if name == "cost" else (found.text, "")
     section = Section(name, title, text, pictures, moving=name == "modes", lead=LEADS[name], more=more)

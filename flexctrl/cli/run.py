@@ -32,7 +32,7 @@ def answer(request: Request) -> Answer:
     if twin:
         write_csv(request.out, "rigid.csv", curves(twin))
     draw(request, scene, run, twin)
-    return Answer(_text(scene, run, twin), data, problem(run, twin))
+    return Answer(_text(scene, run, twin), data, problem(run, twin), interrupted(run, twin))
 
 
 def run_both(scene: Scene, twin: bool) -> tuple[Run, Run | None]:
@@ -87,6 +87,11 @@ def problem(run: Run, twin: Run | None) -> str:
     return ""
 
 
+def interrupted(run: Run, twin: Run | None) -> bool:
+    """Return whether one of the runs was interrupted."""
+    return any(one is not None and one.status is Status.INTERRUPTED for one in (run, twin))
+
+
 def draw(request: Request, scene: Scene, run: Run, twin: Run | None) -> None:
     """Write the pictures of a run: its curves, and the machine at the end."""
     unit = units(scene.structure)
@@ -139,4 +144,4 @@ def _row(name: str, runs: list[Run]) -> list[float]:
     return [beyond(rounding, value) for number in zip(*each, strict=True) for value in number]
 
 
-__all__ = ["answer", "curves", "draw", "problem", "run_both", "told"]
+__all__ = ["answer", "curves", "draw", "interrupted", "problem", "run_both", "told"]
