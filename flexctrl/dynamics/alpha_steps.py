@@ -129,7 +129,7 @@ class Stepper:
             self.counts.newton += 1
             step = step + correction + self.coning(h, now.v, to_v * correction)
             v, rate = v + to_v * correction, rate + to_rate * correction
-            contraction = size / last if np.isfinite(last) else 0.0
+            contraction = size / last if 0.0 < last < np.inf else 0.0
             worse = contraction > 2.0 and iteration > 3 and not wary
             if not np.isfinite(size) or worse or self._astray(step - foreseen):
                 break

@@ -213,7 +213,7 @@ class _Stepper:
             size, worst = largest(correction * self.weight)
             self.counts.newton += 1
             step = step + correction
-            contraction = size / last if np.isfinite(last) else 0.0
+            contraction = size / last if 0.0 < last < np.inf else 0.0
             poor = contraction > POOR and size > 100.0 * _NEWTON
             settled = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * _NEWTON
             if size <= _NEWTON or settled or (contraction > 0.5 and size < 1e3 * _NEWTON):
@@ -243,7 +243,7 @@ class _Stepper:
             step = step + correction
             if not np.isfinite(size):
                 break
-            if caution.over(size, size / last, iteration):
+            if caution.over(size, size / last if last > 0.0 else 0.0, iteration):
                 self.counts.worst = worst
                 return self._end(point, h, step, 2.0 * self._middle(point, step, h)[2] - point.momenta)
             last = size

@@ -20,14 +20,16 @@ from flexctrl.model.rounding import DIGITS
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope, Spring
 
-__all__ = ["SHORT", "STIFF", "SURE", "TURNING", "Caution", "firmest", "noise", "stiffest"]
+__all__ = ["SHORT", "STIFF", "SURE", "TURNING", "Caution", "firmest", "noise", "stiffest", "told_by_differences"]
 
 STIFF = 10.0
 """Radians of its vibration against the masses at its ends in a step that a line is stiff from on."""
 SURE = 1e-11
 """Size of the last correction of steps over such lines."""
 
-_HEAVY = 3e7
+_HEAVY, _TOLD = 3e7, 1e6
+"""Mass that a load moves with along a rigid rope over that across it: from where on lines are stiff as ropes are, and
+up to where differences of forces, right to eight digits, make a tangent."""
 
 TURNING, SHORT = 0.5, 1.0 / 64.0
 """Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
@@ -78,11 +80,26 @@ def firmest(model: Plant) -> float:
     -------
     float
     """
-    return float(max(once(model, _frequencies).max(initial=0.0), once(model, _heavy).max(initial=0.0)))
+    wall = np.inf if once(model, _spreads).max(initial=0.0) > _HEAVY else 0.0
+    return float(max(once(model, _frequencies).max(initial=0.0), wall))
 
 
-def _heavy(model: Plant) -> np.ndarray:
-    """Infinite for each winch with a rigid rope like a wall to its load, zero for others, shape (winches,)."""
+def told_by_differences(model: Plant) -> bool:
+    """Tell whether differences of forces make tangents for loads beside the inertia of motors that they hang from.
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    bool
+    """
+    return bool(once(model, _spreads).max(initial=0.0) <= _TOLD)
+
+
+def _spreads(model: Plant) -> np.ndarray:
+    """The mass with which a rigid rope's end moves along it over that across, for each winch, shape (winches,)."""
     if not (isinstance(model, Model) and model.large):
         return np.zeros(0)
     winches = [d for d in model.structure.drives if isinstance(d, Winch) and not model.bends(d)]
@@ -95,7 +112,7 @@ def _heavy(model: Plant) -> np.ndarray:
         first = 6 * model.structure.number(winch.node)
         own = np.unique(moves[first : first + 3].indices)
         spread = np.linalg.eigvalsh(mass[own][:, own].toarray()) if own.size else np.ones(1)
-        found.append(np.inf if spread[-1] > _HEAVY * max(spread[0], 0.0) else 0.0)
+        found.append(spread[-1] / max(spread[0], spread[-1] / np.finfo(float).max))
     return np.array(found)
 
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import flexctrl as fc
 
 
-def hoisted(sway, until, tolerance=None, inertia=1e4):
+def hoisted(sway, until, tolerance=None, inertia=1e4, method=None):
     """A load hoisted at 1 m/s from 10 m by a motor too heavy to be slowed: its sway, and that of its equation."""
     at = (10.0 * np.sin(sway), 0.0, -10.0 * np.cos(sway))
     trolley, load = fc.PointMass("trolley", (0, 0, 0), 1.0), fc.PointMass("load", at, 1.0)
@@ -19,7 +19,7 @@ def hoisted(sway, until, tolerance=None, inertia=1e4):
     structure = fc.Structure([trolley, load], held, [winch], [fc.MotorTorque("torque", winch)], outputs)
     model = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity()])
     start = fc.project(model, model.rest, {load.node: (-np.sin(sway), 0.0, np.cos(sway))}).state
-    run = fc.simulate(model, until=until, start=start, tolerance=tolerance, inputs={"torque": -9.81})
+    run = fc.simulate(model, until=until, start=start, tolerance=tolerance, inputs={"torque": -9.81}, method=method)
 
     def slope(t, y):
         return [y[1], (2.0 * y[1] - 9.81 * np.sin(y[0])) / (10.0 - t)]
@@ -40,10 +40,28 @@ def test_nothing_is_said_where_it_is_right():
     assert not run.report.notes
 
 
-@pytest.mark.parametrize("inertia", [1e4, 1e8, 1e9])
+@pytest.mark.parametrize("inertia", [1e4, 1e6, 1e8, 1e9, 1e12, 1e15])
 def test_a_load_that_is_nothing_beside_its_motor_sways_all_the_same(inertia):
     """Tangents made where the rope pointed before would move the load by a share of what holds the motor."""
     run, exact = hoisted(0.05, 9.5, inertia=inertia)
     assert run.status is fc.Status.FINISHED
     assert run["sway"][-1] == pytest.approx(exact, abs=0.02)
     assert run.report.energy_residual < 0.05
+
+
+@pytest.mark.parametrize("sway", [1e-3, 0.05, 0.3])
+@pytest.mark.parametrize("inertia", [1e6, 1e7, 1e9, 1e12])
+def test_it_takes_no_more_steps_however_heavy_the_motor(inertia, sway):
+    """Nothing of the motion depends on it: 1e4 times the load hold the drum's speed already."""
+    (light, _), (heavy, _) = hoisted(sway, 5.0), hoisted(sway, 5.0, inertia=inertia)
+    assert heavy.status is fc.Status.FINISHED
+    assert heavy.report.steps <= 1.2 * light.report.steps + 2
+    assert heavy["sway"][-1] == pytest.approx(light["sway"][-1], abs=2e-3 * (sway + 0.05))
+
+
+@pytest.mark.parametrize("method", [fc.GeneralizedAlpha(0.02), fc.GeneralizedAlpha(0.05)])
+@pytest.mark.parametrize("inertia", [1e6, 1e9, 1e12])
+def test_fixed_steps_do_as_well(inertia, method):
+    (light, exact), (heavy, _) = (hoisted(0.05, 5.0, inertia=j, method=method) for j in (1e4, inertia))
+    assert heavy.status is fc.Status.FINISHED
+    assert abs(heavy["sway"][-1] - exact) <= abs(light["sway"][-1] - exact) + 1e-4

@@ -32,6 +32,7 @@ from flexctrl.dynamics.march.shelf import states_of, width_of
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.scales import components, farthest
 from flexctrl.dynamics.steps import Mark
+from flexctrl.dynamics.stiff_lines import told_by_differences
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import can_be_flat
@@ -56,7 +57,8 @@ def can_march(model: Plant) -> TypeGuard[Model]:
     -------
     bool
     """
-    return isinstance(model, Model) and isinstance(model.backend, Compiled) and can_be_flat(model)
+    flat = isinstance(model, Model) and isinstance(model.backend, Compiled) and can_be_flat(model)
+    return flat and told_by_differences(model)
 
 
 class Pacing(NamedTuple):
