@@ -14,9 +14,9 @@ from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Controlled
 from flexctrl.model.state import State
 
-__all__ = ["first_step"]
+__all__ = ["first_step", "unseen"]
 
-_NEVER, _NEAR, _BRIEF = 1e4, 0.1, 1e-3
+_NEVER, _NEAR, _BRIEF, _HIDDEN = 1e4, 0.1, 1e-3, 6.0
 
 
 def first_step(feed: Feed, state: State, supply: Supply, pace: Controlled, tolerance: Tolerance, span: float) -> float:
@@ -42,6 +42,29 @@ def first_step(feed: Feed, state: State, supply: Supply, pace: Controlled, toler
         return min(1.0 / rate, pace.largest)
     speed = float(np.abs(state.v / yardsticks(feed.model)).max(initial=0.0))
     return min(_NEAR / speed if speed * span > _BRIEF else _BRIEF * span, pace.largest)
+
+
+def unseen(feed: Feed, state: State, supply: Supply, tolerance: Tolerance) -> float:
+    """Return a time in which accelerations move a machine by no more than its error estimate lets pass [s].
+
+    Steps may be longer than what is over in that time: about 6 roots of the error allowed, times the time in which
+    accelerations bring the machine about; 0 if there are none.
+
+    Parameters
+    ----------
+    feed : Feed
+    state : State
+        Where the run begins.
+    supply : Supply
+        Its inputs there.
+    tolerance : Tolerance
+
+    Returns
+    -------
+    float
+    """
+    rate = _quickness(feed, state, supply)
+    return _HIDDEN * tolerance.absolute**0.5 / rate if rate > 0.0 else 0.0
 
 
 def _quickness(feed: Feed, state: State, supply: Supply) -> float:

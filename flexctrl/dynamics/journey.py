@@ -197,7 +197,7 @@ class Journey:
             return "give a smaller Tolerance"
         smaller = f"take steps smaller than {pace.step:g} s, or AdaptiveAlpha, which finds them"
         motion, switches = self.plan.model.motion, self.plan.model.switches
-        if isinstance(method, ConservingMidpoint) or motion.flows.size or switches.names:
+        if isinstance(method, ConservingMidpoint) or motion.flows.size or switches.names or self.books.sums.lost:
             return smaller
         return f"{smaller}, or ConservingMidpoint({pace.step:g}), which keeps energies of springs in such steps"
 

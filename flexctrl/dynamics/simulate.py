@@ -18,6 +18,7 @@ from flexctrl.dynamics.events import Event
 from flexctrl.dynamics.feed import Supply, feed_of
 from flexctrl.dynamics.first_step import first_step
 from flexctrl.dynamics.journey import Journey, Plan
+from flexctrl.dynamics.layers import beyond_layers
 from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.nearing import SMALLEST
 from flexctrl.dynamics.record import InMemory, Record, Unwritten
@@ -205,6 +206,7 @@ def _begun(
     state = model.switches.begin(state, supply.u)
     stops = Stops(plan.feed.sample_time, plan.feed.breaks)
     stops.skip(0.0)
+    state, supply, notes = beyond_layers(plan.feed, state, supply, pace, plan.tolerance)
     size = pace.step if isinstance(pace, Fixed) else _first(plan, pace, state, supply, min(stops.next, plan.until))
     try:
         point = stepper.start(state, supply, size)
@@ -217,9 +219,9 @@ def _begun(
     watch = _watch(plan, events)
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method.order, plan.tolerance)
-    journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
+    journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), notes=notes)
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
-        journey.notes = (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
+        journey.notes += (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
     rows.here(point, 0.0)
     return journey
 

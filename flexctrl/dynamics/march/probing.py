@@ -20,6 +20,8 @@ __all__ = ["Probes", "probe", "probes_of"]
 
 _STEP = 1e-7
 """Of a place, in yardsticks; rates and accelerations that come with it only add to the forces."""
+_SLIGHT = 1e-3
+"""Of the rates there are, where steps have failed: drag is no longer linear in more."""
 _PULL = 1e4
 """Of an acceleration alone, in which forces are linear."""
 
@@ -107,10 +109,17 @@ def _grouped(F: Flattened) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.
 
 @seldom
 def probe(
-    p: Probes, f: Flat, whole: int, on_place: float, on_rate: float, on_acceleration: float, entries: Reals
+    p: Probes,
+    f: Flat,
+    whole: int,
+    on_place: float,
+    on_rate: float,
+    on_acceleration: float,
+    least: float,
+    entries: Reals,
 ) -> None:
     """Fill in the slope of the forces, by kernels of the whole machine maybe, for motions that add these times an
-    increment."""
+    increment; increments as small as ``least`` where rates would not be as they are."""
     clear(f.entries, entries)
     for i in range(f.drives):
         p.driven[i] = f.driven[i]
@@ -120,6 +129,8 @@ def probe(
         put(p.v[i:], eight(f.v[i:]))
         put(p.rate[i:], eight(f.rate[i:]))
     far = _STEP if on_place > 0.0 else _PULL
+    if least < far and on_rate > 0.0:
+        far = max(least, min(far, _SLIGHT * swiftest(p, f) / on_rate))
     forces(f, whole, on_place)
     for i in range(0, f.padded, 8):
         put(p.base[i:], eight(f.force[i:]))
@@ -143,6 +154,14 @@ def probe(
     forces(f, whole, on_place)
     for i in range(f.drives):
         f.driven[i] = p.driven[i]
+
+
+def swiftest(p: Probes, f: Flat) -> float:
+    """Return the largest rate there is, in yardsticks."""
+    most = 0.0
+    for i in range(f.n):
+        most = max(most, abs(f.v[i]) / p.size[i])
+    return most
 
 
 def forces(f: Flat, whole: int, on_place: float) -> None:

@@ -25,6 +25,8 @@ __all__ = ["blended", "press_all", "refactored", "sloped", "step", "to_rate", "t
 
 _TURNED = 0.03
 _TRUSTED = 8
+_FINEST = 1e-12
+"""Increments of probes in a step that has failed, at the least."""
 _PATIENCE = 500
 """Steps until the mass is tried again for the tangent."""
 _HABIT = 0.002
@@ -179,7 +181,8 @@ def lag(m: March) -> None:
 def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) -> None:
     """Fill in the slope of the forces for motions that add these times an increment."""
     if m.probes.groups > 0:
-        probe(m.probes, m.flat, m.whole, on_place, on_rate, on_acceleration, m.entries)
+        least = _FINEST if m.attempt == 1 else 1.0
+        probe(m.probes, m.flat, m.whole, on_place, on_rate, on_acceleration, least, m.entries)
     else:
         if m.fronts.beyond > 0:  # levers turn under the forces they carry
             push(m.flat)
