@@ -28,6 +28,7 @@ from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.straying import strayed
+from flexctrl.dynamics.unbegun import UNASKED, unbegun
 from flexctrl.dynamics.unsure import unsure
 from flexctrl.dynamics.watch import Watch
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
@@ -95,7 +96,8 @@ def simulate(
     -------
     Run
         Whatever happens once it has begun: a step that fails, an exception in the controller, a full disk and Ctrl-C
-        end the run with their status, and all that was computed until then.
+        end the run with their status, and all that was computed until then. So does Ctrl-C while the controller is
+        asked for the first time: the run stands at its start.
 
     Raises
     ------
@@ -179,8 +181,14 @@ def _run(
     rows: Rows,
     track: Track,
 ) -> Run:
-    setting_out = _resumed if isinstance(start, Checkpoint) else _begun
-    journey = setting_out(plan, stepper, start, events, rows, track)  # type: ignore[arg-type]
+    watch = _watch(plan, events)
+    try:
+        if isinstance(start, Checkpoint):
+            journey = _resumed(plan, stepper, start, watch, rows, track)
+        else:
+            journey = _begun(plan, stepper, start, watch, rows, track)
+    except KeyboardInterrupt:
+        return _result(unbegun(plan, stepper, start, watch, rows, track))
     journey.travel()
     return _result(journey)
 
@@ -194,7 +202,7 @@ def _begun(
     plan: Plan,
     stepper: Stepper[Any],
     start: State | Rest | None,
-    events: tuple[Event, ...],
+    watch: Watch,
     rows: Rows,
     track: Track,
 ) -> Journey:
@@ -216,7 +224,6 @@ def _begun(
             f"simulate: {name} has neither mass nor stiffness; hold it with a Support, or give the part "
             "rotary inertia (rhoJ, rhoI) or mass"
         ) from None
-    watch = _watch(plan, events)
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method.order, plan.tolerance)
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), notes=notes)
@@ -234,23 +241,23 @@ def _first(plan: Plan, pace: Controlled, state: State, supply: Supply, span: flo
     return min(pace.first, pace.largest)
 
 
-def _resumed(
-    plan: Plan, stepper: Stepper[Any], start: Checkpoint, events: tuple[Event, ...], rows: Rows, track: Track
-) -> Journey:
+def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch, rows: Rows, track: Track) -> Journey:
     """A run that goes on."""
-    watch = _watch(plan, events)
+    asked = start.passed != UNASKED
     for what, now, before in (
         ("model", machine_of(plan.model), start.machine),
         ("method", repr(plan.method), start.method),
         ("tolerance", plan.tolerance, start.tolerance),
-        ("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x)),
-        ("number of events", watch.count, len(start.sides)),
+        ("controller", len(plan.feed.first(start.point.state).x) if asked else 0, len(start.point.supply.x)),
+        ("number of events", watch.count if asked else 0, len(start.sides)),
         ("spacing of rows (every)", rows.every, start.every),
     ):
         if now != before:
             raise StructureError(
                 f"simulate: the checkpoint is of another {what} ({before} there, {now} here); give what the run had"
             )
+    if not asked:
+        return _begun(plan, stepper, start.point.state, watch, rows, track)
     stepper.recall(start.memory)
     stepper.counts.take(start.counts)
     watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span

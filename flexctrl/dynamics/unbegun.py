@@ -1,0 +1,67 @@
+"""A run that Ctrl-C ends before its first step: it stands where it was to begin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from flexctrl.dynamics.books import Books
+from flexctrl.dynamics.checkpoint import Checkpoint
+from flexctrl.dynamics.dense import Track
+from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.journey import Journey, Plan
+from flexctrl.dynamics.rows import Rows
+from flexctrl.dynamics.run import Status
+from flexctrl.dynamics.steps import Mark, Point, Stepper
+from flexctrl.dynamics.stops import Stops
+from flexctrl.dynamics.watch import Watch
+from flexctrl.model.equilibrium import Rest
+from flexctrl.model.state import State
+
+__all__ = ["UNASKED", "unbegun"]
+
+UNASKED = -1
+"""Stops that a checkpoint has passed whose controller has not been asked: from there a run begins."""
+
+
+def unbegun(
+    plan: Plan,
+    stepper: Stepper[Any],
+    start: State | Rest | Checkpoint | None,
+    watch: Watch,
+    rows: Rows,
+    track: Track,
+) -> Journey:
+    """Return a run that is over where it was to begin, or to go on.
+
+    Parameters
+    ----------
+    plan : Plan
+    stepper : Stepper
+    start : State, Rest, Checkpoint or None
+    watch : Watch
+    rows : Rows
+    track : Track
+
+    Returns
+    -------
+    Journey
+    """
+    model, none = plan.model, np.zeros(0)
+    if isinstance(start, Checkpoint):
+        point = start.point
+    else:
+        state = start.state if isinstance(start, Rest) else start or model.rest
+        point = Point(state.with_(t=0.0), np.zeros(model.n), Supply(plan.feed.base, none, none))
+    books = Books(plan.feed, point.state, plan.method.order, plan.tolerance)
+    mark = replace(start.mark) if isinstance(start, Checkpoint) else Mark(0.0)
+    journey = Journey(plan, stepper, point, Stops(0.0, ()), books, watch, rows, track, mark)
+    journey.status = Status.INTERRUPTED
+    journey.message = f"interrupted at t = {point.state.t:.6g} s, before the first step"
+    if isinstance(start, Checkpoint):
+        books.sums, books.first, journey.saved = replace(start.sums), start.first, start
+    else:
+        journey.saved = replace(journey.snapshot(), passed=UNASKED, rows=0)
+    return journey
