@@ -124,12 +124,15 @@ def draw(directory: Path) -> None:
     """Draw the frequency responses and the moves."""
     import matplotlib.pyplot as plt
 
+    # [bode picture]
     figure, ax = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
     for name, response in responses.items():
         ax.loglog(response.frequencies, np.abs(response.channel("sway", "torque")), label=name)
     ax.set(xlabel="frequency [Hz]", ylabel="sway per torque [rad/(N m)]", ylim=(1e-6, 1e2))
     ax.legend()
     figure.savefig(directory / "bode.png", dpi=90)
+    # [/bode picture]
+    # [move picture]
     figure, axes = plt.subplots(2, sharex=True, figsize=(6.4, 4.0), layout="constrained")
     for name, run in runs.items():
         style = "--" if "rigid" in name else "-"
@@ -139,6 +142,7 @@ def draw(directory: Path) -> None:
     axes[1].set(xlabel="time [s]", ylabel="jib's end [mm]")
     axes[0].legend(fontsize="small")
     figure.savefig(directory / "move.png", dpi=90)
+    # [/move picture]
 
 
 if __name__ == "__main__":
