@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.local import Local
 from flexctrl.dynamics.march.record import OFTEN
 from flexctrl.dynamics.run import Tolerance
@@ -109,7 +110,7 @@ class Books:
         """
         if self.model.motion.flows.size or dragged(self.model).size:
             self.turn(after)
-        if quasistatic(self.model).size:
+        if isinstance(self.model, LinearPlant) or quasistatic(self.model).size:
             (k0, v0, _), (k1, v1, _) = (self.model.energy(point.state) for point in (before, after))
             moved = after.state.q - before.state.q
             work = float(self.model.loads(after.state, after.supply.u) @ moved)

@@ -3,7 +3,8 @@
 Inputs that are held (constant, or from a sampled controller) and linear continuous controllers on a linear model
 leave no error but round-off. Other continuous controllers are interpolated over a step at Lobatto's four points,
 which is exact for commands that are cubic in time; a step over which that does not hold is refused, and halved by
-the run.
+the run. One that damps freedoms without mass or damping itself is solved for commands and their rates together, to third
+order.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexctrl.design.controller import LinearController
+from flexctrl.dynamics.at_once import Instant, holding
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_plant import LinearPlant
 from flexctrl.dynamics.march.clock import later
-from flexctrl.dynamics.modal_equations import ModalEquations, closed, opened
+from flexctrl.dynamics.modal_equations import ModalEquations, closed, feels_at_once, opened
 from flexctrl.dynamics.propagator import NODES, Propagator
 from flexctrl.dynamics.quadratic import Turnover
 from flexctrl.dynamics.run import Tolerance
@@ -32,6 +34,7 @@ __all__ = ["Exact", "ExactStepper", "ModalPoint"]
 
 _SWEEPS = 30
 _SETTLED = 1e-13
+_NOISE = 10.0 * float(np.finfo(float).eps)
 _SMALL = 1e-6
 _HALF = 0.5
 _ROUND_OFF = 1e-9
@@ -142,7 +145,7 @@ class ExactStepper:
         self.yard = yardsticks(self.model)
         (self.equations, self.propagator), self.closed = _modal(self.model, self.modes), False
         if isinstance(self.model, LinearPlant) and isinstance(self.feed.controller, LinearController):
-            self.closed = self.feed.continuous
+            self.closed = self.feed.continuous and not feels_at_once(self.equations, self.model, self.feed)
             if self.closed:
                 self.equations = closed(self.equations, self.model, self.feed)
                 self.propagator = Propagator(self.equations.first)
@@ -162,11 +165,30 @@ class ExactStepper:
         """Return the point of a state; what no mass holds goes where its forces balance."""
         e, z = self.equations, supply.x if self.closed else np.zeros(0)
         known = np.append(state.q, state.v) - e.first.D @ self.forcing(supply.u) - e.first.C[:, e.modes :] @ z
-        return self.point(state, np.append(e.read @ known, z), supply, state.t)
+        modal, n = np.append(e.read @ known, z), self.model.n
+        if not self._open:
+            return self.point(state, modal, supply, state.t)
+        place = state.q - e.first.C[:n] @ modal - e.first.D[:n, -1]
+        return self._asked(state, modal, supply, holding(self.model, e.first.D[:n, :-1], place), step)
 
     def renew(self, point: ModalPoint, supply: Supply, step: float) -> ModalPoint:
         """Return the point under other inputs."""
+        if self._open:
+            return self._asked(point.state, point.modal, supply, point.supply.u, step)
         return self.point(point.state, point.modal, supply, point.state.t)
+
+    @property
+    def _open(self) -> bool:
+        """Whether commands follow from what they do at once."""
+        at_once = self.equations.first.D[:, :-1].any() or (
+            isinstance(self.model, LinearPlant) and self.model.linear.D.any()
+        )
+        return self.feed.continuous and not self.closed and bool(at_once)
+
+    def _asked(self, state: State, modal: np.ndarray, supply: Supply, kept: np.ndarray, step: float) -> ModalPoint:
+        """The point of a modal state under a continuous controller that feels at once what it commands."""
+        supply, slide = Instant(self.equations, self.feed, self.shown, step).answered(state, modal, supply, kept)
+        return self.point(state, modal, supply, state.t, None, slide)
 
     def step(self, point: ModalPoint, h: float) -> ModalPoint:
         """Return the point a step later."""
@@ -186,21 +208,30 @@ class ExactStepper:
         return np.append(self.feed.base if self.closed else u, 1.0)
 
     def point(
-        self, before: State, modal: np.ndarray, supply: Supply, t: float, course: np.ndarray | None = None
+        self,
+        before: State,
+        modal: np.ndarray,
+        supply: Supply,
+        t: float,
+        course: np.ndarray | None = None,
+        slide: np.ndarray | None = None,
     ) -> ModalPoint:
-        """The point of a modal state under inputs; in a closed loop these follow from it."""
+        """The point of a modal state under inputs that may change; in a closed loop these follow from it."""
         e, w = self.equations, self.forcing(supply.u)
-        state = self._state(before, modal, w, e.gain @ modal + e.direct @ w, t)
+        state = self.shown(before, modal, w, t, slide)
         if self.closed:
             supply = replace(self.feed.evaluate(state, modal[e.modes :]), u=state.driven)
         rate = e.first.C[self.model.n :] @ (e.first.A @ modal + e.first.B @ w)
         return ModalPoint(state, rate, supply, modal, np.zeros((4, len(w))) if course is None else course)
 
-    def _state(self, before: State, modal: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> State:
-        n, first = self.model.n, self.equations.first
-        both = first.C @ modal + first.D @ w
+    def shown(self, before: State, modal: np.ndarray, w: np.ndarray, t: float, slide: np.ndarray | None) -> State:
+        """The state of a modal state under inputs w that change by ``slide`` [1/s]; None: they are held."""
+        n, e = self.model.n, self.equations
+        both = e.first.C @ modal + e.first.D @ w
+        if slide is not None:
+            both[n:] += e.first.D[:n, : len(slide)] @ slide
         state = self.model.advance(before, both[:n] - before.q, both[n:], t)
-        return replace(state, driven=u) if isinstance(self.model, LinearPlant) else state
+        return replace(state, driven=e.gain @ modal + e.direct @ w) if isinstance(self.model, LinearPlant) else state
 
     def _collocated(self, point: ModalPoint, h: float) -> ModalPoint:
         """A step under a continuous controller: its commands at the nodes and the motion there are found together."""
@@ -214,14 +245,17 @@ class ExactStepper:
             found = found - np.linalg.solve(self.memory.matrix, gap.ravel()).reshape(found.shape)
             self.counts.newton += 1
             last = self._large(gap)
-            if last <= _SETTLED * max(1.0, float(np.abs(found).max(initial=0.0))):
+            least = max(_SETTLED, _NOISE * float(np.abs(self.memory.matrix).sum(axis=1).max(initial=0.0)))
+            if last <= least * max(1.0, float(np.abs(found).max(initial=0.0))):
                 break
         else:
             raise StepError(0, f"commands did not settle over a step of {h:.3g} s at t = {t:.6g} s")
         course, f, x = self._courses(before, h, found)
         self._check(point, h, course, f)
         supply = Supply(found[-1, :m], x[-1], found[-1, m:])
-        return self.point(point.state, self._modal(point, course, h, h), supply, later(t, h), course)
+        return self.point(
+            point.state, self._modal(point, course, h, h), supply, later(t, h), course, _slide(course, 1.0, h)
+        )
 
     def _courses(self, before: Supply, h: float, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Inputs over a step as a polynomial, rates and states of the controller at the nodes, from those found."""
@@ -253,8 +287,7 @@ class ExactStepper:
     def at(self, point: ModalPoint, course: np.ndarray, share: float, h: float) -> State:
         """Return the state at a share of a step whose inputs are a polynomial."""
         modal, w = self._modal(point, course, share * h, h), share ** np.arange(4) @ course
-        u = self.equations.gain @ modal + self.equations.direct @ w
-        return self._state(point.state, modal, w, u, point.state.t + share * h)
+        return self.shown(point.state, modal, w, point.state.t + share * h, _slide(course, share, h))
 
     def _answer(self, point: ModalPoint, course: np.ndarray, share: float, h: float, z: np.ndarray) -> Supply:
         """What the controller answers there."""
@@ -266,7 +299,8 @@ class ExactStepper:
         z = point.supply.x + h * (powers @ (_POLYNOMIAL @ f))
         answer = self._answer(point, course, _HALF, h, z)
         off = np.append(answer.u - (_HALF ** np.arange(4) @ course)[:-1], 0.0)
-        moved = self.equations.first.C @ (self.propagator.over(h, h)[1][0] @ off)
+        first = self.equations.first
+        moved = first.C @ (self.propagator.over(h, h)[1][0] @ off) + first.D @ off
         worst = float(np.abs(moved[: self.model.n] / self.yard).max(initial=0.0))
         if not worst <= self.tolerance.absolute:
             raise StepError(0, f"commands change too fast for a step of {h:.3g} s at t = {point.state.t:.6g} s")
@@ -278,6 +312,13 @@ class ExactStepper:
     def curve(self, before: ModalPoint, after: ModalPoint) -> _Curve:
         """Return the motion over a step."""
         return _Curve(self, before, after)
+
+
+def _slide(course: np.ndarray, share: float, h: float) -> np.ndarray | None:
+    """How fast inputs change that are a polynomial over a step; None if they do not."""
+    if not course[1:].any():
+        return None
+    return np.arange(1, 4) * share ** np.arange(3) @ course[1:] / h
 
 
 @dataclass(frozen=True, eq=False)

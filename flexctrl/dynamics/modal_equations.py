@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.feed import Feed
@@ -14,7 +15,9 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import FirstOrder, first_order
 from flexctrl.model.plant import Plant
 
-__all__ = ["ModalEquations", "closed", "opened"]
+__all__ = ["ModalEquations", "closed", "feels_at_once", "opened"]
+
+_DUST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,8 @@ class ModalEquations:
     modes : int
         States that are not the controller's.
     read : numpy.ndarray, shape (modes, 2 n)
-        These states from (q, v) less what inputs do at once.
+        These states from (q, v) less what inputs do at once: of what has mass its place and rate, of what has damping
+        alone its place.
     """
 
     first: FirstOrder
@@ -76,7 +80,7 @@ def opened(model: Plant, modes: int | None = None) -> ModalEquations:
     )
     system = replace(modal_system(linear), jump=np.zeros((2 * n, m + 1)))
     first = first_order(system)
-    read = _inverse(first.C)
+    read = _reading(M, C, first, len(system.modes))
     always = system.modes.unstable + system.modes.rigid
     if modes is not None and always + modes < len(system.modes):
         first, kept = _truncated(system, always + modes)
@@ -117,7 +121,7 @@ def closed(plant: ModalEquations, model: LinearPlant, feed: Feed) -> ModalEquati
     W[[model.inputs.index(name) for name in law.outputs], range(len(law.outputs))] = 1.0
     reads = [model.outputs.index(name) for name in law.inputs]
     S = (linear.Cq @ first.C[:n] + linear.Cv @ first.C[n:])[reads]
-    F = (linear.Cq @ first.D[:n, :m] + linear.D)[reads]
+    F = (linear.Cq @ first.D[:n, :m] + linear.Cv @ first.D[n:, :m] + linear.D)[reads]
     solved = np.linalg.inv(np.eye(m) - W @ law.D @ F)
     gain = solved @ np.hstack([W @ law.D @ S, W @ law.C])
     seen = np.hstack([S, np.zeros((len(reads), k))]) + F @ gain
@@ -125,14 +129,35 @@ def closed(plant: ModalEquations, model: LinearPlant, feed: Feed) -> ModalEquati
     A = np.vstack([np.hstack([first.A, np.zeros((d, k))]) + first.B[:, :m] @ gain, own])
     B = np.vstack([first.B[:, :m] @ solved, law.B @ F @ solved])
     C = np.hstack([first.C, np.zeros((2 * n, k))]) + first.D[:, :m] @ gain
+    D = first.D[:, :m] @ solved
+    C[n:] += first.D[:n, :m] @ gain @ A
+    D[n:] += first.D[:n, :m] @ gain @ B
     states = (*first.states, *(f"controller{i + 1}" for i in range(k)))
-    whole = FirstOrder(A, _unloaded(B), C, _unloaded(first.D[:, :m] @ solved), states, (slice(0, d + k),))
-    return ModalEquations(whole, gain, _unloaded(solved), d, _inverse(C[:, :d]))
+    whole = FirstOrder(A, _unloaded(B), C, _unloaded(D), states, (slice(0, d + k),))
+    return ModalEquations(whole, gain, _unloaded(solved), d, plant.read)
 
 
-def _inverse(C: np.ndarray) -> np.ndarray:
-    """States from what they show, least squares."""
-    return np.linalg.pinv(C, rcond=max(C.shape) * np.finfo(float).eps) if C.size else np.zeros(C.shape[::-1])
+def feels_at_once(plant: ModalEquations, model: LinearPlant, feed: Feed) -> bool:
+    """Tell whether a controller reads the rate of a freedom without mass or damping that it moves itself."""
+    n, reads, writes, Cv = model.n, feed.reads, list(feed.writes), model.linear.Cv
+    moved = plant.first.D[:n, writes]
+    felt, size = np.abs((Cv @ moved)[reads]), (np.abs(Cv) @ np.abs(moved))[reads]
+    return bool((felt > _DUST * size).any())
+
+
+def _reading(M: sp.csr_matrix, C: sp.csr_matrix, first: FirstOrder, modes: int) -> np.ndarray:
+    """Modal states from (q, v) by the left vectors of (M q, M v, C q).
+
+    These are what a jump of the inputs leaves as it is. It moves freedoms without mass and damping at once, and rates
+    of those without mass: these tell nothing of the states behind the jump.
+    """
+    n, two = M.shape[0], 2 * modes
+    sizes = first.A[np.arange(0, two, 2), np.arange(1, two, 2)]
+    momenta = (M.T @ (first.C[:n, :two:2] * sizes)).T
+    left = np.zeros((len(first.A), 2 * n))
+    left[:two:2, :n], left[1:two:2, n:] = sizes[:, None] * momenta, momenta
+    left[two:, :n] = (C.T @ first.C[:n, two:]).T
+    return np.linalg.solve(left @ first.C, left)
 
 
 def _unloaded(matrix: np.ndarray) -> np.ndarray:
