@@ -6,6 +6,7 @@ method towards it. What depends on time alone has to be polynomials in pieces.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
@@ -13,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from flexctrl.design.controller import Controller, LinearController
-from flexctrl.design.hardware import AntiWindup, Saturated
+from flexctrl.design.hardware import AntiWindup, Quantised, Sampled, Saturated
 from flexctrl.design.lowering import LAWS, NotLowered, Told, Tracer, once
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, simplified
 from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Together, Tracking
@@ -131,6 +132,15 @@ def _held(law: AntiWindup, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
     return u, rate
 
 
-_SAME = (LinearController, Saturated, Tracking, FeedForward, Commanded, OpenLoop, Together)
-_RATES = {kind: LAWS[kind] for kind in _SAME} | {AntiWindup: _held}
+def _unrounded(law: Quantised, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
+    if not law.idle:
+        raise NotLowered
+    return tracer.of(law.controller, x, y)
+
+
+_SAME = (LinearController, Sampled, Saturated, Tracking, FeedForward, Commanded, OpenLoop, Together)
+_RATES: dict[type, Callable[[Any, Tracer, Any, Any], Told]] = {kind: LAWS[kind] for kind in _SAME} | {
+    AntiWindup: _held,
+    Quantised: _unrounded,
+}
 """By the very type: what is derived from one of these has a say of its own."""

@@ -17,7 +17,7 @@ from flexctrl.design.wrapping import Wrapper, by_name, check_names, discretised
 from flexctrl.errors import ControllerError, shortened
 from flexctrl.structure.freedoms import numbers
 
-__all__ = ["AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated"]
+__all__ = ["AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated", "bare"]
 
 Limits = Mapping[str, float | tuple[float, float]]
 
@@ -256,6 +256,11 @@ class Quantised(Wrapper):
         sizes = _signal_values(self.steps, self, "Quantised")
         return tuple((np.flatnonzero(s), s[np.flatnonzero(s)]) for s in sizes)
 
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is rounded."""
+        return not any(len(places) for places, _ in self.grids)
+
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         read, sent = self.grids
         return _rounded(self.controller.command(t, x, _rounded(y, *read)), *sent)
@@ -325,6 +330,24 @@ class Noisy(Wrapper):
         """
         block, row = divmod(round(t / self._period), _BLOCK)
         return _normals(self.seed, block, sum(map(len, self.levels)))[row]
+
+
+def bare(controller: Controller) -> Controller:
+    """Return a controller without wrappers of no strength around it: no sample time, nothing that is rounded.
+
+    Parameters
+    ----------
+    controller : Controller
+
+    Returns
+    -------
+    Controller
+    """
+    while (type(controller) is Sampled and not controller.sample_time) or (
+        type(controller) is Quantised and controller.idle
+    ):
+        controller = controller.controller
+    return controller
 
 
 _BLOCK = 1024

@@ -3,8 +3,8 @@
 Inputs that are held (constant, or from a sampled controller) and linear continuous controllers on a linear model
 leave no error but round-off. Other continuous controllers are interpolated over a step at Lobatto's four points,
 which is exact for commands that are cubic in time; a step over which that does not hold is refused, and halved by
-the run. One that damps freedoms without mass or damping itself is solved for commands and their rates together, to third
-order.
+the run. One that damps freedoms without mass or damping itself is solved for commands and their rates together, to
+third order.
 """
 
 from __future__ import annotations

@@ -301,4 +301,6 @@ def feed_of(model: Plant, controller: Any, inputs: np.ndarray) -> Feed:
     """
     if controller is None:
         return Feed(model, inputs, None)
-    return Feed(model, inputs, as_controller(controller, model.inputs, model.outputs))
+    from flexctrl.design.hardware import bare  # all kinds of controllers: not for runs without any
+
+    return Feed(model, inputs, bare(as_controller(controller, model.inputs, model.outputs)))

@@ -185,3 +185,32 @@ def test_the_kernel_says_what_the_law_does(law):
     if n:
         assert np.allclose(rate, given.rate(t, x, y), rtol=1e-8, atol=1e-10)
         assert np.allclose(x, x0 + 0.5 * h * (rate0 + rate), rtol=1e-8, atol=1e-12)
+
+
+WRAPPERS = {
+    "without sampling": lambda law: fc.Sampled(law, 0.0),
+    "without rounding": lambda law: fc.Quantised(law, {"travel": 0.0, "push": 0.0}),
+    "both": lambda law: fc.Quantised(fc.Sampled(law, 0.0), {"travel": 0.0}),
+    "within limits that are far": lambda law: fc.Saturated(fc.Quantised(fc.Sampled(law, 0.0)), {"push": 1e9}),
+}
+
+
+@pytest.mark.parametrize("wrapped", WRAPPERS)
+def test_wrappers_of_no_strength_change_no_bit(wrapped):
+    law = follow()
+    bare, other = (
+        fc.simulate(crane(), told, until=0.1, method=PACES["controlled"]) for told in (law, WRAPPERS[wrapped](law))
+    )
+    assert (bare.t == other.t).all()
+    assert (bare.y == other.y).all()
+
+
+def test_a_wrapper_of_no_strength_leaves_a_linear_law_linear():
+    """`Exact` closes its loop without a step's error."""
+    machine, law = (
+        fc.linearize(crane()),
+        pid(900.0, 200.0, 30.0, measured="travel", rate=FilteredRate(0.01), command="push"),
+    )
+    start = {"until": 0.1, "inputs": {"push": 10.0}, "method": fc.Exact(0.02)}
+    bare, wrapped = (fc.simulate(machine, told, **start) for told in (law, fc.Sampled(fc.Quantised(law), 0.0)))
+    assert (bare.y == wrapped.y).all()
