@@ -57,7 +57,8 @@ class Backlash(Effect):
 
     def check_beside(self, others: Sequence[Effect]) -> None:
         """A linear model has no gap."""
-        check_large(others, "Backlash")
+        if any(gap for _, gap in self.gaps):
+            check_large(others, "Backlash")
 
 
 def gaps_of(effects: Sequence[Effect]) -> dict[str, float]:

@@ -88,7 +88,8 @@ class CoulombFriction(Effect):
 
     def check_beside(self, others: Sequence[Effect]) -> None:
         """A linear model has no stick."""
-        check_large(others, "CoulombFriction")
+        if self.acting:
+            check_large(others, "CoulombFriction")
 
     @property
     def acting(self) -> tuple[tuple[str, Coulomb], ...]:

@@ -103,7 +103,8 @@ class LuGreFriction(Effect):
 
     def check_beside(self, others: Sequence[Effect]) -> None:
         """A linear model has no stick."""
-        check_large(others, "LuGreFriction")
+        if self.acting:
+            check_large(others, "LuGreFriction")
 
     def inner(self, structure: Structure) -> tuple[Inner, ...]:
         """A bristle each."""

@@ -273,14 +273,24 @@ def bowing(m: BeamMotion) -> ca.SX:
 def deformations(m: BeamMotion) -> ca.SX:
     """Return what `stresses` work on: stretch, twist, and end rotations against the chord about y (two), z (two).
 
-    To second order in the end rotations.
+    To second order in the end rotations: what bends in both planes twists, and what is twisted as well is bent in the
+    other plane, so that a slender beam turns over sideways, or coils under a torque, where it should.
     """
     import casadi as ca
 
     if SHEARING[0] in m.p:
         return _sheared(m)
     (x1, y1, z1), (x2, y2, z2) = (components(t) for t in m.theta)
-    return ca.vertcat(m.stretch + m.p["L"] * bowing(m), x2 - x1, y1, y2, z1, z2)
+    twist, (far_y, far_z) = x2 - x1, _farther(m)
+    t = twist / 12.0
+    ends = (y1 - t * far_z[0], y2 + t * far_z[1], z1 + t * far_y[0], z2 - t * far_y[1])
+    return ca.vertcat(m.stretch + m.p["L"] * bowing(m), twist + 0.5 * (y1 * z2 - y2 * z1), *ends)
+
+
+def _farther(m: BeamMotion) -> tuple[tuple[ca.SX, ca.SX], tuple[ca.SX, ca.SX]]:
+    """Return the end rotations about y, and about z, each with twice that of the other end added."""
+    (_, y1, z1), (_, y2, z2) = (components(t) for t in m.theta)
+    return (y1 + 2.0 * y2, y2 + 2.0 * y1), (z1 + 2.0 * z2, z2 + 2.0 * z1)
 
 
 def _sheared(m: BeamMotion) -> ca.SX:
@@ -341,11 +351,22 @@ def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
 
     if SHEARING[0] in m.p or m.modal:
         return work_of(m, lambda local: ca.dot(deformations(local), stress)) * -1.0
-    (_, y1, z1), (_, y2, z2) = (components(t) for t in m.theta)
-    N, torque = stress[0], stress[1]
-    s = N * m.p["L"] / 30.0
-    m1 = ca.vertcat(-torque, stress[2] + s * (4.0 * y1 - y2), stress[4] + s * (4.0 * z1 - z2))
-    m2 = ca.vertcat(torque, stress[3] + s * (4.0 * y2 - y1), stress[5] + s * (4.0 * z2 - z1))
+    (x1, y1, z1), (x2, y2, z2) = (components(t) for t in m.theta)
+    N, torque, about_y1, about_y2, about_z1, about_z2 = ca.vertsplit(stress)
+    far_y, far_z = _farther(m)
+    s, t, half = N * m.p["L"] / 30.0, (x2 - x1) / 12.0, 0.5 * torque
+    turning = about_y2 * far_z[1] - about_y1 * far_z[0] + about_z1 * far_y[0] - about_z2 * far_y[1]
+    twisting = torque + turning / 12.0
+    m1 = ca.vertcat(
+        -twisting,
+        about_y1 + s * (4.0 * y1 - y2) + half * z2 + t * (about_z1 - 2.0 * about_z2),
+        about_z1 + s * (4.0 * z1 - z2) - half * y2 - t * (about_y1 - 2.0 * about_y2),
+    )
+    m2 = ca.vertcat(
+        twisting,
+        about_y2 + s * (4.0 * y2 - y1) - half * z1 + t * (2.0 * about_z1 - about_z2),
+        about_z2 + s * (4.0 * z2 - z1) + half * y1 - t * (2.0 * about_y1 - about_y2),
+    )
     return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
 
 

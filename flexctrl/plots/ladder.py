@@ -17,6 +17,8 @@ __all__ = ["ladder_figure", "rungs_chart"]
 
 _LEAST = 1e-6
 _MARKS = "osD^v*P"
+_KNOWN = ("rigid", "rigid, shafts", "linear", "component modes", "full", "refined")
+"""Rungs that look the same in every chart; others take what is left."""
 
 
 def ladder_figure(ladder: Ladder) -> Figure:
@@ -51,7 +53,10 @@ def rungs_chart(ax: Axes, ladder: Ladder) -> Axes:
     times, errors = [r.time_ratio for r in ran], [max(r.error, _LEAST) for r in ran]
     climb = [(r.time_ratio, max(r.error, _LEAST)) for r in ladder.climb]
     ax.plot(*zip(*climb, strict=True), color=PALE, linewidth=2.5, zorder=1)
-    for rung, mark, colour, x, y in zip(ran, _MARKS, CYCLE, times, errors, strict=False):
+    order = [*_KNOWN, *(r.name for r in ran if r.name not in _KNOWN)]
+    for rung, x, y in zip(ran, times, errors, strict=True):
+        i = order.index(rung.name)
+        mark, colour = _MARKS[i % len(_MARKS)], CYCLE[i % len(CYCLE)]
         ax.plot(x, y, mark, color=colour, markersize=9, alpha=0.85, label=rung.name, zorder=2)
     ax.legend(fontsize="small", frameon=False)
     ax.axhspan(_LEAST / 10, max(ladder.reference.uncertainty, _LEAST), color="#e5e7eb", zorder=0)

@@ -99,12 +99,13 @@ class Ladder:
 
         From the last one downwards: the most accurate of those at least twice as fast. A rung that is left out saves
         too little, or another is as quick and nearer to the reference, or it is no nearer to that than no motion at
-        all.
+        all. Rungs whose errors are below what the reference is known to are as good as each other.
         """
+        doubt = self.reference.uncertainty
         ran = [rung for rung in self.rungs if np.isfinite(rung.time_ratio)]
         found, near = ran[-1:], [rung for rung in ran if rung.error < 1.0]
         while cheaper := [r for r in near if _WORTH * r.time_ratio <= found[0].time_ratio]:
-            found.insert(0, min(cheaper, key=lambda r: (r.error, r.time_ratio)))
+            found.insert(0, min(cheaper, key=lambda r: (max(r.error, doubt), r.time_ratio)))
         return tuple(found)
 
     def plot(self) -> Figure:
@@ -119,13 +120,14 @@ class Ladder:
         return ladder_figure(self)
 
     def __str__(self) -> str:
-        wide = max(len(r.name) for r in self.rungs)
+        wide, doubt = max(len(r.name) for r in self.rungs), self.reference.uncertainty
         lines = [f"{'rung':<{wide}}  {'freedoms':>8}  {'steps':>7}  {'error':>9}  {'time':>8}  {'next takes':>10}"]
         for rung, gain in zip(self.rungs, (*self.gains, np.nan), strict=True):
             if rung.failure:
                 lines.append(f"{rung.name:<{wide}}  {rung.failure}")
                 continue
-            told = f"{rung.freedoms:>8}  {rung.steps:>7}  {rung.error:9.2e}  {rung.time_ratio:8.3g}"
+            error = f"{rung.error:.2e}" if rung.error > doubt else f"< {doubt:.1e}"
+            told = f"{rung.freedoms:>8}  {rung.steps:>7}  {error:>9}  {rung.time_ratio:8.3g}"
             beyond = f"  {_times(gain):>10}" if np.isfinite(gain) else ""
             lines.append(f"{rung.name:<{wide}}  {told}{beyond}")
         lines.append(

@@ -105,7 +105,8 @@ def table(scene: fc.Scene, ladder: fc.Ladder) -> str:
     ]
     for rung, gain in zip(ladder.rungs, (*ladder.gains, np.nan), strict=True):
         beyond = f"{gain:.1f} ×" if np.isfinite(gain) else ""
-        told = f"{rung.error:.1e} | {rung.time_ratio:.2f}" if not rung.failure else f"{rung.failure} |"
+        error = f"{rung.error:.1e}" if rung.error > ladder.reference.uncertainty else "as the reference"
+        told = f"{error} | {rung.time_ratio:.2f}" if not rung.failure else f"{rung.failure} |"
         step, rest = (np.nan, np.nan) if rung.failure else shares(scene, rung)
         cost = f"{1e6 * step:.2f} | {1e3 * rest:.1f}"
         rows.append(f"| {rung.name} | {rung.freedoms} | {rung.steps} | {told} | {beyond} | {cost} |")

@@ -88,6 +88,24 @@ def test_backlash_takes_the_place_of_a_spring():
     assert all(after[kind] == before[kind] for kind in set(after) & set(before))
 
 
+@pytest.mark.parametrize("beside", [[], BARE], ids=["small motion", "large"])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        fc.CoulombFriction({"motor": 0.0}),
+        fc.CoulombFriction({}),
+        fc.LuGreFriction({"motor": fc.LuGre(1e3, 0.0)}),
+        fc.Backlash({"motor": 0.0}),
+        fc.ViscousFriction({"motor": 0.0}),
+        fc.MotorLag({"motor": 0.0}),
+    ],
+    ids=lambda e: type(e).__name__,
+)
+def test_of_no_strength_it_is_absent_from_linear_machines_too(effect, beside):
+    effects = [*beside, fc.Gravity(), fc.Flexible()]
+    assert counted(machine(), [*effects, effect]) == counted(machine(), effects)
+
+
 @pytest.mark.parametrize("stretches", [False, True])
 def test_a_winch_costs_itself_and_nothing_else(stretches):
     """A hoist beside a boom: what either is made of alone."""

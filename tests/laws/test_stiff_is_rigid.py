@@ -66,3 +66,28 @@ def test_the_error_of_a_stiff_machine_against_the_rigid_one_is_of_first_order_in
     order = -np.polyfit(np.log(stiffness), np.log(errors), 1)[0]
     assert order == pytest.approx(1.0, abs=0.1)
     assert errors[-1] < 1e-2
+
+
+@pytest.mark.parametrize("elements", [1, 2, 5])
+def test_a_beam_that_hardly_shears_is_one_that_does_not(elements):
+    """To round-off and at any mesh: bent and twisted by half its length, and in its frequencies there."""
+
+    def bent(**shear: float) -> np.ndarray:
+        section = fc.Section(EA=2e8, EI_y=4e4, EI_z=4e3, GJ=2e3, rhoA=6.0, rhoJ=0.02, **shear)
+        beam = fc.Beam("beam", (0, 0, 0), (3, 0, 0), section, elements=elements)
+        model = fc.assemble(
+            fc.Structure(
+                [beam],
+                [fc.Support(beam.start)],
+                inputs=[fc.Force(f"f{axis}", beam.end, axis) for axis in "yz"],
+                outputs=[
+                    *(fc.Position(axis, beam.end, axis) for axis in "xyz"),
+                    *(fc.Rotation(f"r{axis}", beam.end, axis) for axis in "xyz"),
+                ],
+            ),
+            [fc.Flexible(), fc.LargeRotation()],
+        )
+        rest = fc.equilibrium(model, inputs={"fy": 300.0, "fz": -3000.0})
+        return np.array([*rest.outputs.values(), *fc.linearize(model, at=rest).modes(3).frequencies])
+
+    assert bent(GA_y=1e20, GA_z=1e20) == pytest.approx(bent(), rel=1e-9, abs=1e-9)

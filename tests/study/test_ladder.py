@@ -15,6 +15,7 @@ from flexctrl.errors import StructureError
 from flexctrl.scene.files import scene_from
 from flexctrl.scene.reading import Place
 from flexctrl.study.ladder import Ladder, Rung, rungs
+from flexctrl.study.reference import Reference
 from flexctrl.study.settings import Fidelity, Setting
 from flexctrl.study.subject import prepared
 
@@ -52,9 +53,27 @@ def test_rungs_worth_standing_on():
     setting = Setting(Fidelity.FULL, 1, fc.AdaptiveAlpha(), fc.Tolerance())
     rungs = [Rung(name, setting, error, time, 1, 1) for name, (time, error) in times.items()]
     failed = Rung("refined", setting, np.inf, np.inf, 0, 0, "it cannot be")
-    assert [r.name for r in Ladder("made up", (*rungs, failed), None).climb] == ["linear", "full"]
-    assert [r.name for r in Ladder("made up", tuple(rungs[:1]), None).climb] == ["rigid"]
-    assert Ladder("made up", (failed,), None).climb == ()
+    exact, rough = (Reference(None, setting, {"mesh": known}) for known in (0.0, 0.5))
+    assert [r.name for r in Ladder("made up", (*rungs, failed), exact).climb] == ["linear", "full"]
+    assert [r.name for r in Ladder("made up", tuple(rungs[:1]), exact).climb] == ["rigid"]
+    assert Ladder("made up", (failed,), exact).climb == ()
+    quick = Rung("quick", setting, 0.45, 0.8, 1, 1)  # as good as the linear one, as far as can be told
+    assert [r.name for r in Ladder("made up", (quick, *rungs), rough).climb] == ["quick", "full"]
+    assert "quick" not in [r.name for r in Ladder("made up", (quick, *rungs), exact).climb]
+    assert "< 5.0e-01" in str(Ladder("made up", (quick, *rungs), rough))
+
+
+def test_a_rung_looks_the_same_in_every_chart():
+    setting = Setting(Fidelity.FULL, 1, fc.AdaptiveAlpha(), fc.Tolerance())
+    exact = Reference(None, setting, {"mesh": 1e-6})
+    names = ["rigid", "linear", "full", "mine"]
+    looks = []
+    for start in (0, 1):
+        rungs = [Rung(name, setting, 0.1 / (i + 1), i + 1.0, 1, 1) for i, name in enumerate(names[start:])]
+        ax = Ladder("made up", tuple(rungs), exact).plot().axes[0]
+        looks.append({line.get_label(): (line.get_marker(), line.get_color()) for line in ax.lines})
+    assert all(looks[0][name] == looks[1][name] for name in names[1:])
+    assert len({looks[0][name] for name in names}) == len(names)
 
 
 def test_every_rung_has_its_own_freedoms():

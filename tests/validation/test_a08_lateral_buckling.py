@@ -4,8 +4,8 @@ Classical: P = 2 z √(EI GJ)/L², z the zeros of J₋₁⸝₄, for a strip tha
 stiffnesses of that plane are taken 10⁴ times those of the section; K grows by a part that is proportional to the load.
 FinEtools (PetrKryslUCSD/FinEtoolsFlexStructures.jl, test/test_beam_buckling.jl) lists two factors for L = 30, b = 0.5,
 h = 4, E = 10⁶, ν = 0.3 and J from a table, found with 32 of its elements. Its elements written again give them, and go
-on to the closed form with more: the second of those listed is 2.5e-3 above it, an error of its mesh. Ours are as far
-from the closed form with 38 elements as theirs with 32, and go to it as well.
+on to the closed form with more: the second of those listed is 2.5e-3 above it, an error of its mesh. As many of ours
+are nearer to the closed form, and go to it as well.
 """
 
 from __future__ import annotations
@@ -80,11 +80,11 @@ def test_as_listed(record):
     case = "A8 strip with a load at its tip: factors of FinEtools"
     listed = {"reference": LISTED, "source": "FinEtoolsFlexStructures.jl test/test_beam_buckling.jl"}
     record(f"{case}, its 32 elements written again", ours=theirs(32), tolerance=2e-4, **listed)
-    record(f"{case}, 40 elements of ours", ours=ours(40), tolerance=1e-3, **listed)
+    record(f"{case}, 32 elements of ours", ours=ours(32), tolerance=1e-3, **listed)
 
 
 def test_closed_form(record):
     case = "A8 strip with a load at its tip: the same factors by closed form"
     closed = {"reference": closed_form(), "source": "zeros of J₋₁⸝₄ (Prandtl 1899)"}
     record(f"{case}, 128 elements of FinEtools", ours=theirs(128), tolerance=2e-4, **closed)
-    record(f"{case}, 64 elements of ours", ours=ours(64), tolerance=1e-3, **closed)
+    record(f"{case}, 64 elements of ours", ours=ours(64), tolerance=6e-4, **closed)
