@@ -32,9 +32,11 @@ _EXACT = 1e-13
 _SHORT = 1e-6
 
 
-def massless(feed: Feed) -> Massless:
-    """Return the freedoms of a model that move no mass, under what feeds it."""
-    return Massless(feed, quasistatic(feed.model), dragged(feed.model))
+def massless(feed: Feed, steady: np.ndarray | None = None) -> Massless:
+    """Return the freedoms of a model that move no mass, under what feeds it; ``steady`` are those that this damps."""
+    if steady is None or not steady.size:
+        return Massless(feed, quasistatic(feed.model), dragged(feed.model))
+    return Massless(feed, np.setdiff1d(quasistatic(feed.model), steady), np.union1d(dragged(feed.model), steady))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from flexctrl.dynamics.massless import massless
 from flexctrl.dynamics.newton import POOR
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import largest, turning, yardsticks
-from flexctrl.dynamics.settling import settled
+from flexctrl.dynamics.settling import settled, steadied
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
 from flexctrl.dynamics.stiff_lines import STIFF, Caution, firmest
 from flexctrl.errors import SingularMatrixError, StructureError
@@ -158,7 +158,7 @@ class _Stepper:
             If a freedom has neither mass nor stiffness.
         """
         still = np.zeros(self.model.n)
-        state, supply = settled(self.model, state, self.feed, supply)
+        state, supply = self._settled(state, supply, step)
         try:
             rate = self.masses.accelerations(state, supply.u, still)
         except SingularMatrixError:
@@ -166,6 +166,12 @@ class _Stepper:
             state, supply = self._set_out(state, still, supply, step)
             self._check_held(state, supply, step)
         return _Point(state, rate, supply, self.momenta.at(state, supply.u)[0])
+
+    def _settled(self, state: State, supply: Supply, step: float) -> tuple[State, Supply]:
+        """Return a state with what has stiffness alone where it balances; what the controller damps stays."""
+        steady = steadied(self.feed, state, supply, step, np.inf)
+        self.light = massless(self.feed, steady)
+        return settled(self.model, state, self.feed, supply, steady)
 
     def _set_out(self, state: State, rate: np.ndarray, supply: Supply, step: float) -> tuple[State, Supply]:
         """Return a state in which what has no mass moves as its forces say, and the inputs there."""
@@ -184,7 +190,7 @@ class _Stepper:
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs: momenta do not jump."""
-        state, supply = settled(self.model, point.state, self.feed, supply)
+        state, supply = self._settled(point.state, supply, step)
         if self.massless:
             state, supply = self._set_out(state, point.rate, supply, step)
         rate = point.rate if self.massless else self.masses.accelerations(state, supply.u, point.rate)

@@ -12,7 +12,7 @@ from flexctrl.dynamics.alpha_point import AlphaPoint
 from flexctrl.dynamics.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.massless import Massless, massless
-from flexctrl.dynamics.settling import settled
+from flexctrl.dynamics.settling import settled, steadied
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.flows import flow_rates, flowing, without
 from flexctrl.model.solve import Solve
@@ -38,7 +38,8 @@ def start(stepper: Stepper, state: State, supply: Supply, step: float) -> AlphaP
 
 
 def _fresh(stepper: Stepper, state: State, supply: Supply, step: float) -> AlphaPoint:
-    state, supply = settled(stepper.model, state, stepper.feed, supply)
+    steady = steadied(stepper.feed, state, supply, step, stepper.sight)
+    state, supply = settled(stepper.model, state, stepper.feed, supply, steady)
     light = _light(stepper, state, supply, step)
     state, supply, rate = _set_out(stepper, state, supply, step, light)
     if light.loose.size:
@@ -49,7 +50,7 @@ def _fresh(stepper: Stepper, state: State, supply: Supply, step: float) -> Alpha
 
 def _light(stepper: Stepper, state: State, supply: Supply, step: float) -> Massless:
     """What moves no mass and sets out as its forces say: nothing, where a step would not see how it begins."""
-    light = massless(stepper.feed)
+    light = massless(stepper.feed, steadied(stepper.feed, state, supply, step, stepper.sight))
     return light if light.all.size and light.seen(state, supply, step, stepper.sight) else light.none
 
 

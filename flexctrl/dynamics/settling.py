@@ -18,7 +18,7 @@ from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 
-__all__ = ["dragged", "quasistatic", "settled", "weightless"]
+__all__ = ["dragged", "quasistatic", "settled", "steadied", "weightless"]
 
 _EXACT = 1e-12
 _ITERATIONS = 25
@@ -68,7 +68,38 @@ def _own(model: Plant, seeds: tuple[float, float, float]) -> np.ndarray:
     return np.abs(model.slope(model.rest, zero, zero, seeds, u).diagonal())
 
 
-def settled(model: Plant, state: State, feed: Feed, supply: Supply) -> tuple[State, Supply]:
+def steadied(feed: Feed, state: State, supply: Supply, step: float, sight: float) -> np.ndarray:
+    """Return the quasi-static freedoms that a continuous controller damps: they keep their place as its command jumps.
+
+    Parameters
+    ----------
+    feed : Feed
+    state : State
+    supply : Supply
+    step : float
+        About to be taken [s].
+    sight : float
+        Time constants that a step may be long, so that it sees them; one that sees nothing finds them settled.
+
+    Returns
+    -------
+    numpy.ndarray of int
+    """
+    light = quasistatic(feed.model)
+    if not light.size or not feed.continuous:
+        return light[:0]
+    still, damping = np.zeros(feed.model.n), feed.slope(state, supply, 0.0, (0.0, 1.0, 0.0)).diagonal()[light]
+    if not damping.any():
+        return light[:0]
+    held = feed.model.slope(state, state.v, still, (1.0, 0.0, 0.0), supply.u)
+    stiffness = (held + feed.slope(state, supply, 0.0, (1.0, 0.0, 0.0))).diagonal()[light]
+    seen = np.isinf(sight) | (np.abs(stiffness) * step <= sight * np.abs(damping))
+    return light[seen & (damping != 0.0)]
+
+
+def settled(
+    model: Plant, state: State, feed: Feed, supply: Supply, steady: np.ndarray | None = None
+) -> tuple[State, Supply]:
     """Return a state with its quasi-static freedoms where they balance under the inputs, and the inputs there.
 
     Inputs of a continuous controller follow what it reads. The state is left as it is where it is balanced, or where
@@ -81,12 +112,14 @@ def settled(model: Plant, state: State, feed: Feed, supply: Supply) -> tuple[Sta
     feed : Feed
     supply : Supply
         Inputs from now on.
+    steady : numpy.ndarray of int, optional
+        Those among them that keep their place.
 
     Returns
     -------
     tuple of State and Supply
     """
-    light = quasistatic(model)
+    light = quasistatic(model) if steady is None else np.setdiff1d(quasistatic(model), steady)
     if not light.size:
         return state, supply
     zero, weight, first = np.zeros(model.n), 1.0 / yardsticks(model)[light], (state, supply)

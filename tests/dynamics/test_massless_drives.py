@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flexctrl as fc
+from flexctrl.design import Step, pd
 from flexctrl.errors import MechanismError
 
 SHAFT, RATIO, SAMPLE, UNTIL = 50.0, 3.0, 0.02, 1.0
@@ -175,3 +176,35 @@ def test_under_a_continuous_controller_it_moves_as_its_forces_say(method, c):
     errors = [np.abs(run.y[-1] - exact) for run in runs]
     assert (errors[0] <= [2e-4, 5e-4, 1e-4]).all()
     assert errors[0] / errors[1] == pytest.approx([4.0] * 3, rel=0.05)
+
+
+METHODS = {
+    "fixed": (fc.GeneralizedAlpha(1e-3), 2e-4),
+    "controlled": (fc.AdaptiveAlpha(), 3e-4),
+    "conserving": (fc.ConservingMidpoint(1e-3), 2e-4),
+    "exact": (fc.Exact(1e-3), 1e-6),
+}
+
+
+@pytest.mark.parametrize("jump", [0.0, 0.05])
+@pytest.mark.parametrize("method", METHODS)
+def test_under_a_continuous_law_that_damps_it_it_keeps_its_place_as_the_reference_jumps(method, jump):
+    """a' = 8 (r − a) − k (a − 3 q), J q'' = 3 k (a − 3 q): the law's damping alone makes it of first order."""
+    body = fc.RigidBody("body", (0, 0, 0), 1.0, (1, 1, 1.0))
+    drive = fc.RotaryDrive("drive", body.node, axis="z", stiffness=SHAFT, ratio=RATIO, inertia=0)
+    outputs = [fc.DriveAngle("angle", drive), fc.DriveSpeed("speed", drive)]
+    held = [fc.Support(body.node, "u v w rx ry")]
+    model = fc.assemble(
+        fc.Structure([body], held, [drive], [fc.MotorTorque("torque", drive)], outputs), [fc.ShaftElasticity()]
+    )
+    law = fc.Tracking(pd(8.0, 1.0, measured="angle", rate="speed", command="torque"), {"angle": Step(1.0, at=jump)})
+    how, tolerance = METHODS[method]
+    run = fc.simulate(model, law, until=0.25, method=how, every=0.05)
+
+    def slope(t: float, z: np.ndarray) -> list[float]:
+        shaft = SHAFT * (z[0] - RATIO * z[1])
+        return [8.0 * (1.0 - z[0]) - shaft, z[2], RATIO * shaft]
+
+    found = solve_ivp(slope, (0, 0.25), np.zeros(3), t_eval=run.t, method="Radau", rtol=1e-11, atol=1e-14).y[0]
+    expected = found if jump == 0.0 else np.append(0.0, found[:-1])
+    assert np.abs(run["angle"] - expected).max() <= tolerance * np.abs(expected).max()
