@@ -174,6 +174,13 @@ def test_out_holds_pictures_and_data(call, scene, tmp_path, command, files):
         assert "nan" not in "".join(rows[1:])
 
 
+def test_notes_stand_below_a_run_and_in_its_data(call, scene, told):
+    _, text, _ = call("run", scene)
+    notes = told("run")["notes"]
+    assert notes[0] == "made up"
+    assert "\n".join(f"note: {note}" for note in notes) in text
+
+
 def test_written_curves_are_the_run(call, scene, tmp_path):
     _, out, _ = call("run", scene, "--json", "--out", tmp_path)
     curves = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)

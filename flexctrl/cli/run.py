@@ -26,13 +26,16 @@ def answer(request: Request) -> Answer:
     scene = load_scene(request.scene).settled
     wanted = scene.simulation is not None and scene.simulation.rigid_twin
     run, twin = run_both(scene, twin=wanted)
-    data = plain({"scene": scene.name, **told(run)} | ({"rigid": told(twin)} if twin else {}))
+    notes = [*scene.notes, *run.report.notes]
+    data = plain({"scene": scene.name, **told(run), "notes": notes} | ({"rigid": told(twin)} if twin else {}))
     write_json(request.out, "run.json", data)
     write_csv(request.out, "run.csv", curves(run))
     if twin:
         write_csv(request.out, "rigid.csv", curves(twin))
     draw(request, scene, run, twin)
-    return Answer(_text(scene, run, twin), data, problem(run, twin), interrupted(run, twin))
+    beside = [f"rigid twin: {note}" for note in twin.report.notes if note not in notes] if twin else []
+    text = "\n".join([_text(scene, run, twin), "", *(f"note: {note}" for note in (*notes, *beside))]).rstrip()
+    return Answer(text, data, problem(run, twin), interrupted(run, twin))
 
 
 def run_both(scene: Scene, twin: bool) -> tuple[Run, Run | None]:

@@ -182,12 +182,13 @@ class Scene:
         controller: Any = None,
         loads: Mapping[str, float | Signal] | None = None,
         simulation: Simulation | None = None,
+        notes: Sequence[str] | None = None,
     ) -> Scene:
         """Return a copy with some fields replaced; what is left out stays, models of the same physics too.
 
         Parameters
         ----------
-        structure, effects, controller, loads, simulation
+        structure, effects, controller, loads, simulation, notes
             As for the constructor.
 
         Returns
@@ -200,6 +201,7 @@ class Scene:
             "controller": controller,
             "loads": loads,
             "simulation": simulation,
+            "notes": notes if notes is None else tuple(notes),
         }
         found = replace(self, **{name: value for name, value in given.items() if value is not None})
         if structure is not None:
@@ -222,15 +224,16 @@ class Scene:
 
     @cached_property
     def settled(self) -> Scene:
-        """The scene with the effects it needs: itself, unless it has `Automatic` among them."""
+        """The scene with the effects it needs, and a note of what is left out: itself, without `Automatic`."""
         choice = next((e for e in self.effects if isinstance(e, Automatic)), None)
         if choice is None:
             return self
         full = self.with_(effects=[e for e in self.effects if e is not choice])
-        found = ledger(full, choice.tolerance).scene
-        found = found.with_(simulation=replace(self._simulation, method=found.simulation.method))
+        drawn_up = ledger(full, choice.tolerance)
+        found = drawn_up.scene
         assert isinstance(found, Scene)
-        return found
+        way = replace(self._simulation, method=found._simulation.method)
+        return found.with_(simulation=way, notes=(*self.notes, f"automatic: {drawn_up.summary}"))
 
     # -- models
 

@@ -223,6 +223,12 @@ class Ledger:
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
     @property
+    def summary(self) -> str:
+        """What the minimal set leaves out of the full one, and what that changes, in a line."""
+        gone = ", ".join(e.name for e in self.entries if not e.keep) or "nothing"
+        return f"left out: {gone}; {self.changes} (asked: {self.within}){self._way}"
+
+    @property
     def changes(self) -> str:
         """How far the minimal set's answer is from the full one's, in words."""
         change = self.minimal_change

@@ -40,8 +40,8 @@ def smallest(bench: Bench, items: Sequence[Omission], exact: bool) -> Choice:
     """Return what can be left out together.
 
     From the full scene, or the one that is linear if that is quicker, what keeps the answer alone is left out
-    together: all of it, or halves of it where it does more together. Then everything that is left is tried once
-    more, one by one, until none can go: one may undo what another does.
+    together, first what there is less to compute without: all of it, or halves of it where it does more together. Then
+    everything that is left is tried once more, one by one, until none can go: one may undo what another does.
 
     Parameters
     ----------
@@ -64,8 +64,10 @@ class _Search:
     def found(self) -> Choice:
         choice = self._start()
         alone = {o.name: self._excess(o) for o in self.items}
-        order = sorted(self.items, key=lambda o: alone[o.name])
-        self._extend(choice, [o for o in order if alone[o.name] <= 1.0 and o.spares])
+        order = sorted(self.items, key=lambda o: (not self._saves(o), alone[o.name]))
+        can_go = [o for o in order if alone[o.name] <= 1.0 and o.spares]
+        self._extend(choice, [o for o in can_go if self._saves(o)])
+        self._extend(choice, can_go)
         while sum(self._goes(choice, o) for o in order):
             pass  # one may go now that another has
         return choice
@@ -86,6 +88,11 @@ class _Search:
     def _excess(self, omission: Omission) -> float:
         trial = self.bench.without(self._bundle(omission, ()))
         return float("inf") if isinstance(trial, Refused) else self.bench.excess(trial)
+
+    def _saves(self, omission: Omission) -> bool:
+        """Whether there is less to compute without it alone."""
+        trial = self.bench.without(self._bundle(omission, ()))
+        return not isinstance(trial, Refused) and _cheaper(trial, self.bench.full)
 
     def _bundle(self, omission: Omission, gone: Sequence[Omission]) -> list[Omission]:
         """One more to leave out, and before it what cannot be without it."""

@@ -358,4 +358,9 @@ def test_automatic_picks_the_minimal_set(longer, drawn_up_longer):
     assert chosen.settled.effects == drawn_up_longer.scene.effects
     assert chosen.settled.simulation == replace(longer.simulation, method=drawn_up_longer.scene.simulation.method)
     assert longer.settled is longer
+    told = [note for note in chosen.settled.notes if note.startswith("automatic: left out: ")]
+    assert told == [f"automatic: {drawn_up_longer.summary}"]
+    gone = {e.name for e in drawn_up_longer.entries if not e.keep}
+    assert gone
+    assert all(name in told[0] for name in gone)
     assert chosen.model.effects == longer.model.effects  # by itself it adds nothing
