@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.effects.places import by_place, finite
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, viscous_force
 from flexctrl.mechanics.beam_inertia import drag
@@ -98,20 +99,35 @@ class RayleighDamping(Effect):
 class ModalDamping(Effect):
     """C = M Φ diag(2 ζᵢ ωᵢ) Φᵀ M from the undamped modes about the machine's equilibrium; 0 is no damping.
 
+    Motions without stiffness, and those in which the machine would leave the equilibrium, are not damped. A `Scene`
+    fills in its own ``hold`` and ``rest_inputs``.
+
     Parameters
     ----------
     ratios : float or sequence of float
         Damping ratio of every flexible mode, or of the first ones in order (the rest are undamped).
+    hold : mapping of str to float, optional
+        Freedoms held in the equilibrium, ``"girder.start.u"`` or a coordinate's name, and where [m or rad]; the modes
+        are those of the machine that is free there again, under the forces that held it.
+    inputs : mapping of str to float, optional
+        Constant inputs it is in equilibrium with, in their units.
 
     Raises
     ------
     StructureError
-        For a ratio that is negative or not a number.
+        For a ratio that is negative, and for what is no number.
     """
 
     ratios: tuple[float, ...] | float
+    hold: tuple[tuple[str, float], ...]
+    inputs: tuple[tuple[str, float], ...]
 
-    def __init__(self, ratios: float | Sequence[float]) -> None:
+    def __init__(
+        self,
+        ratios: float | Sequence[float],
+        hold: Mapping[str, float] | None = None,
+        inputs: Mapping[str, float] | None = None,
+    ) -> None:
         def checked(ratio: float) -> float:
             return check_finite(ratio, "ratio", "ModalDamping", least=0.0)
 
@@ -122,3 +138,9 @@ class ModalDamping(Effect):
             object.__setattr__(self, "ratios", several)
         else:
             object.__setattr__(self, "ratios", checked(ratios))
+        for name, what, given in (("hold", "place", hold), ("inputs", "value", inputs)):
+            object.__setattr__(self, name, by_place(given or {}, f"ModalDamping: {name}", what, finite))
+
+    def everywhere(self) -> Effect:
+        """Kernels do not know about equilibria."""
+        return ModalDamping(self.ratios)

@@ -31,6 +31,9 @@ class Certificate:
     gyroscopic : float
         max |C − Cᵀ| / 2 max |C|: 0 for dampers, 1 for Coriolis forces alone (`RotatingFrame`). Undamped modes do
         not know of it, damped poles do.
+    held : tuple of str
+        What the equilibrium held and the model has let go of: the forces that held it, constant, are part of the
+        equilibrium, and no inputs.
     """
 
     residual: float
@@ -43,13 +46,15 @@ class Certificate:
     loads: tuple[str, ...] = ()
     gyroscopic: float = 0.0
     frequency_error: float = 0.0
+    held: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         rigid = "; ".join(self.rigid_modes) or "none"
         why = f" (by {', '.join(self.loads)})" if self.loads else ""
+        held = f", with constant forces on {', '.join(self.held)}" if self.held else ""
         turning = f", skew share of C {self.gyroscopic:.1e}" if self.gyroscopic else ""
         return (
-            f"equilibrium residual {self.residual:.1e}, asymmetry of K {self.asymmetry:.1e}{why}, "
+            f"equilibrium residual {self.residual:.1e}{held}, asymmetry of K {self.asymmetry:.1e}{why}, "
             f"smallest pivot of M {self.definiteness:.1e}, Taylor slope {self.taylor_slope:.2f}, "
             f"condition of M {self.condition_mass:.1e}, of K {self.condition_stiffness:.1e}{turning}, "
             f"lowest frequencies within {self.frequency_error:.1e}; "

@@ -18,6 +18,7 @@ import scipy.sparse as sp
 __all__ = ["clean_mass", "clean_stiffness"]
 
 RANK = 1e-12
+_LEAN = 1e-9
 
 Groups: TypeAlias = Sequence[np.ndarray]
 
@@ -72,6 +73,9 @@ def clean_stiffness(K: sp.csc_matrix, noise: np.ndarray, groups: Groups) -> sp.c
         idle = np.abs(values) <= limit[:, None]
         for node in np.flatnonzero(idle.any(axis=1) & (limit > 0.0)):
             null = vectors[node][:, idle[node]]
+            # what the noise leaves open of a direction: left in, its square would pass for a stiffness
+            open_to = min(limit[node] / np.abs(values[node]).max(initial=limit[node]), _LEAN)
+            null = np.where(np.abs(null) > open_to, null, 0.0)
             if np.abs(even[places[node]].T @ null).max() <= limit[node]:
                 nulls.append((places[node], null))
     return _without(nulls, K)

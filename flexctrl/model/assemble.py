@@ -18,7 +18,8 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.rope_mass import RopeMass
 from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.kernels.kernel import Backend, best_backend
-from flexctrl.model.braked import rest_held
+from flexctrl.linear.modes import Modes
+from flexctrl.model.braked import borne, rest_held
 from flexctrl.model.equations import Small
 from flexctrl.model.laws.frictions import inner_freedoms
 from flexctrl.model.laws.gusts import check_gusts, idle_gusts
@@ -188,32 +189,40 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
     """
     [small] = [e for e in parts if isinstance(e, GeometricStiffness)]
     large = assemble(structure, [*(e for e in parts if e is not small), LargeRotation()], backend)
-    from flexctrl.model.linearize import all_free, linearize, released  # brings all that modes need
+    from flexctrl.model.linearize import all_free, released  # brings all that modes need
 
     found = rest_held(large, dict(small.hold), dict(small.inputs))
-    linear = released(found) if found.brakes else all_free(linearize(large, at=found), found)
+    linear = all_free(released(found), found)
     about = Small(np.zeros(large.n), linear.K, linear.C.tocsr(), linear.M, found.inputs)
     motion = replace(large.motion, rest=found.state)
     unloaded = replace(large, effects=parts, motion=motion, viscous=0.0 * large.viscous, about=about)
     load = -unloaded.loads(found.state, found.inputs)
-    held = [large.coordinate(name) for name in found.held]
-    load[held] += (large.balance(found.state, *np.zeros((2, large.n))) + large.loads(found.state, found.inputs))[held]
-    return replace(unloaded, about=replace(about, load=load))
+    held = [large.coordinate(name) for name in found.held if name in large.coordinates]
+    let_go = large.balance(found.state, *np.zeros((2, large.n))) + large.loads(found.state, found.inputs)
+    unbraked = -large.motion.collect(found.state, borne(found))
+    load[held] += (let_go - unbraked)[held]
+    return replace(unloaded, about=replace(about, load=load + unbraked))
 
 
 def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:
-    """Return M Φ diag(2 ζ ω) Φᵀ M with the flexible modes about the equilibrium under the model's own weight."""
-    from flexctrl.model.linearize import linearize  # brings all that modes need
+    """Return M Φ diag(2 ζ ω) Φᵀ M with the flexible modes about the equilibrium that the damping names."""
+    from flexctrl.model.linearize import released  # brings all that modes need
 
-    linear = linearize(model)
-    modes = linear.modes(None if isinstance(damping.ratios, float) else len(damping.ratios) + linear.modes().rigid)
-    shapes, omega = modes.shapes[:, modes.rigid :], modes.omega[modes.rigid :]
+    linear = released(rest_held(model, dict(damping.hold), dict(damping.inputs)))
+    count = None if isinstance(damping.ratios, float) else len(damping.ratios) + _not_vibrating(linear.modes())
+    modes = linear.modes(count)
+    first = _not_vibrating(modes)
+    shapes, omega = modes.shapes[:, first:], modes.omega[first:]
     ratios = np.full(len(omega), damping.ratios) if isinstance(damping.ratios, float) else np.array(damping.ratios)
     count = min(len(ratios), len(omega))
     momenta = linear.M @ shapes[:, :count]
     places = [model.coordinate(name) for name in linear.coordinates]
     spread = sp.csr_matrix((np.ones(len(places)), (places, range(len(places)))), shape=(model.n, len(places)))
     return sp.csr_matrix(spread @ (momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T @ spread.T)
+
+
+def _not_vibrating(modes: Modes) -> int:
+    return modes.unstable + modes.rigid
 
 
 def rigid(model_or_effects: Model | Sequence[Effect]) -> Model | tuple[Effect, ...]:

@@ -101,8 +101,27 @@ class Balance:
 
     def force(self, state: State) -> np.ndarray:
         """Return the unbalanced forces on the free coordinates."""
-        force = self.model.balance(state, self.still, self.still) + self.model.loads(state, self.u)
-        return force[self.free] - (self.kept if self.kept.size else 0.0)
+        return self.among(state, self.whole_force(state)) - (self.kept if self.kept.size else 0.0)
+
+    def whole_force(self, state: State) -> np.ndarray:
+        """Return the unbalanced forces on all coordinates."""
+        return self.model.balance(state, self.still, self.still) + self.model.loads(state, self.u)
+
+    def among(self, state: State, force: np.ndarray) -> np.ndarray:
+        """Return what forces on all coordinates come to on the free ones."""
+        return force[self.free]
+
+    def whole(self, state: State, step: np.ndarray) -> np.ndarray:
+        """Return the step of all coordinates in which the free ones and those that are held go theirs."""
+        return step
+
+    def basis(self, state: State) -> sp.csc_matrix:
+        """Return the steps of all coordinates for one of each free one, shape (n, free)."""
+        return sp.identity(self.model.n, format="csc")[:, self.free]
+
+    def seen(self, state: State, A: sp.spmatrix) -> sp.csr_matrix:
+        """Return what a matrix on all coordinates comes to on the free ones."""
+        return self.among_free(A.tocsr())
 
     def gap(self, state: State) -> np.ndarray:
         """Return how far the held coordinates are from their places."""
@@ -167,7 +186,7 @@ class Balance:
 
     def round_off(self, state: State) -> np.ndarray:
         """Return the largest forces on the free coordinates that may be rounding alone."""
-        return force_rounding(self.model, state, self.u)[self.free]
+        return self.among(state, force_rounding(self.model, state, self.u))
 
     def holds(self, state: State, K: sp.csr_matrix) -> bool:
         """Tell whether a stiffness K of all coordinates resists every displacement of the free ones."""
@@ -187,7 +206,7 @@ class Balance:
         step[self.fixed] = self.gap(state)
         force = self.force(state) - (K[self.free] @ step if self.held else 0.0)
         step[self.free] = factorise(self.among_free(K).tocsr())(force)
-        return step
+        return self.whole(state, step)
 
     def settled(self, state: State, tolerance: float) -> bool:
         """Tell whether a state is an equilibrium, as far as round-off lets that be told.

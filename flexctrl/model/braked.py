@@ -1,29 +1,124 @@
-"""Equilibria that hold freedoms by name, among them the motors of winches whose ropes do not stretch.
+"""Equilibria that hold freedoms by name, also those that in this model follow from others.
 
-Such a motor turns with the length of its rope, which is no coordinate: of a rope that leans, it is held by a torque on
-it that is found with the shape, K δq − Gᵀ δτ = f, G δq = θ − θ(q), with the angle's slope G.
+The motor behind a rigid shaft turns with the joint that it drives, that of a rope which does not stretch with the
+rope's length: neither is a coordinate. Such a freedom is held by a force of its own, as a brake's torque on the motor,
+and by nothing else: f + Gᵀ τ = 0, θ(q) = θ₀, with its slope G. It takes the place of one coordinate, which then
+follows: with steps δq = B δy, where δy has G δq / G_p in place of δq_p, the search for equilibria is the usual one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.spatial.transform import Rotation
 
-from flexctrl.model.equilibrium import Rest, equilibrium
-from flexctrl.model.holding import held_at, own_coordinate
+from flexctrl.errors import EquilibriumError, StructureError
+from flexctrl.model.balance import Balance
+from flexctrl.model.equilibrium import Rest, equilibrium, settled
+from flexctrl.model.holding import own_coordinate, raw_place
+from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
+from flexctrl.model.rounding import force_rounding, slope_terms
 from flexctrl.model.state import State
-from flexctrl.structure.drives import Winch
-from flexctrl.structure.inputs import MotorTorque
+from flexctrl.model.units import geared, units
+from flexctrl.structure.freedoms import check_finite
 
-__all__ = ["rest_held", "with_brakes"]
+__all__ = ["balance_of", "bearing", "borne", "rest_held"]
 
-_STEPS = 60
-_REACH = 0.2
-_CLOSE = 1e-12
+_INDEPENDENT, _CLOSE = 1e-9, 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Braked(Balance):
+    """A balance in which freedoms that follow from others are held too.
+
+    Attributes
+    ----------
+    cells : numpy.ndarray of int, shape (k,)
+        Their places in raw vectors.
+    wanted : numpy.ndarray, shape (k,)
+        Where they are held, from the drawn shape [m or rad].
+    pivots : numpy.ndarray of int, shape (k,)
+        The coordinates whose places they take; ``held`` has them too, at no matter which value.
+    """
+
+    cells: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    wanted: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    pivots: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def gap(self, state: State) -> np.ndarray:
+        """Return how far what is held is from its place, in displacements of the coordinates that give way to it."""
+        away = np.zeros(self.model.n)
+        own = np.setdiff1d(self.fixed, self.pivots)
+        away[own] = [self.held[int(i)] for i in own] - state.q[own]
+        away[self.pivots] = la.solve(self._leads(state), self.wanted - stands(self.model, self.cells, state))
+        return away[self.fixed]
+
+    def among(self, state: State, force: np.ndarray) -> np.ndarray:
+        """Return what forces on all coordinates come to on the free ones, the others giving way."""
+        return np.asarray(self._change(state).T @ force)[self.free]
+
+    def whole(self, state: State, step: np.ndarray) -> np.ndarray:
+        """Return the step of all coordinates in which what is held goes to its place."""
+        return np.asarray(self._change(state) @ step)
+
+    def basis(self, state: State) -> sp.csc_matrix:
+        """Return the steps of all coordinates for one of each free one, shape (n, free)."""
+        return self._change(state).tocsc()[:, self.free]
+
+    def seen(self, state: State, A: sp.spmatrix) -> sp.csr_matrix:
+        """Return what a matrix on all coordinates comes to on the free ones."""
+        change = self._change(state)
+        return self.among_free((change.T @ A @ change).tocsr())
+
+    def slope(self, state: State, excess: Excess | None = None) -> sp.csr_matrix:
+        """Return K of all coordinates and of what takes the place of some; what holds turns with its levers."""
+        K, motion, force = super().slope(state, excess), self.model.motion, self.whole_force(state)
+        if excess is not None:
+            force = force + motion.collect(state, excess.raw)
+        if self.model.large and not motion.plain:
+            K = K - sp.csr_matrix(motion.stiffening(state, self.brakes(state, force)))
+        change = self._change(state)
+        return (change.T @ K @ change).tocsr()
+
+    def brakes(self, state: State, force: np.ndarray) -> np.ndarray:
+        """Return the raw forces that hold against forces on all coordinates."""
+        raw = np.zeros(self.model.motion.raw)
+        raw[self.cells] = -la.solve(self._leads(state).T, force[self.pivots])
+        return raw
+
+    def round_off(self, state: State) -> np.ndarray:
+        """Return the largest forces on the free coordinates that may be rounding alone."""
+        return np.asarray(abs(self._change(state)).T @ force_rounding(self.model, state, self.u))[self.free]
+
+    def part(self, start: State, holding: np.ndarray, done: float) -> Braked:
+        """Return the way to this balance from a start that forces ``holding`` hold: 0 there, 1 here."""
+        found = super().part(start, holding, done)
+        assert isinstance(found, Braked)
+        wanted = (1.0 - done) * stands(self.model, self.cells, start) + done * self.wanted
+        return self._again(replace(found, wanted=wanted))  # type: ignore[return-value]
+
+    def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+        if not self.model.large or self.model.motion.plain:
+            return super()._terms(state, K)
+        change = abs(self._change(state))
+        return self.among_free((change.T @ slope_terms(self.model, state, self.u, K) @ change).tocsr())
+
+    def _leads(self, state: State) -> np.ndarray:
+        """How what is held follows the coordinates that give way, shape (k, k)."""
+        return _slope(self.model, self.cells, state)[:, self.pivots]
+
+    def _change(self, state: State) -> sp.csr_matrix:
+        """Steps of the coordinates from steps in which what is held stands in for those that give way: B."""
+        G = _slope(self.model, self.cells, state)
+        follow = -la.solve(G[:, self.pivots], G)
+        follow[:, self.pivots] = 0.0
+        rows = sp.csr_matrix((np.ones(len(self.pivots)), (self.pivots, np.arange(len(self.pivots)))), (G.shape[1],) * 2)
+        return (sp.identity(G.shape[1], format="csr") + rows[:, : len(self.pivots)] @ sp.csr_matrix(follow)).tocsr()
 
 
 def rest_held(model: Model, hold: Mapping[str, float], inputs: Mapping[str, float]) -> Rest:
@@ -33,34 +128,35 @@ def rest_held(model: Model, hold: Mapping[str, float], inputs: Mapping[str, floa
     ----------
     model : Model
     hold : mapping of str to float
-        ``"girder.start.u"`` or a coordinate's name, and where; see `held_at`.
+        ``"girder.start.u"`` or a coordinate's name, and where; also those that rigid parts, shafts and ropes take away.
     inputs : mapping of str to float
 
     Returns
     -------
     Rest
-        Where a rope that does not stretch hangs from a motor that is held, all that the rope moves is held in it.
+        ``brakes`` tells the forces that hold what is no coordinate.
 
     Raises
     ------
     EquilibriumError, StructureError
-        As `equilibrium` and `held_at`.
+        As `equilibrium`; for what the joints do not leave free, and for what cannot be held where it is asked to be.
     """
-    places, winches = held_at(model, hold), _winches(model, hold)
-    if winches and model.large:
-        own = {model.coordinate(n): at for n, at in held_at(model, _others(model, hold, winches)).items()}
-        if (hung := _hung(model, places, own, winches, inputs)) is not None:
-            state, torques = hung
-            led = np.flatnonzero(_slope(model, state, list(winches)).any(axis=0))
-            places = {model.coordinates[i]: float(state.q[i]) for i in {*led.tolist(), *own}}
-            names = (model.structure.drives[i].name for i in winches)
-            brakes = tuple(zip(names, torques.tolist(), strict=True))
-            return replace(equilibrium(model, hold=places, inputs=inputs, start=state), brakes=brakes)
-    return equilibrium(model, hold=places, inputs=inputs)
+    own, lost = _told(model, hold)
+    if not lost:
+        return equilibrium(model, hold={model.coordinates[i]: at for i, at in own.items()}, inputs=inputs)
+    wanted = {raw_place(model, name): at for name, at in lost.items()}
+    own |= {i: float(model.rest.q[i]) for i in model.motion.frozen if i not in own}
+    balance = _balance(model, model.input_vector(inputs), own, wanted, model.rest)
+    found = settled(balance, model.rest.loose)
+    _check_places(model, lost, found.state)
+    held = (*(model.coordinates[i] for i in own), *lost)
+    forces = balance.brakes(found.state, balance.whole_force(found.state)) if isinstance(balance, Braked) else None
+    brakes = tuple((name, 0.0 if forces is None else float(forces[i])) for name, i in zip(lost, wanted, strict=True))
+    return replace(found, held=held, brakes=brakes)
 
 
-def with_brakes(rest: Rest) -> Rest:
-    """Return an equilibrium whose brakes are torques of motors, inputs behind those that its model has.
+def bearing(rest: Rest) -> Model:
+    """Return the model of an equilibrium under the forces that hold what is no coordinate of it.
 
     Parameters
     ----------
@@ -68,71 +164,141 @@ def with_brakes(rest: Rest) -> Rest:
 
     Returns
     -------
-    Rest
-        Itself without brakes.
+    Model
     """
+    return rest.model.carrying(borne(rest)) if rest.brakes else rest.model
+
+
+def borne(rest: Rest) -> np.ndarray:
+    """Return the raw forces that hold what is no coordinate.
+
+    Parameters
+    ----------
+    rest : Rest
+
+    Returns
+    -------
+    numpy.ndarray, shape (raw,)
+    """
+    raw = np.zeros(rest.model.motion.raw)
+    for name, force in rest.brakes:
+        raw[raw_place(rest.model, name)] = force
+    return raw
+
+
+def balance_of(rest: Rest) -> Balance:
+    """Return the conditions of an equilibrium, with all held that it holds.
+
+    Parameters
+    ----------
+    rest : Rest
+
+    Returns
+    -------
+    Balance
+    """
+    model, state = rest.model, rest.state
+    numbers = {model.coordinate(name) for name in rest.held if name in model.coordinates}
+    own = {i: float(state.q[i]) for i in sorted(numbers | set(model.motion.frozen))}
     if not rest.brakes:
-        return rest
-    drives, torques = zip(*rest.brakes, strict=True)
-    model = _with_torques(rest.model, drives)
-    return replace(rest, model=model, inputs=np.concatenate([rest.inputs, torques]), brakes=())
+        return Balance(model, rest.inputs, own)
+    cells = [raw_place(model, name) for name, _ in rest.brakes]
+    wanted = dict(zip(cells, stands(model, np.array(cells), state).tolist(), strict=True))
+    return _balance(bearing(rest), rest.inputs, own, wanted, state)
 
 
-def _with_torques(model: Model, drives: Sequence[str]) -> Model:
-    """The machine with a torque on the motor of each of some drives, the last of its inputs."""
-    from flexctrl.model.assemble import assemble  # which finds equilibria itself
+def stands(model: Model, cells: np.ndarray, state: State) -> np.ndarray:
+    """Return how far raw freedoms are from where they are drawn.
 
-    brakes = [MotorTorque(f"brake_of_{name}", name) for name in drives]
-    return assemble(model.structure.with_(inputs=[*model.structure.inputs, *brakes]), model.effects, model.backend)
+    Parameters
+    ----------
+    model : Model
+    cells : numpy.ndarray of int, shape (k,)
+        Places in raw vectors: of nodes, and of motors.
+    state : State
 
-
-def _winches(model: Model, hold: Mapping[str, float]) -> dict[int, float]:
-    """Numbers of the drives that are held, lead a rope and have no coordinate of their own, and where."""
-    drives = enumerate(model.structure.drives)
-    names = {f"{d.name}_source": i for i, d in drives if isinstance(d, Winch)}
-    return {names[name]: at for name, at in hold.items() if name in names and not own_coordinate(model, name)}
-
-
-def _others(model: Model, hold: Mapping[str, float], winches: Mapping[int, float]) -> dict[str, float]:
-    led = {f"{model.structure.drives[i].name}_source" for i in winches}
-    return {name: at for name, at in hold.items() if name not in led}
-
-
-def _slope(model: Model, state: State, drives: list[int]) -> np.ndarray:
-    """How motor angles follow the coordinates."""
-    rows = [model.motion.source_base + i for i in drives]
-    return np.asarray(model.motion.jacobian(state)[rows].toarray())
+    Returns
+    -------
+    numpy.ndarray, shape (k,)
+        Displacements [m], turns (of rotations, their rotation vectors) and motor angles [rad].
+    """
+    if model.large:
+        return _posed(model, cells, state)
+    away = state.q - model.rest.q
+    return _posed(model, cells, model.rest) + _slope(model, cells, model.rest) @ away
 
 
-def _hung(
-    model: Model,
-    places: Mapping[str, float],
-    own: Mapping[int, float],
-    winches: Mapping[int, float],
-    inputs: Mapping[str, float],
-) -> tuple[State, np.ndarray] | None:
-    """Return the shape in which brakes hold the winches, and their torques; None if Newton's method finds none."""
-    structure, drives, wanted = model.structure, list(winches), np.array(list(winches.values()))
-    held = _with_torques(model, [structure.drives[i].name for i in drives])
-    u, still = held.input_vector(dict(inputs)), np.zeros(held.n)
-    free = np.setdiff1d(np.arange(held.n), list(own))
-    state, motion, k = held.displace(dict(places)), held.motion, len(drives)
-    force = (held.balance(state, still, still) + held.loads(state, u))[free]
-    u[-k:] = -la.lstsq(_slope(held, state, drives)[:, free].T, force)[0]
-    for _ in range(_STEPS):
-        force = (held.balance(state, still, still) + held.loads(state, u))[free]
-        G = _slope(held, state, drives)[:, free]
-        K = -held.slope(state, still, still, (1.0, 0.0, 0.0), u).toarray()[np.ix_(free, free)]
-        gap = wanted - (motion.ratios * (state.driven - held.rest.driven))[drives]
-        system = np.block([[K, -G.T], [G, np.zeros((k, k))]])
-        step = la.lstsq(system, np.concatenate([force, gap]))[0]
-        share = min(1.0, _REACH * structure.size / max(float(np.abs(step[:-k]).max(initial=0.0)), 1e-300))
-        u[-k:] += share * step[-k:]
-        moved = still.copy()
-        moved[free] = share * step[:-k]
-        state = held.advance(state, moved, still, 0.0)
-        if not np.isfinite(state.x).all():
-            return None
-        if np.abs(moved).max(initial=0.0) <= _CLOSE * structure.size:
-            return state, u[-k:]
-    return None
+def _posed(model: Model, cells: np.ndarray, state: State) -> np.ndarray:
+    motion = model.motion
+    drawn, driven = model.rest.x, model.rest.driven
+    if model.about:  # whose rest is no drawn shape
+        drawn = np.array([*(n.position for n in model.structure.nodes), (0.0, 0.0, 0.0)])
+        driven = motion.unwound(drawn, np.tile(np.eye(3), (len(drawn), 1, 1)), 0.0 * driven)
+    turned = Rotation.from_matrix(state.R).as_rotvec()
+    nodes = np.hstack([state.x - drawn, turned]).ravel()
+    return np.asarray(np.concatenate([nodes, motion.ratios * (state.driven - driven)])[cells])
+
+
+def _told(model: Model, hold: Mapping[str, float]) -> tuple[dict[int, float], dict[str, float]]:
+    """Where coordinates are held, by their numbers, and what is held beside, by its name."""
+    own: dict[int, float] = {}
+    lost: dict[str, float] = {}
+    for name, at in hold.items():
+        place = check_finite(at, f"hold {name!r}", "equilibrium")
+        if not (coordinate := own_coordinate(model, name)):
+            lost[name] = place
+        elif own.setdefault(model.coordinate(coordinate), place) != place:
+            raise StructureError(f"hold {name!r}: {coordinate} is held in two places, at {place:g} too; name one")
+    return own, lost
+
+
+def _slope(model: Model, cells: np.ndarray, state: State) -> np.ndarray:
+    """How raw freedoms follow the coordinates, shape (k, n)."""
+    return np.asarray(model.motion.jacobian(model.place(state))[cells].toarray())
+
+
+def _balance(
+    model: Model, u: np.ndarray, own: Mapping[int, float], wanted: Mapping[int, float], start: State
+) -> Balance:
+    """The balance that holds coordinates and, of raw freedoms, all that can move and do not follow from others."""
+    cells, places = np.array(list(wanted), dtype=int), np.array(list(wanted.values()))
+    reach = _slope(model, cells, start) * units(model, model.structure.size)
+    reach[:, list(own)] = 0.0
+    sizes = np.linalg.norm(reach, axis=1)
+    moving = np.flatnonzero(sizes > _INDEPENDENT * _yardsticks(model)[cells])
+    moving = moving[_leading((reach[moving] / sizes[moving, None]).T)]
+    if not moving.size:
+        return Balance(model, u, own)
+    pivots = _leading(reach[moving])
+    held = dict(own) | {int(i): float(start.q[i]) for i in pivots}
+    return Braked(model, u, held, cells=cells[moving], wanted=places[moving], pivots=pivots)
+
+
+def _leading(A: np.ndarray) -> np.ndarray:
+    """Numbers of columns that make up the space of all, the largest first."""
+    if not A.size:
+        return np.zeros(0, dtype=int)
+    R, order = la.qr(A, mode="r", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    return np.asarray(order[: int((sizes > _INDEPENDENT * sizes[0]).sum())])
+
+
+def _yardsticks(model: Model) -> np.ndarray:
+    """What a displacement of one is in each raw freedom of nodes and motors."""
+    size = model.structure.size
+    nodes = np.tile(np.repeat([size, 1.0], 3), len(model.motion.place))
+    return np.concatenate([nodes, geared(model, size)])
+
+
+def _check_places(model: Model, lost: Mapping[str, float], state: State) -> None:
+    """Refuse an equilibrium in which something is not where it is to be held."""
+    cells = np.array([raw_place(model, name) for name in lost])
+    reached, units_there = stands(model, cells, state), _yardsticks(model)[cells]
+    for (name, at), place, unit in zip(lost.items(), reached, units_there, strict=True):
+        if abs(place - at) > _CLOSE * max(unit, abs(at)):
+            raise EquilibriumError(
+                f"no equilibrium found with {name} held at {at:g}: it stays at {place:.6g}, as in this model it does "
+                "not move, or only with what is held elsewhere; hold it there, or let bend what is between",
+                state,
+                0.0,
+            )

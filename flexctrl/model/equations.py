@@ -163,7 +163,7 @@ class SmallMotion:
 
     def loads(self, state: State, u: np.ndarray) -> np.ndarray:
         """Return the generalised forces of the inputs."""
-        return self.model.motion.collect(self.model.rest, self._reach @ u)
+        return self.model.motion.collect(self.model.rest, self._reach @ u + self.model.carried)
 
     def balance(self, state: State, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the sum of all other forces."""

@@ -42,9 +42,9 @@ class Rest:
     iterations : int
     model : Model
     held : tuple of str
-        Coordinates that were held.
+        What was held: coordinates, and freedoms that in this model follow from others (a motor behind a rigid shaft).
     brakes : tuple of (str, float)
-        Drives that brakes hold whose ropes do not stretch, and the brakes' torques [N m]: they keep these ropes taut.
+        The forces that hold such freedoms [N or N m], by the names in ``held``; linear models bear them.
     """
 
     state: State
@@ -71,12 +71,10 @@ class Rest:
             Under loads without a potential, if the poles cannot be told: beyond 1000 freedoms, for a motion with
             neither mass nor stiffness, or where massless freedoms are damped.
         """
-        from flexctrl.model.braked import with_brakes  # which finds equilibria itself
+        from flexctrl.model.braked import balance_of
         from flexctrl.model.stability import leaving  # brings all that modes need
 
-        whole = with_brakes(self)
-        held = (whole.model.coordinate(name) for name in whole.held)
-        return leaving(Balance(whole.model, whole.inputs, {i: float(self.state.q[i]) for i in held}), self.state)
+        return leaving(balance_of(self), self.state)
 
     @property
     def stable(self) -> bool:
@@ -146,10 +144,29 @@ def equilibrium(
         check_state(model, start, "equilibrium: start")
     begin = (start or model.rest).loose
     held |= {i: float(begin.q[i]) for i in model.motion.frozen}
-    balance = Balance(model, model.input_vector(inputs or {}), held)
-    begin = begin.with_(v=balance.still, t=0.0)
-    found = _found(balance, begin, tolerance)
-    if fallen := off_rails(model, found.state):
+    return settled(Balance(model, model.input_vector(inputs or {}), held), begin, tolerance)
+
+
+def settled(balance: Balance, start: State, tolerance: float = 1e-9) -> Rest:
+    """Return the equilibrium that a start leads to.
+
+    Parameters
+    ----------
+    balance : Balance
+    start : State
+    tolerance : float
+
+    Returns
+    -------
+    Rest
+
+    Raises
+    ------
+    EquilibriumError
+        As `equilibrium`.
+    """
+    found = _found(balance, start.with_(v=balance.still, t=0.0), tolerance)
+    if fallen := off_rails(balance.model, found.state):
         raise EquilibriumError(
             f"no equilibrium found on the rails: {fallen[0]}; hold what travels, or balance its load",
             found.state,

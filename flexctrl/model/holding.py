@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from flexctrl.effects.flexibility import Flexible
@@ -13,58 +11,7 @@ from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
 from flexctrl.structure.naming import node_of
 from flexctrl.structure.structure import Structure
 
-__all__ = ["check_free", "held_at", "own_coordinate"]
-
-_ROUNDING = 1e-9
-
-
-def held_at(model: Model, hold: Mapping[str, float]) -> dict[str, float]:
-    """Return which coordinates of a model are held where.
-
-    What rigid parts and shafts take away (a motor's source angle in the rigid twin) is held by the coordinates that
-    it moves with at rest, T q = at, wherever these equations tell them; a motion that they leave free stays free.
-
-    Parameters
-    ----------
-    model : Model
-    hold : mapping of str to float
-        ``"girder.start.u"`` or a coordinate's name, and where.
-
-    Returns
-    -------
-    dict of str to float
-
-    Raises
-    ------
-    StructureError
-        For what the joints do not leave free.
-    """
-    found, lost = {}, {}
-    for name, at in hold.items():
-        if own := own_coordinate(model, name):
-            found[own] = at
-        else:
-            lost[_raw_place(model, name)] = at
-    return found | _followed(model, lost, found) if lost else found
-
-
-def _followed(model: Model, lost: Mapping[int, float], found: Mapping[str, float]) -> dict[str, float]:
-    """Return the coordinates that raw freedoms tell, by their places, where others are held already.
-
-    Told are those that no motion has which leaves the raw freedoms where they are.
-    """
-    from scipy.linalg import lstsq, null_space
-
-    T = model.motion.jacobian(model.motion.rest)[list(lost)].toarray()
-    own = [model.coordinate(name) for name in found]
-    rest = np.array(list(lost.values())) - T[:, own] @ np.array(list(found.values()), dtype=float)
-    T[:, own] = 0.0
-    moved = np.flatnonzero(T.any(axis=0))
-    if not moved.size:
-        return {}
-    places = lstsq(T[:, moved], rest, cond=_ROUNDING)[0]
-    told = np.abs(null_space(T[:, moved], rcond=_ROUNDING)).max(axis=1, initial=0.0) < _ROUNDING
-    return {model.coordinates[i]: float(at) for i, at in zip(moved[told], places[told], strict=True)}
+__all__ = ["check_free", "own_coordinate", "raw_place"]
 
 
 def own_coordinate(model: Model, name: str) -> str:
@@ -100,11 +47,26 @@ def check_free(model: Model, name: str) -> None:
         For what is not there, or not left free by the joints.
     """
     if not own_coordinate(model, name):
-        _raw_place(model, name)
+        raw_place(model, name)
 
 
-def _raw_place(model: Model, name: str) -> int:
-    """Where a freedom that the joints leave free stands in raw vectors, or one that all that can bend would have."""
+def raw_place(model: Model, name: str) -> int:
+    """Where a freedom that the joints leave free stands in raw vectors, or one that all that can bend would have.
+
+    Parameters
+    ----------
+    model : Model
+    name : str
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    StructureError
+        As `check_free`.
+    """
     structure = model.structure
     if "." in name:
         node, column = _cell(structure, name)
@@ -116,6 +78,9 @@ def _raw_place(model: Model, name: str) -> int:
             f"hold {name!r}: the joints leave no such freedom there; free: {', '.join(free) or 'none'}"
         )
     else:
+        motors = [f"{drive.name}_source" for drive in structure.drives]
+        if name in motors:
+            return model.motion.source_base + motors.index(name)
         from flexctrl.model.assemble import assemble  # which holds freedoms itself
 
         elastic = assemble(structure, [Flexible()])

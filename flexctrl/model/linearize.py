@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,7 +13,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.place import Place
 from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
-from flexctrl.model.braked import with_brakes
+from flexctrl.model.braked import balance_of, bearing
 from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
@@ -45,7 +46,7 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     -------
     LinearModel
         In the order of ``model.coordinates``; inputs and outputs are deviations. Its ``certificate``
-        tells why it can be trusted.
+        tells why it can be trusted. What a `Rest` holds is held.
 
     Raises
     ------
@@ -66,28 +67,35 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
             "linearize: the machine has no degrees of freedom, so there is nothing to linearise: its supports hold all "
             "that no effect lets bend"
         )
-    if isinstance(at, Rest) and at.brakes and inputs is None:
-        whole = with_brakes(at)
-        return _without_brakes(linearize(whole.model, at=whole), at)
-    _refuse_spins(model, () if not isinstance(at, Rest) else at.held)
     rest = equilibrium(model, inputs=inputs) if at is None else at
+    u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
     state = (rest.state if isinstance(rest, Rest) else rest).loose
+    _refuse_spins(model, () if not isinstance(rest, Rest) else rest.held)
     check_state(model, state, "linearize: at")
+    if isinstance(rest, Rest):
+        return _about(balance_of(replace(rest, model=model, inputs=u)), state)
+    return _about(Balance(model, u, _frozen(model, state)), state)
+
+
+def _frozen(model: Model, state: State) -> dict[int, float]:
+    """Where coordinates are that stay as they are in linear models."""
+    return {i: float(state.q[i]) for i in model.motion.frozen}
+
+
+def _about(balance: Balance, state: State) -> LinearModel:
+    """The certified linear model about a state in which a balance is met."""
+    model, free = balance.model, balance.free
     if apart := model.apart(state):
         raise LinearizationError(f"linearize: {apart}")
-    u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
-    free = _free(model, rest)
     if not free.size:
         raise LinearizationError(
             f"linearize: every coordinate is held ({', '.join(model.coordinates)}), so there is nothing to linearise; "
             "linearise about an equilibrium that leaves one free"
         )
-    held = set(range(model.n)) - set(free.tolist())
-    balance = Balance(model, u, {i: float(state.q[i]) for i in sorted(held)})
     residual = _check_balance(balance, state)
     _refuse_corners(model, state, free)
-    loads = without_energy(model, u)
-    linear, asymmetry = _derivative(balance, state, free, bool(loads))
+    loads = without_energy(model, balance.u)
+    linear, asymmetry = _derivative(balance, state, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
     return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state))
 
@@ -107,14 +115,13 @@ def all_free(linear: LinearModel, rest: Rest) -> LinearModel:
     LinearModel
         In the order of the model's coordinates, all of them; not certified where something was held.
     """
-    model, state = rest.model, rest.state.loose
-    if len(linear.coordinates) == model.n:
+    if len(linear.coordinates) == rest.model.n:
         return linear
-    return _derivative(Balance(model, rest.inputs), state, np.arange(model.n), _unsymmetric(rest))[0]
+    return _derivative(Balance(bearing(rest), rest.inputs), rest.state.loose, _unsymmetric(rest))[0]
 
 
 def released(rest: Rest) -> LinearModel:
-    """Linearise about an equilibrium, and let go of what was held to find it, as a run does that starts there.
+    """Linearise about an equilibrium under the forces that hold it, constant, with nothing held any more.
 
     Parameters
     ----------
@@ -124,32 +131,31 @@ def released(rest: Rest) -> LinearModel:
     Returns
     -------
     LinearModel
-        Of all coordinates. Where it takes a force to hold the machine there it has no certificate: let go, it leaves.
+        Of all coordinates. A force that holds a coordinate adds nothing to K; that on a motor behind a rigid shaft, or
+        on a rope that does not stretch, turns with what they drive, and is in K. The certificate names what was held.
+        There is none where a force that holds it has no potential (a moment on a node that may turn about every axis).
 
     Raises
     ------
     LinearizationError, MechanismError
         As `linearize`.
     """
-    if rest.brakes:  # what they hold may be all there is
-        whole = with_brakes(rest)
-        return _without_brakes(_let_go(whole), rest)
-    linear = linearize(rest.model, at=rest)
-    return _let_go(rest) if rest.held else linear
-
-
-def _let_go(rest: Rest) -> LinearModel:
-    model, inputs = rest.model, dict(zip(rest.model.inputs, rest.inputs.tolist(), strict=True))
+    if not rest.held:
+        return linearize(rest.model, at=rest)
+    model, state = bearing(rest), rest.state.loose
+    frozen = _frozen(model, state)
+    free = Balance(model, rest.inputs, frozen)
+    held = np.array([model.coordinates[i] in rest.held for i in free.free], dtype=bool)
+    _refuse_spins(model, ())
     try:
-        return linearize(model, at=rest.state, inputs=inputs)
-    except LinearizationError:  # it takes a force to hold it
-        balance = Balance(model, rest.inputs)
-        return _derivative(balance, rest.state.loose, _free(model, rest.state), _unsymmetric(rest))[0]
-
-
-def _without_brakes(linear: LinearModel, rest: Rest) -> LinearModel:
-    """What was linearised with brakes as inputs, these constant: with the inputs of the machine itself."""
-    return linear.select(rest.model.inputs)
+        linear = _about(replace(free, kept=np.where(held, free.force(state), 0.0)), state)
+    except LinearizationError:
+        if balance_of(rest).free.size:
+            linearize(rest.model, at=rest)  # whose reasons are those of the machine, not of letting go
+        return _derivative(free, state, _unsymmetric(rest))[0]
+    assert linear.certificate is not None
+    let_go = tuple(name for name in rest.held if name not in {model.coordinates[i] for i in frozen})
+    return linear.certified(replace(linear.certificate, held=let_go))
 
 
 def _unsymmetric(rest: Rest) -> bool:
@@ -174,13 +180,14 @@ def _refuse_spins(model: Model, held: Sequence[str]) -> None:
         )
 
 
-def _derivative(balance: Balance, state: State, free: np.ndarray, unsymmetric: bool) -> tuple[LinearModel, float]:
-    model, u, unit = balance.model, balance.u, sp.diags(balance.unit[free])
-    M, C, K = (A[free][:, free] for A in tangents(model, state, u))
+def _derivative(balance: Balance, state: State, unsymmetric: bool) -> tuple[LinearModel, float]:
+    model, u, unit = balance.model, balance.u, sp.diags(balance.unit[balance.free])
+    M, C, K = (balance.seen(state, A) for A in tangents(model, state, u))
     largest = float(abs(unit @ K @ unit).max()) if K.nnz else 0.0
     asymmetry = float(abs(unit @ (K - K.T) @ unit).max()) / max(largest, 1e-300) if K.nnz else 0.0
     pull = 0.0 if balance.idle(model.rest) else balance.pull(state)
-    T = model.motion.jacobian(model.place(state))[:, free]
+    basis = balance.basis(state)
+    T = model.motion.jacobian(model.place(state)) @ basis
     on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=np.zeros(model.n))), model.motion.raw)
     linear = LinearModel(
         M=_symmetric(M),
@@ -190,12 +197,12 @@ def _derivative(balance: Balance, state: State, free: np.ndarray, unsymmetric: b
         Cq=(on_place @ T).toarray(),
         Cv=(on_rates @ T).toarray(),
         D=np.zeros((len(model.outputs), len(model.inputs))),
-        coordinates=tuple(model.coordinates[i] for i in free),
+        coordinates=tuple(model.coordinates[i] for i in balance.free),
         inputs=model.inputs,
         outputs=model.outputs,
         name=model.structure.name,
         parts=model.forces.parts(model.place(state), T),
-        place=Place(model, state, sp.identity(model.n, format="csc")[:, free], u, pull),
+        place=Place(model, state, basis, u, pull),
     )
     return linear, asymmetry
 
@@ -207,15 +214,9 @@ def _push(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarray]:
     def force(d: np.ndarray) -> np.ndarray:
         step = np.zeros(model.n)
         step[balance.free] = d
-        return balance.force(model.advance(state, step, balance.still, 0.0)) - rest
+        return balance.force(model.advance(state, balance.whole(state, step), balance.still, 0.0)) - rest
 
     return force
-
-
-def _free(model: Model, rest: Rest | State) -> np.ndarray:
-    held = set(rest.held) if isinstance(rest, Rest) else set()
-    held |= {model.coordinates[i] for i in model.motion.frozen}
-    return np.array([i for i, name in enumerate(model.coordinates) if name not in held], dtype=int)
 
 
 def _check_balance(balance: Balance, state: State) -> float:

@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 
     from flexctrl.model.equilibrium import Rest
 
+_LASTING = ("inputs", "outputs", "large", "signals", "gusts", "forces", "dust", "_mass", "_stiffness")
+"""What does not depend on the forces that a model carries."""
+
 
 @dataclass(frozen=True)
 class Model:
@@ -60,6 +63,8 @@ class Model:
         Damping that acts on the degrees of freedom themselves (modal damping); empty without.
     about : Small or None
         Matrices of small motion about another place than the drawn shape (geometric stiffness).
+    carried : numpy.ndarray, shape (raw,), or 0.0
+        Constant raw forces beside those of the inputs: what holds a motor in an equilibrium.
     """
 
     structure: Structure
@@ -68,6 +73,7 @@ class Model:
     backend: Backend
     viscous: sp.csr_matrix = field(repr=False)
     about: Small | None = field(default=None, repr=False)
+    carried: np.ndarray | float = field(default=0.0, repr=False)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -137,10 +143,25 @@ class Model:
         -------
         numpy.ndarray, shape (raw,)
         """
-        steady = self.signals.loads_at(state) @ u
+        steady = self.signals.loads_at(state) @ u + self.carried
         if not self.gusts:
             return steady
         return steady + self.gusts.force(self.slots(state), u, self.motion.raw)
+
+    def carrying(self, raw: np.ndarray) -> Model:
+        """Return the model with constant raw forces beside those of its inputs, to be balanced and linearised.
+
+        Parameters
+        ----------
+        raw : numpy.ndarray, shape (raw,)
+
+        Returns
+        -------
+        Model
+        """
+        found = replace(self, carried=raw)
+        found.__dict__.update({name: self.__dict__[name] for name in _LASTING if name in self.__dict__})
+        return found
 
     def reach(self, state: State, u: np.ndarray) -> sp.csr_matrix:
         """Return ∂(raw forces of the inputs)/∂u where the equations take it, about inputs u, shape (raw, inputs).

@@ -143,6 +143,12 @@ def equations_of(model: Model, at: Rest | State | None = None) -> Equations:
     """
     if at is not None and not isinstance(at, Rest | State):
         raise StructureError(f"to_nlsys: at = {shortened(at)}; expected a Rest (from equilibrium) or a State")
+    if isinstance(at, Rest) and at.brakes:
+        bound = ", ".join(name for name, _ in at.brakes)
+        raise StructureError(
+            f"to_nlsys: the equilibrium holds {bound}, which in this model follows from other coordinates; give "
+            "rest.state, and the force that holds it by an input"
+        )
     reference = model.rest if at is None else at.state if isinstance(at, Rest) else at
     held = {model.coordinate(name) for name in at.held} if isinstance(at, Rest) else set()
     chart = chart_of(model, reference)

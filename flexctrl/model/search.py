@@ -98,7 +98,7 @@ class Newton:
         solve = factorise(matrix, self._plan)
         found, left = self._without_drift(matrix, solve, force, here, shift) if shift else (solve(force), force)
         step[balance.free] = found
-        return step, left
+        return balance.whole(here.state, step), left
 
     def _without_drift(
         self,
@@ -144,7 +144,7 @@ class Newton:
         borne = borne + share * (target - borne)
         now, _ = self.mixed.stress(state, balance.still)
         excess = self.mixed.excess(state, borne - now)
-        left = force + model.motion.collect(state, excess.raw)[balance.free]
+        left = force + balance.among(state, model.motion.collect(state, excess.raw))
         return _Iterate(state, excess, force, balance.relative(left, scale))
 
 
@@ -197,7 +197,8 @@ class _Search:
         self.stalled = 0 if true < 0.7 * self.least else self.stalled + 1
         if true < self.least or share < 1.0 or self.iterations == 1:
             self.best, self.least = there.state, true
-        self.small = share == 1.0 and (true <= _TARGET or (size <= _SETTLED and self.shift <= self.floor))
+        closed = self.balance.astray(there.state) <= _TARGET
+        self.small = closed and share == 1.0 and (true <= _TARGET or (size <= _SETTLED and self.shift <= self.floor))
         return not (self.stalled > 8 and size < 1e-6 and self.balance.settled(self.best, self.newton.tolerance))
 
     def found(self) -> Found:
@@ -209,7 +210,7 @@ class _Search:
         return Found(best, least, self.iterations, done, self.steady, self.contracting)
 
     def _in_balance(self, state: State) -> bool:
-        return self.balance.astray(state) <= 1e-12 and self.balance.settled(state, self.newton.tolerance)
+        return self.balance.astray(state) <= _TARGET and self.balance.settled(state, self.newton.tolerance)
 
     def _in_balance_but_for_drift(self) -> bool:
         """Whether free motions have carried what is left from where it is round-off to heavier places."""

@@ -41,7 +41,7 @@ def leaving(balance: Balance, state: State) -> int:
         Under loads without a potential, if the motions cannot be told; see `growing`.
     """
     if without_energy(balance.model, balance.u):
-        M, C, K = (balance.among_free(A.tocsr()).tocsc() for A in tangents(balance.model, state, balance.u))
+        M, C, K = (balance.seen(state, A).tocsc() for A in tangents(balance.model, state, balance.u))
         if K.shape[0] and asymmetry(K, symmetric(K)[0]) > ROUND_OFF:
             return growing(_unseen(balance, M, C, K))
     return balance.unstable(state)

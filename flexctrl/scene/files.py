@@ -5,13 +5,15 @@ from __future__ import annotations
 import runpy
 import tomllib
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Tolerance
+from flexctrl.effects.damping import ModalDamping
+from flexctrl.effects.effect import Effect
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.errors import FlexctrlError, SceneError, check_kind
 from flexctrl.model.assemble import assemble
@@ -92,7 +94,7 @@ def _from_python(file: Path) -> Scene:
         got = "defines no 'scene'" if found is None else f"its 'scene' is a {type(found).__name__}"
         raise SceneError(f"{file}: {got}; expected scene = flexctrl.Scene(structure, …)")
     place = Place(str(file))
-    _check_held(found, place.at("scene").at("hold"), place.at("scene").at("GeometricStiffness").at("hold"))
+    _check_held(found, place.at("scene").at("hold"), lambda effect: place.at("scene").at(type(effect).__name__))
     return found
 
 
@@ -136,15 +138,19 @@ def scene_from(content: Mapping[str, Any], place: Place, name: str) -> Scene:
         ),
         place,
     )
-    _check_held(scene, place.at("equilibrium").at("hold"), place.at("effects").at("geometric_stiffness").at("hold"))
+    _check_held(scene, place.at("equilibrium").at("hold"), lambda effect: place.at("effects").at(_LAID[type(effect)]))
     return scene
 
 
-def _check_held(scene: Scene, equilibrium: Place, effect: Place) -> None:
+_LAID: dict[type, str] = {GeometricStiffness: "geometric_stiffness", ModalDamping: "modal_damping"}
+"""Effects that are laid about an equilibrium, by the names they have in a scene file."""
+
+
+def _check_held(scene: Scene, equilibrium: Place, of: Callable[[Effect], Place]) -> None:
     """Refuse to hold what is not there or not free, before anything is computed."""
+    laid = [e for e in scene.effects if isinstance(e, GeometricStiffness | ModalDamping)]
     own = [(name, equilibrium.at(name)) for name in scene.hold]
-    laid = [e for e in scene.effects if isinstance(e, GeometricStiffness)]
-    wanted = [*own, *((name, effect.at(name)) for e in laid for name, _ in e.hold)]
+    wanted = [*own, *((name, of(e).at("hold").at(name)) for e in laid for name, _ in e.hold)]
     if not wanted:
         return
     model = assemble(scene.structure, [e for e in scene.effects if e not in laid]) if laid else scene.model

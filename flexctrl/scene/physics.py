@@ -64,6 +64,8 @@ def _dry(value: Any, place: Place) -> Coulomb | float:
     return _COULOMB.read(value, place) if isinstance(value, Mapping) else number(value, place)
 
 
+_REST = {"hold": mapping(number), "inputs": mapping(number)}
+
 EFFECTS: dict[str, Kind] = {
     "automatic": Kind(Automatic, {"tolerance": positive}),
     "gravity": Kind(Gravity, {"g": vector}),
@@ -74,10 +76,10 @@ EFFECTS: dict[str, Kind] = {
     "rope_stretch": Kind(RopeStretch, {"of": several(text)}),
     "rope_mass": Kind(RopeMass, {"of": several(text)}),
     "large_rotation": Kind(LargeRotation),
-    "geometric_stiffness": Kind(GeometricStiffness, {"hold": mapping(number), "inputs": mapping(number)}),
+    "geometric_stiffness": Kind(GeometricStiffness, _REST),
     "rotating_frame": Kind(RotatingFrame, {"rate": vector, "center": vector}),
     "rayleigh_damping": Kind(RayleighDamping, {"alpha": number, "beta": number}),
-    "modal_damping": Kind(ModalDamping, {"ratios": one_or_several(number)}),
+    "modal_damping": Kind(ModalDamping, {"ratios": one_or_several(number), **_REST}),
     "viscous_friction": Placed(ViscousFriction, {"coefficients": mapping(number)}),
     "coulomb_friction": Placed(CoulombFriction, {"laws": mapping(_dry)}),
     "lugre_friction": Placed(LuGreFriction, {"laws": mapping(_LUGRE.read)}),

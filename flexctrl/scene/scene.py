@@ -15,6 +15,7 @@ from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.effects.automatic import Automatic
+from flexctrl.effects.damping import ModalDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import Flexible
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
@@ -216,11 +217,14 @@ class Scene:
         def there(hold: Mapping[str, float]) -> dict[str, float]:
             return {renamed(name, before, self.structure): at for name, at in hold.items()}
 
-        laid = [
-            e if not isinstance(e, GeometricStiffness) else GeometricStiffness(there(dict(e.hold)), dict(e.inputs))
-            for e in self.effects
-        ]
-        return replace(self, hold=there(self.hold), effects=tuple(laid))
+        def moved(effect: Effect) -> Effect:
+            if isinstance(effect, GeometricStiffness):
+                return GeometricStiffness(there(dict(effect.hold)), dict(effect.inputs))
+            if isinstance(effect, ModalDamping):
+                return ModalDamping(effect.ratios, there(dict(effect.hold)), dict(effect.inputs))
+            return effect
+
+        return replace(self, hold=there(self.hold), effects=tuple(moved(e) for e in self.effects))
 
     @cached_property
     def settled(self) -> Scene:
@@ -271,7 +275,11 @@ class Scene:
 
     def _loaded(self, effect: Effect) -> Effect:
         """An effect that is laid about an equilibrium, about that of the scene unless it names one."""
-        return GeometricStiffness(self.hold, self.rest_inputs) if effect == GeometricStiffness() else effect
+        if effect == GeometricStiffness():
+            return GeometricStiffness(self.hold, self.rest_inputs)
+        if isinstance(effect, ModalDamping) and effect == ModalDamping(effect.ratios):
+            return ModalDamping(effect.ratios, self.hold, self.rest_inputs)
+        return effect
 
     def _equilibrium(self, model: Model) -> Rest:
         try:

@@ -49,7 +49,8 @@ def test_a_machine_held_by_a_force_is_linearised_as_it_is_let_go(written):
     text = TROLLEY + '\n[equilibrium]\nhold = { "trolley.u" = 0.3 }\ninputs = { push = 2.0 }\n'
     linear = load_scene(written(text)).linear
     assert "trolley_0_u" in linear.coordinates
-    assert linear.certificate is None
+    assert linear.certificate.held == ("trolley_0_u",)
+    assert linear.certificate.residual < 1e-9
 
 
 def test_an_equilibrium_that_cannot_be_is_told(written):
