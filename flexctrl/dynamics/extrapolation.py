@@ -2,7 +2,7 @@
 
 The difference δ of the two shapes is taken in the degrees of freedom, rotations by the logarithm of the relative
 rotation; the extrapolated shape is the finer one moved on by δ/(2^p − 1). Both runs go on from their own states, so
-the pair is as stable as the method itself; what each step adds to δ estimates its error.
+the pair is as stable as the method itself. Steps are chosen as the coarser run alone would choose them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import scipy.sparse as sp
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Counts, Integrator, Joining, Pace, Point, Stepper
 from flexctrl.errors import StructureError
@@ -39,7 +38,8 @@ class Richardson:
     Two more orders for a method that is symmetric in time (`ConservingMidpoint`, ``GeneralizedAlpha(h, rho=1.0)``),
     one more for others, at three times the cost of the coarser run. As damped and as stable as the method itself.
     Errors of both runs grow with time, so this is for runs in which the coarser one still follows the motion. Beyond a
-    corner of a law of force both go on from where the finer one is.
+    corner of a law of force both go on from where the finer one is. Steps of `AdaptiveAlpha` are those that it takes by
+    itself: a tolerance is kept by the coarser run, and what is extrapolated is as much better as with fixed steps.
 
     Parameters
     ----------
@@ -82,11 +82,10 @@ class Richardson:
 
 @dataclass(frozen=True)
 class _Point(Point):
-    """A point with those of both runs, and the difference of the two."""
+    """A point with those of both runs."""
 
     coarse: Point
     fine: Point
-    gap: np.ndarray
 
     @property
     def firm(self) -> _Point:
@@ -106,7 +105,6 @@ class _Stepper:
     counts: Counts = field(default_factory=Counts)
 
     def __post_init__(self) -> None:
-        self.yard = 1.0 / yardsticks(self.model)
         self.between = Difference(self.model)
 
     @property
@@ -125,7 +123,7 @@ class _Stepper:
     def start(self, state: State, supply: Supply, step: float) -> _Point:
         """Return the point of a state, both runs together."""
         coarse, fine = self.coarse.start(state, supply, step), self.fine.start(state, supply, 0.5 * step)
-        return _Point(fine.state, fine.rate, fine.supply, coarse, fine, np.zeros(self.model.n))
+        return _Point(fine.state, fine.rate, fine.supply, coarse, fine)
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs; the runs stay apart."""
@@ -136,15 +134,19 @@ class _Stepper:
         point = replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
         if not quasistatic(self.model).size:
             return point
-        gap = self.between(coarse.state, fine.state)
-        state = self.moved_on(coarse.state, fine.state, gap)
-        return replace(point, state=state, supply=self._supply(supply, state, coarse, fine), gap=gap)
+        state = self.moved_on(coarse.state, fine.state)
+        return replace(point, state=state, supply=self._supply(supply, state, coarse, fine))
+
+    def fed(self, point: _Point, supply: Supply) -> _Point:
+        """Return the point with other states or rates of its law: what either run goes on from, at corners, too."""
+        coarse, fine = (replace(run, supply=self._own(run, supply)) for run in (point.coarse, point.fine))
+        return replace(point, supply=supply, coarse=coarse, fine=fine)
 
     def join(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point with both runs in its state: apart, they would meet a corner of a law of force apart."""
         coarse = _joined(self.coarse, replace(point.coarse, state=point.state), supply, step)
         fine = _joined(self.fine, replace(point.fine, state=point.state), supply, 0.5 * step)
-        return replace(point, rate=fine.rate, supply=supply, coarse=coarse, fine=fine, gap=np.zeros(self.model.n))
+        return replace(point, rate=fine.rate, supply=supply, coarse=coarse, fine=fine)
 
     def _own(self, run: Point, supply: Supply) -> Supply:
         """What a run is supplied with: the states of a continuous law are integrated, by each run its own."""
@@ -163,17 +165,17 @@ class _Stepper:
         self.counts.newton += spent[0] - before[0]
         self.counts.factorisations += spent[1] - before[1]
         self.counts.worst = self.fine.counts.worst
-        gap = self.between(coarse.state, fine.state)
-        state = self.moved_on(coarse.state, fine.state, gap)
+        state = self.moved_on(coarse.state, fine.state)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
-        return _Point(state, rate, self._supply(point.supply, state, coarse, fine), coarse, fine, gap)
+        return _Point(state, rate, self._supply(point.supply, state, coarse, fine), coarse, fine)
 
     def _spent(self) -> tuple[int, int]:
         a, b = self.coarse.counts, self.fine.counts
         return a.newton + b.newton, a.factorisations + b.factorisations
 
-    def moved_on(self, coarse: State, fine: State, gap: np.ndarray) -> State:
+    def moved_on(self, coarse: State, fine: State) -> State:
         """Return the extrapolated state."""
+        gap = self.between(coarse, fine)
         v = fine.v + self.weight * (fine.v - coarse.v)
         return self.model.advance(fine, self.weight * gap, v, fine.t)
 
@@ -183,10 +185,12 @@ class _Stepper:
         return self.feed.within(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
 
     def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
-        """Return the error that the step added to the finer run, over what is allowed."""
-        local = self.weight * np.abs(after.gap - before.gap) * self.yard
-        allowed = tolerance.of(farthest(self.model, moved))
-        return float((local / allowed).max(initial=0.0))
+        """Return the error that the step added to the coarser run, over what is allowed.
+
+        By how the two runs part over a step nothing is to be told: what they differ by already goes on by itself,
+        and no shorter step makes it less.
+        """
+        return self.coarse.error(before.coarse, after.coarse, h, moved, tolerance)
 
 
 def _joined(stepper: Stepper[Any], run: Any, supply: Supply, step: float) -> Any:

@@ -15,6 +15,7 @@ from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track
 from flexctrl.dynamics.events import EventError, Occurrence
 from flexctrl.dynamics.explicit import ExplicitRungeKutta
+from flexctrl.dynamics.extrapolation import Richardson
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride
@@ -23,7 +24,7 @@ from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.record import Unwritten, writing
 from flexctrl.dynamics.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
-from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper
+from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper, Twofold
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.switching import beyond
 from flexctrl.dynamics.watch import Crossing, Watch
@@ -191,6 +192,9 @@ class Journey:
     def _remedy(self) -> str:
         """What to do where steps of this length make energy."""
         pace, method = self.plan.method.pace, self.plan.method
+        if isinstance(method, Richardson):
+            finer = f"steps smaller than {pace.step:g} s" if isinstance(pace, Fixed) else "a smaller Tolerance"
+            return f"the coarser of the two runs of Richardson no longer follows the motion: take {finer}"
         if isinstance(method, ExplicitRungeKutta):
             return "stiff parts are for implicit methods: take AdaptiveAlpha, or GeneralizedAlpha(step)"
         if not isinstance(pace, Fixed):
@@ -261,7 +265,8 @@ class Journey:
         feed, before, state = self.plan.feed, self.point.supply, self.point.state
         fresh = feed.restart(state, before) if feed.continuous else feed.sample(state, before)
         if np.array_equal(fresh.u, before.u):
-            self.point = replace(self.point, supply=fresh)
+            several, point = self.stepper, self.point
+            self.point = several.fed(point, fresh) if isinstance(several, Twofold) else replace(point, supply=fresh)
         else:
             held = replace(self.point, state=self.under(fresh.u))
             self.point = self.stepper.renew(held, fresh, self.mark.size)

@@ -32,6 +32,7 @@ __all__ = [
     "Reusable",
     "StepError",
     "Stepper",
+    "Twofold",
     "check_step",
 ]
 
@@ -190,6 +191,14 @@ class Joining(Stepper[P], Protocol[P]):
 
     def join(self, point: P, supply: Supply, step: float) -> P:
         """Return the point with all runs in its state, under other inputs; ``step`` is about to be taken."""
+
+
+@runtime_checkable
+class Twofold(Protocol[P]):
+    """A stepper whose points hold those of several runs."""
+
+    def fed(self, point: P, supply: Supply) -> P:
+        """Return the point with other states or rates of its law, in all runs; its inputs do not jump."""
 
 
 @runtime_checkable

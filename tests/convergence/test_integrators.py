@@ -149,6 +149,20 @@ def test_chosen_steps_follow_the_tolerance(method):
     assert runs[1].report.steps > runs[0].report.steps
 
 
+@pytest.mark.parametrize(("rho", "order"), [(1.0, 4), (0.5, 3)], ids=["undamped", "damped"])
+@pytest.mark.parametrize("name", ["four_bar", "hinges"])
+def test_order_of_extrapolation_over_chosen_steps(name, rho, order):
+    """The steps are those of the method, and with their number the error falls as with that of fixed ones."""
+    s, found = subject(name), []
+    for tol in (1e-4, 1e-6):
+        how = {"tolerance": fc.Tolerance(tol, 1e-3 * tol), "every": UNTIL}
+        once, run = (s.run(method, **how) for method in (fc.AdaptiveAlpha(rho), fc.Richardson(fc.AdaptiveAlpha(rho))))
+        assert run.report.steps == pytest.approx(once.report.steps, abs=2)
+        found.append((run.report.steps, float(np.abs(run.final.x - s.end).max())))
+    (few, loose), (many, tight) = found
+    assert np.log(loose / tight) / np.log(many / few) == pytest.approx(order, abs=0.4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", [fc.GeneralizedAlpha, fc.ConservingMidpoint], ids=lambda m: m.__name__)
 def test_between_steps_the_error_falls_as_at_them(method):
