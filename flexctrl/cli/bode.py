@@ -77,7 +77,8 @@ def told(m: Margins) -> dict[str, Any]:
     dict
     """
     return {
-        "stable": m.stable,
+        "stable": m.verdict == "stable",
+        "closed_loop": m.verdict,
         "gain": m.gain_up.margin,
         "gain_db": 20.0 * np.log10(m.gain_up.margin),
         "gain_hz": m.gain_up.omega / (2 * np.pi),
@@ -145,7 +146,7 @@ def _text(cut: Cut, data: Mapping[str, Any], found: Mapping[str, Margins]) -> st
         else:
             lines.append(f"{name}: no damped resonance")
     if found:
-        keys = ("stable", "gain_db", "phase_deg", "delay_s", "modulus", "Ms", "Mt")
+        keys = ("closed_loop", "gain_db", "phase_deg", "delay_s", "modulus", "Ms", "Mt")
         rows = [(key, *(told(m)[key] for m in found.values())) for key in keys]
         lines += ["", f"loop cut at {cut.input}", grid(("margin", *found), rows)]
     return "\n".join(lines)

@@ -58,19 +58,19 @@ def _data(
             data[name] = {"responds": False}
             continue
         loop, locus = loops[name], loci[name]
-        marginal = loop.is_marginal()
+        cut_open = margins(loop)
         data[name] = {
             "responds": True,
             "poles": in_s(locus.poles, loop.dt),
             "zeros": in_s(locus.zeros, loop.dt),
             "closed_loop_poles": in_s(loop.closed_poles(), loop.dt),
-            "stable": loop.is_stable() and not marginal,
-            "marginal": marginal,
+            "stable": cut_open.verdict == "stable",
+            "marginal": loop.is_marginal(),
             "critical_gains": [
                 {"gain": c.gain, "hz": c.omega / (2 * np.pi), "unstable_above": c.unstable_above}
                 for c in critical[name]
             ],
-            "margins": told(margins(loop)),
+            "margins": told(cut_open),
         }
     return data
 
@@ -104,8 +104,9 @@ def _text(cut: Cut, data: Mapping[str, Any]) -> str:
         if not side["responds"]:
             lines.append(f"\n{name}: {cut.input} does not move {cut.output}")
             continue
-        state = "stable" if side["stable"] else "on the verge (undamped)" if side["marginal"] else "UNSTABLE"
-        lines.append(f"\n{name}: closed loop {state} at gain 1, {len(side['poles'])} poles, {len(side['zeros'])} zeros")
+        lines.append(
+            f"\n{name}: closed loop {side['margins']['closed_loop']} at gain 1, {len(side['poles'])} poles, {len(side['zeros'])} zeros"
+        )
         rows = [(c["gain"], c["hz"], "above" if c["unstable_above"] else "below") for c in side["critical_gains"]]
         if rows:
             lines.append(grid(("critical gain", "Hz", "unstable"), rows, left=0))

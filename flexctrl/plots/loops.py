@@ -224,8 +224,7 @@ def margins_figure(margins: Margins) -> Figure:
     mark_margins(plot_bode(curves, (axes["gain"], axes["phase"])), margins)
     plot_nyquist({loop.name: loop}, axes["nyquist"], margins=margins, radius=2.0)
     plot_sensitivities({loop.name: loop}, axes["sensitivity"], margins=margins)
-    verdict = "closed loop stable" if margins.stable else "closed loop UNSTABLE: the margins mean nothing"
-    figure.suptitle(f"{loop.name}: {verdict}", fontsize=10, color=INK)
+    figure.suptitle(f"{loop.name}: {str(margins).splitlines()[0]}", fontsize=10, color=INK)
     return figure
 
 

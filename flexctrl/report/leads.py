@@ -17,8 +17,8 @@ LEADS = {
     ),
     "bode": (
         "How far the output swings for a sine at the input, by frequency, for the machine as it is and for "
-        "its rigid twin. With a controller: the loop cut at its command, and how far it is from instability "
-        "(stable only if True)."
+        "its rigid twin. With a controller: the loop cut at its command, and how far it is from instability, "
+        "which says something only where the closed loop is stable."
     ),
     "rlocus": (
         "Where the poles of the closed loop go as its gain grows, for the machine as it is and for its rigid "

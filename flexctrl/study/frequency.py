@@ -97,6 +97,11 @@ class Margins:
     phase_crossings: tuple[Crossing, ...]
     loop: Loop = field(repr=False)
 
+    @property
+    def verdict(self) -> str:
+        """``stable``, ``on the verge (undamped)`` (see :meth:`Loop.is_marginal`) or ``UNSTABLE``."""
+        return "on the verge (undamped)" if self.loop.is_marginal() else "stable" if self.stable else "UNSTABLE"
+
     def plot(self) -> Figure:
         """Draw the loop with its margins: Bode, Nyquist, sensitivities.
 
@@ -110,7 +115,7 @@ class Margins:
 
     def __str__(self) -> str:
         hz = 2 * np.pi
-        lines = [f"closed loop {'stable' if self.stable else 'UNSTABLE: the margins mean nothing'}"]
+        lines = [f"closed loop {self.verdict}{': the margins mean nothing' if self.verdict == 'UNSTABLE' else ''}"]
         lines += [
             f"gain margin   {self.gain_down.margin:.4g} … {self.gain_up.margin:.4g} "
             f"({20 * np.log10(self.gain_up.margin):.4g} dB) at {self.gain_up.omega / hz:.5g} Hz",
