@@ -77,7 +77,7 @@ def answering(law: Controller) -> Answering | None:
 def _answering(law: Controller) -> Answering | None:
     import casadi as ca
 
-    n = len(law.initial())
+    n = np.size(law.initial())
     if law.sample_time or n > _STATES:
         return None
     tracer = _Rates()

@@ -218,7 +218,7 @@ class _Completed:
         return tuple(getattr(self.inner, "breaks", ()))
 
     def initial(self) -> np.ndarray:
-        return np.asarray(self.inner.initial(), dtype=float)
+        return np.asarray(self.inner.initial())
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return self.inner.command(t, x, y)

@@ -226,10 +226,10 @@ def once(known: WeakKeyDictionary[Any, T], make: Callable[[Controller], T], law:
 def _lowered(law: Controller) -> Lowered | None:
     import casadi as ca
 
-    if not law.sample_time or len(law.initial()) * (len(law.initial()) + len(law.inputs)) > _MOST:
+    if not law.sample_time or np.size(law.initial()) * (np.size(law.initial()) + len(law.inputs)) > _MOST:
         return None
     tracer = Tracer()
-    x, y = ca.SX.sym("x", len(law.initial())), ca.SX.sym("y", len(law.inputs))
+    x, y = ca.SX.sym("x", np.size(law.initial())), ca.SX.sym("y", len(law.inputs))
     try:
         u, after = tracer.of(law, x, y)
     except NotLowered:

@@ -17,7 +17,9 @@ from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds, listed
 
-__all__ = ["check_arguments", "check_times", "events_of"]
+__all__ = ["check_arguments", "check_rows", "check_times", "events_of"]
+
+_NUMBERS = 1e9
 
 _KINDS: dict[str, tuple[Any, str]] = {
     "model": ((Model, LinearModel), "a Model (from assemble) or a LinearModel (from linearize)"),
@@ -91,6 +93,30 @@ def check_times(until: float, every: float | None, start: object) -> None:
     if isinstance(start, Checkpoint) and until < start.t * (1.0 - 1e-9):
         raise StructureError(
             f"simulate: until = {until} s is before the checkpoint, which is at {start.t:.9g} s; give a later end"
+        )
+
+
+def check_rows(until: float, spacing: float | None, signals: int) -> None:
+    """Raise where rows at even spacing would be more than any memory or file is for.
+
+    Parameters
+    ----------
+    until : float
+    spacing : float or None
+    signals : int
+        In each row, beside the time.
+
+    Raises
+    ------
+    StructureError
+        For more than 1e9 numbers.
+    """
+    if spacing is not None and (1 + signals) * until > _NUMBERS * spacing:
+        rows = until / spacing
+        raise StructureError(
+            f"simulate: every = {spacing:g} s makes {rows:.3g} rows of {1 + signals} numbers until {until:g} s, "
+            f"{8e-9 * rows * (1 + signals):.3g} GB; expected {_NUMBERS:g} numbers at most: give every = "
+            f"{(1 + signals) * until / _NUMBERS:.1g} s or more, or leave it out for a row at every step"
         )
 
 

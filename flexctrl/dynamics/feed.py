@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.design.controller import Controller, as_controller
+from flexctrl.dynamics.said import CommandError, blamed, reals, state_of
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import FLOAT, Compiled
 from flexctrl.model.plant import Plant
@@ -23,27 +24,6 @@ if TYPE_CHECKING:
 
 _SMALL = 1e-7
 _NEAR = 1e-10
-
-
-class CommandError(ControllerError):
-    """A controller commands what is no finite number, or raises an exception: that is its cause."""
-
-
-def _blamed(error: Exception) -> ControllerError:
-    """Return what a run says of an exception in a controller."""
-    if isinstance(error, ControllerError):
-        return error
-    blamed = CommandError(f"the controller raised {type(error).__name__}: {error}")
-    blamed.__cause__ = error
-    return blamed
-
-
-def _reals(values: Any, what: str) -> np.ndarray:
-    """Return what a controller answers as real numbers."""
-    found = np.asarray(values)
-    if found.dtype.kind == "c":
-        raise CommandError(f"the controller's {what} is complex: {values!r}; give real numbers, as by numpy.real")
-    return np.asarray(found, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -147,7 +127,10 @@ class Feed:
         """Return the inputs at the start."""
         if self.controller is None:
             return Supply(self.base, np.zeros(0), np.zeros(0))
-        x = _reals(self.controller.initial(), "initial state")
+        try:
+            x = state_of(self.controller, self.controller.initial(), "initial state")
+        except Exception as error:
+            raise blamed(error)  # noqa: B904 - its cause is set
         return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self.evaluate(state, x)
 
     def sample(self, state: State, supply: Supply) -> Supply:
@@ -167,9 +150,9 @@ class Feed:
             return said
         try:
             u = self._total(c.command(t, x, y))
-            return u, _reals(c.update(t, x, y), "next state") if x.size else x
+            return u, state_of(c, c.update(t, x, y), "update", x.size) if x.size else x
         except Exception as error:
-            raise _blamed(error)  # noqa: B904 - its cause is set
+            raise blamed(error)  # noqa: B904 - its cause is set
 
     def restart(self, state: State, supply: Supply) -> Supply:
         """Return the inputs after a break of a continuous command."""
@@ -185,12 +168,13 @@ class Feed:
         return self._answered(t, y, supply.x) if self.continuous else self.sampled(t, y, supply)
 
     def _answered(self, t: float, y: np.ndarray, x: np.ndarray) -> Supply:
-        assert self.controller is not None
+        c = self.controller
+        assert c is not None
         try:
-            rate = _reals(self.controller.rate(t, x, y), "rate") if x.size else x
-            return Supply(np.array(self._total(self.controller.command(t, x, y))), x, rate)
+            rate = state_of(c, c.rate(t, x, y), "rate", x.size) if x.size else x
+            return Supply(np.array(self._total(c.command(t, x, y))), x, rate)
         except Exception as error:
-            raise _blamed(error)  # noqa: B904 - its cause is set
+            raise blamed(error)  # noqa: B904 - its cause is set
 
     def within(self, state: State, x: np.ndarray) -> Supply:
         """Return these inputs within a step or at its end: one that ends where the command jumps does not feel it."""
@@ -211,7 +195,7 @@ class Feed:
         if command is None:
             raise CommandError("the controller's command is None; return a number for each output (a missing return?)")
         column = type(command) is np.ndarray and command.ndim == 1 and command.dtype is FLOAT
-        values = command.tolist() if column else _reals(command, "command").ravel().tolist()
+        values = command.tolist() if column else reals(command, "command").ravel().tolist()
         writes = self.writes
         if len(values) != len(writes):
             raise ControllerError(
@@ -244,9 +228,9 @@ class Feed:
             if not before.x.size:
                 return Supply(np.array(self._total(c.command(t, before.x, y))), before.x, before.x)
             x = _trapezoidal(c, t, y, before, h)
-            return Supply(np.array(self._total(c.command(t, x, y))), x, _reals(c.rate(t, x, y), "rate"))
+            return Supply(np.array(self._total(c.command(t, x, y))), x, state_of(c, c.rate(t, x, y), "rate", x.size))
         except Exception as error:
-            raise _blamed(error)  # noqa: B904 - its cause is set
+            raise blamed(error)  # noqa: B904 - its cause is set
 
     def slope(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return ∂(generalised forces of the inputs)/∂(own motion) through a continuous controller."""
@@ -277,13 +261,13 @@ def _trapezoidal(c: Controller, t: float, y: np.ndarray, before: Supply, h: floa
     """Solve x = x₀ + h/2 (ẋ₀ + f(t, x, y)) by Newton's method."""
     x = before.x + h * before.rate
     for _ in range(10):
-        f = _reals(c.rate(t, x, y), "rate")
+        f = state_of(c, c.rate(t, x, y), "rate", x.size)
         gap = x - before.x - 0.5 * h * (before.rate + f)
         J = np.empty((x.size, x.size))
         for i in range(x.size):
             d = np.zeros(x.size)
             d[i] = _SMALL * max(1.0, abs(x[i]))
-            J[:, i] = (_reals(c.rate(t, x + d, y), "rate") - f) / d[i]
+            J[:, i] = (state_of(c, c.rate(t, x + d, y), "rate", x.size) - f) / d[i]
         step = np.linalg.solve(np.eye(x.size) - 0.5 * h * J, gap)
         x = x - step
         if np.abs(step).max() <= 1e-12 * (1.0 + np.abs(x).max()):

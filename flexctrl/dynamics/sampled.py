@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
+from flexctrl.dynamics.said import state_of
 from flexctrl.errors import ControllerError, StructureError, check_kind, did_you_mean, shortened
 from flexctrl.structure.freedoms import check_finite, check_seconds, check_whole, numbers
 
@@ -109,13 +110,13 @@ def _stretches(
 
     reads = [plant.output_labels.index(name) for name in law.inputs]
     writes = [plant.input_labels.index(name) for name in law.outputs]
-    z, u = np.asarray(law.initial(), dtype=float), base
+    z, u = state_of(law, law.initial(), "initial state"), base
     for k in range(math.ceil(until / law.sample_time - 1e-9)):
         now = k * law.sample_time
         measured = np.asarray(plant.output(now, x, u), dtype=float)[reads]
         u = base.copy()
         u[writes] += np.asarray(law.command(now, z, measured), dtype=float)
-        z = np.asarray(law.update(now, z, measured), dtype=float) if z.size else z
+        z = state_of(law, law.update(now, z, measured), "update", z.size) if z.size else z
         t = np.linspace(now, min(now + law.sample_time, until), points + 1)
         held = np.repeat(u[:, None], points + 1, axis=1)
         run = control.input_output_response(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.dynamics.alpha import AdaptiveAlpha
-from flexctrl.dynamics.asked import check_arguments, check_times, events_of
+from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
 from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.dense import Track, curves_of
@@ -116,6 +116,8 @@ def simulate(
     if until < 1.0 / HUGE:
         raise StructureError(f"simulate: until = {until} s; expected {1.0 / HUGE:g} s at least: give a longer time")
     record = record or InMemory()
+    spacing = every if record.every is None else record.every
+    check_rows(until, spacing, len(model.inputs) + len(model.outputs))
     plant: Plant
     if isinstance(model, LinearModel):
         plant, method = _plant(model, method, _spacing(start, every, until))
@@ -125,7 +127,6 @@ def simulate(
             check_state(model, start, "simulate: start")
             model.__dict__["_begun"] = start
     feed = feed_of(plant, controller, _base(plant, start, inputs))
-    spacing = every if record.every is None else record.every
     tell = progress or _untold
     plan = Plan(
         plant, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, tell, autosave, time.perf_counter()

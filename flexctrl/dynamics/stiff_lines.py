@@ -27,7 +27,7 @@ STIFF = 10.0
 SURE = 1e-11
 """Size of the last correction of steps over such lines."""
 
-_HEAVY, _TOLD = 3e7, 1e6
+_HEAVY = 5e5
 """Mass that a load moves with along a rigid rope over that across it: from where on lines are stiff as ropes are, and
 up to where differences of forces, right to eight digits, make a tangent."""
 
@@ -95,7 +95,7 @@ def told_by_differences(model: Plant) -> bool:
     -------
     bool
     """
-    return bool(once(model, _spreads).max(initial=0.0) <= _TOLD)
+    return bool(once(model, _spreads).max(initial=0.0) <= _HEAVY)
 
 
 def _spreads(model: Plant) -> np.ndarray:
