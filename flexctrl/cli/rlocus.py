@@ -105,7 +105,8 @@ def _text(cut: Cut, data: Mapping[str, Any]) -> str:
             lines.append(f"\n{name}: {cut.input} does not move {cut.output}")
             continue
         lines.append(
-            f"\n{name}: closed loop {side['margins']['closed_loop']} at gain 1, {len(side['poles'])} poles, {len(side['zeros'])} zeros"
+            f"\n{name}: closed loop {side['margins']['closed_loop']} at gain 1, "
+            f"{len(side['poles'])} poles, {len(side['zeros'])} zeros"
         )
         rows = [(c["gain"], c["hz"], "above" if c["unstable_above"] else "below") for c in side["critical_gains"]]
         if rows:
