@@ -107,7 +107,7 @@ def _scouted(pencil: DensePencil, phi: np.ndarray, count: int) -> tuple[ShiftedP
     """A shift that suits the lowest pairs, given vectors near them, and its distance to the lowest."""
     shifted, x = pencil.below_all(faint_shift(pencil.K, pencil.M)), phi[:, :count]
     for _ in range(4):
-        lam, x = shifted.ritz(x)
+        lam, x = shifted.ritz(_orthonormal(pencil.M, x))
         better = _better_shift(_found(pencil, shifted, lam, x, 0), shifted.sigma)
         if better in (0.0, shifted.sigma):
             break
@@ -186,11 +186,19 @@ def _found(
     pencil: Pencil | DensePencil, shifted: ShiftedPencil, lam: np.ndarray, phi: np.ndarray, polish: int = 3
 ) -> _Found:
     noise = pencil.noise(phi)
-    soft = np.abs(lam) <= np.maximum(SOFT_NOISE * noise, UNCLEAR * abs(shifted.sigma))
+    soft = _soft(lam, noise, shifted.sigma)
     if soft.any():
-        phi[:, soft], lam[soft] = _polished(pencil, phi[:, soft], shifted, polish)
-        noise[soft] = pencil.noise(phi[:, soft])
+        # what is as near to 0 as the rounding of one of them is mixed with it, and its own noise does not tell
+        near = soft | (np.abs(lam) <= SOFT_NOISE * noise[soft].max())
+        phi[:, near], lam[near] = _polished(pencil, phi[:, near], shifted, polish)
+        noise[near] = pencil.noise(phi[:, near])
+        soft |= near & (np.abs(lam) <= noise[near].max())
     return _Found(lam, phi, noise, soft)
+
+
+def _soft(lam: np.ndarray, noise: np.ndarray, sigma: float) -> np.ndarray:
+    """Which λ may be rounding alone."""
+    return np.asarray(np.abs(lam) <= np.maximum(SOFT_NOISE * noise, UNCLEAR * abs(sigma)))
 
 
 def _polished(

@@ -32,6 +32,7 @@ __all__ = [
 EPS = float(np.finfo(float).eps)
 HIDDEN, SINGULAR = -1, -2
 TINY = 1e-12
+FAINT = 100.0 * EPS
 FIRM = 1e-9
 
 Matrix: TypeAlias = "np.ndarray | sp.csc_matrix"
@@ -105,6 +106,7 @@ class ShiftedPencil:
     def _within(self, x: np.ndarray, image: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The pairs within the space of x, given M x and (K − σM)⁻¹ M x."""
         theta, z, _ = lapack.dsygvd(image.T @ after, x.T @ image)
+        theta = np.maximum(theta, EPS * EPS * theta[-1])  # beside what nothing holds, stiff motions round to none
         return self.sigma + 1.0 / theta[::-1], after @ (z / theta)[:, ::-1]
 
     def lanczos(self, start: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, Space]:
@@ -284,4 +286,6 @@ def faint_shift(K: Matrix, M: Matrix) -> float:
     """
     k, m = K.diagonal(), M.diagonal()
     both = (k > 0) & (m > 0)
-    return -TINY * (float((k[both] / m[both]).min()) if both.any() else 1.0)
+    ratios = k[both] / m[both]
+    clear = ratios[ratios > FAINT * np.median(ratios)] if ratios.size else ratios  # others may be rounding over a mass
+    return -TINY * float(clear.min(initial=np.inf if clear.size else 1.0))

@@ -275,3 +275,24 @@ def test_linearised_with_its_motors_held_it_moves_as_their_angles_let_it(choice)
     assert len(held.coordinates) == scene.model.n - 2
     assert held.modes().omega_squared[:2] == pytest.approx(la.eigh(K, M, eigvals_only=True)[:2], rel=1e-6)
     assert held.certificate is not None
+
+
+@pytest.mark.parametrize("inertia", [1.0, 1e4, 1e7])
+@pytest.mark.parametrize("wind", [(3.0, 6.0, 0.0), (0.0, 0.0, 0.0)], ids=["blown", "calm"])
+@pytest.mark.parametrize("choice", CHOICES, ids=named)
+def test_modes_of_a_load_on_a_heavy_winch(choice, wind, inertia):
+    """The rope pays out freely, and in calm air the jib turns freely: these two and nothing else have no stiffness."""
+    scene = jib_crane(*choice, wind=wind)
+    light, heavy = scene.structure.drives[0], replace_inertia(scene.structure.drives[1], inertia)
+    linear = scene.with_(structure=scene.structure.with_(drives=[light, heavy])).linear
+    modes = linear.modes()
+    K, M = 0.5 * (linear.K + linear.K.T).toarray(), linear.M.toarray()
+    dense = la.eigh(K, M, eigvals_only=True)
+    assert modes.unstable == 0
+    assert modes.rigid == (1 if any(wind) else 2)
+    assert modes.omega_squared == pytest.approx(dense, rel=1e-5, abs=1e-8 * dense[2])
+
+
+def replace_inertia(winch, inertia):
+    rope = {"EA": winch.EA, "radius": winch.radius, "ratio": winch.ratio}
+    return fc.Winch(winch.name, winch.node, winch.against, **rope, inertia=inertia)
