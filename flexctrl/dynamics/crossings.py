@@ -35,7 +35,8 @@ def crossings(watch: Watch, curve: Curve, before: Point, after: Point, every: fl
 
     Events are looked for at the rows that are ``every`` so many seconds too.
     """
-    if watch.quiet and watch.calm(after.state, before.state):
+    calm = not watch.names and watch.calm(after.state, before.state)
+    if calm and not watch.events:
         return []
     t, h = before.state.t, after.state.t - before.state.t
     value = _Along(watch, curve, before, after)
@@ -46,7 +47,7 @@ def crossings(watch: Watch, curve: Curve, before: Point, after: Point, every: fl
     clear = _clear(watch, np.array([last, *(v for _, v in ends)])[:, :number])
     probes = _probes(watch, curve, before, after, every, clear) if number else []
     seen: list[tuple[float, Sequence[float] | np.ndarray]] = [*ends, *((at, value.events(at)) for at in probes)]
-    for gauge in range(len(last)):
+    for gauge in range(number if calm else len(last)):  # corners are looked at as where there are no events
         corners = [(t, last[gauge]), *((at, v[gauge]) for at, v in (seen if gauge < number else ends))]
         found += _through(watch, gauge, _with_vertices(sorted(corners), gauge, value), value)
     return sorted(found, key=lambda c: c.t)

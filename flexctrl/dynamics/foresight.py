@@ -16,7 +16,7 @@ _DOUBT = 2.0
 _FEWEST = 3
 
 
-def calm_steps(watch: Watch, before: Point, table: np.ndarray, u: np.ndarray) -> int:
+def calm_steps(watch: Watch, before: Point, table: np.ndarray, inputs: np.ndarray) -> int:
     """Return how many steps are over before the first one in which an event may happen; gauges keep their sizes.
 
     A value may go through zero and back within a step if it bends towards zero by more than what it is from there. How
@@ -30,8 +30,8 @@ def calm_steps(watch: Watch, before: Point, table: np.ndarray, u: np.ndarray) ->
         Where the steps start.
     table : numpy.ndarray, shape (steps, 1 + outputs)
         Time and outputs after each step.
-    u : numpy.ndarray
-        Inputs during all of them.
+    inputs : numpy.ndarray, shape (steps + 1, inputs)
+        Inputs at the start and after each of them.
 
     Returns
     -------
@@ -41,8 +41,8 @@ def calm_steps(watch: Watch, before: Point, table: np.ndarray, u: np.ndarray) ->
     count, events = len(table), watch.events
     if count < _FEWEST:
         return 0
-    first = watch.values(before.state, u)[: len(events)]
-    found = _values(watch, events, table[:, 1:], u)
+    first = watch.asked(before.state, inputs[0])
+    found = _values(watch, events, table[:, 1:], inputs[1:])
     values = np.vstack([first, found])
     t = np.append(before.state.t, table[: len(found), 0])
     ahead = watch.sides[: len(events)] * values
@@ -54,19 +54,19 @@ def calm_steps(watch: Watch, before: Point, table: np.ndarray, u: np.ndarray) ->
     return calm
 
 
-def _values(watch: Watch, events: Sequence[Event], outputs: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _values(watch: Watch, events: Sequence[Event], outputs: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """Values of events after each step; as far as their functions give any."""
     model = watch.feed.model
     columns: list[np.ndarray] = []
-    names, held = (*model.outputs, *model.inputs), u.tolist()
+    names = (*model.outputs, *model.inputs)
     for event in events:
         if isinstance(event.of, str) and event.of in model.outputs:
             columns.append(outputs[:, model.outputs.index(event.of)] - event.at)
             continue
         column: list[float] = []
         try:
-            for row in outputs.tolist():
-                column.append(event.value(dict(zip(names, (*row, *held), strict=True))))
+            for row in np.hstack([outputs, inputs]).tolist():
+                column.append(event.value(dict(zip(names, row, strict=True))))
         except EventError:
             pass
         columns.append(np.array(column))

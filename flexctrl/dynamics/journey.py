@@ -16,9 +16,10 @@ from flexctrl.dynamics.dense import Track
 from flexctrl.dynamics.events import EventError, Occurrence
 from flexctrl.dynamics.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.extrapolation import Richardson
-from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.interrupt import Interruption
-from flexctrl.dynamics.march.ride import ride
+from flexctrl.dynamics.march.ride import ride, rides
+from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.midpoint import ConservingMidpoint
 from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.record import Unwritten, writing
@@ -268,12 +269,30 @@ class Journey:
             several, point = self.stepper, self.point
             self.point = several.fed(point, fresh) if isinstance(several, Twofold) else replace(point, supply=fresh)
         else:
-            held = replace(self.point, state=self.under(fresh.u))
-            self.point = self.stepper.renew(held, fresh, self.mark.size)
-            self.books.jump(held, self.point)
+            self._jump(fresh, self.coming(stop))
         if not self.watch.idle and not np.array_equal(fresh.u, before.u):
             self.leapt()
         self.rows.here(self.point, 1e-6 * self.mark.size)
+
+    def _jump(self, fresh: Supply, step: float) -> None:
+        """Let the inputs jump, as a ride does where steps are marched, with a step about to be taken."""
+        stepper = self.stepper
+        if isinstance(stepper, MarchingStepper) and self.plan.model.switches.names and rides(self):
+            leapt = stepper.leap(self.point, fresh, step)
+            if leapt is not None:
+                self.point = leapt
+                return
+            stepper = stepper.plain
+        held = replace(self.point, state=self.under(fresh.u))
+        self.point = stepper.renew(held, fresh, step)
+        self.books.jump(held, self.point)
+
+    def coming(self, t: float) -> float:
+        """Return the length of the step after a stop, which is over."""
+        pace, left = self.plan.method.pace, self.stops.next - t
+        if not isinstance(pace, Fixed):
+            return self.mark.size
+        return left / max(1, math.ceil(left / pace.step - 1e-6)) if math.isfinite(left) else pace.step
 
     def under(self, u: np.ndarray) -> State:
         """Return the state under inputs that have jumped; note what breaks loose with them."""

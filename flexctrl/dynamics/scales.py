@@ -111,8 +111,8 @@ def farthest(model: Plant, moved: np.ndarray) -> np.ndarray:
     """
     way, part = moved * (1.0 / yardsticks(model)), components(model)
     most = np.zeros(part.max(initial=0) + 1)
-    # no more than 1; the compiled loops work it out in the same order, to the bit
-    np.maximum.at(most, part, way + 1.0 - np.maximum(way, 1.0))
+    # no more than 1, without round-off: the compiled loops, which take it up step by step, find the same to the bit
+    np.maximum.at(most, part, np.minimum(way, 1.0))
     return most[part]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -126,12 +126,24 @@ class Watch:
 
     def values(self, state: State, u: np.ndarray, before: State | None = None) -> np.ndarray:
         """Return the gauges' values, of a state that came from one before."""
-        found = []
-        if self.events:
-            signals = self.signals(state, u)
-            found = [event.value(signals) for event in self.events]
+        found = self.asked(state, u)
         switches = self.switches(state, u) if self.names else np.zeros(0)
         return np.concatenate([found, switches, self.corners(state, before or state)])
+
+    def asked(self, state: State, u: np.ndarray) -> list[float]:
+        """Return the values of the events asked for."""
+        if not self.events:
+            return []
+        signals = self.signals(state, u)
+        return [event.value(signals) for event in self.events]
+
+    @property
+    def onlooking(self) -> Watch:
+        """A watch for the events asked for alone: what these tell is nothing that switches and corners go by."""
+        count, none = len(self.events), np.zeros(0)
+        return Watch(
+            self.feed, self.events, _nothing, (), _nothing, (), (), none, self.sides[:count], self.sizes[:count].copy()
+        )
 
     def left(self, after: Point, before: Point, crossing: Crossing) -> float:
         """Return how far a gauge is from zero after a step, on the side it comes from: below zero it has passed it."""
@@ -196,6 +208,15 @@ class Watch:
         """Note that a gauge has come to zero: what leaves it from there does not cross it again."""
         self.sides[crossing.gauge] = 0.0
 
+    def settle_laws(self, after: Point) -> None:
+        """Note the sides of switches and corners after a step."""
+        if not (self.names or self.corner_names):
+            return
+        count = len(self.events)
+        laws = replace(self, events=(), sides=self.sides[count:], sizes=self.sizes[count:])
+        laws.settle(after)
+        self.sides[count:] = laws.sides
+
     def settle(self, after: Point) -> None:
         """Note the sides after a step."""
         values = self.values(after.state, after.supply.u)
@@ -221,3 +242,8 @@ class Watch:
     def corner(self, which: int, t: float, rising: bool) -> Crossing:
         """Return that a corner is met."""
         return Crossing(t, len(self.events) + len(self.names) + which, rising)
+
+
+def _nothing(*_: object) -> np.ndarray:
+    """Values of gauges that are not there."""
+    return np.zeros(0)

@@ -17,10 +17,10 @@ from flexctrl.model.laws.friction_kinds import STUCK
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["watched"]
+__all__ = ["TOGETHER", "watched"]
 
 _CHATTER = 20
-_TOGETHER = 1e-7
+TOGETHER = 1e-7
 
 
 def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Crossing | None]:
@@ -66,9 +66,9 @@ def _is_there(journey: Journey, crossing: Crossing, before: Point, after: Point,
     if crossing.gauge >= len(watch.events):
         return False
     if after.state.t == t:
-        return crossing.t - t <= _TOGETHER * whole
+        return crossing.t - t <= TOGETHER * whole
     off = offset(watch, journey.track.curve(before, after), before, after, crossing.gauge)
-    return abs(off) <= _TOGETHER * whole
+    return abs(off) <= TOGETHER * whole
 
 
 def _switched(journey: Journey, at: Point, landing: Crossing, switch: int, brief: bool) -> Point:

@@ -151,8 +151,8 @@ def test_every_touch_of_zero_is_in_doubt():
         def __init__(self, first: float) -> None:
             self.first, self.sizes = first, np.ones(1)
 
-        def values(self, state, u):
-            return np.array([self.first])
+        def asked(self, state, u):
+            return [self.first]
 
         def dust_of(self, sizes):
             return 1e-13 * sizes
@@ -164,7 +164,7 @@ def test_every_touch_of_zero_is_in_doubt():
         table = np.column_stack([t[1:], y[1:], 0.0 * t[1:]])
         touch = int(at / h)
         first = fc.dynamics.steps.Point(start, np.zeros(model.n), None)
-        assert calm_steps(Held(y[0]), first, table, np.zeros(1)) <= touch
+        assert calm_steps(Held(y[0]), first, table, np.zeros((len(t), 1))) <= touch
 
 
 @pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-2)], ids=["adaptive", "fixed"])

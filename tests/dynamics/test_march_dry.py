@@ -32,11 +32,27 @@ def both(model: fc.Model, monkeypatch: pytest.MonkeyPatch, *controller, **how) -
         return marched, fc.simulate(model, *controller, **how), len(taken)
 
 
+def lasting(run: fc.Run) -> list[fc.Occurrence]:
+    """Its events but slips that are over as they begin: whether a sample tears loose may hang on the last digit."""
+    found: list[fc.Occurrence] = []
+    for event in run.events:
+        if (
+            found
+            and (found[-1].name, found[-1].t, found[-1].rising) == (event.name, event.t, True)
+            and not event.rising
+        ):
+            found.pop()
+        else:
+            found.append(event)
+    return found
+
+
 def alike(a: fc.Run, b: fc.Run) -> None:
     assert a.status is b.status is fc.Status.FINISHED
     assert (a.report.steps, len(a.t)) == (b.report.steps, len(b.t))
-    assert [(e.name, e.rising) for e in a.events] == [(e.name, e.rising) for e in b.events]
-    assert np.allclose([e.t for e in a.events], [e.t for e in b.events], rtol=0.0, atol=1e-7)
+    ours, theirs = lasting(a), lasting(b)
+    assert [(e.name, e.rising) for e in ours] == [(e.name, e.rising) for e in theirs]
+    assert np.allclose([e.t for e in ours], [e.t for e in theirs], rtol=0.0, atol=1e-7)
     scale = np.abs(b.y).max(axis=0, initial=1.0)
     assert (np.abs(a.y - b.y) < 1e-5 * scale).all()  # speeds just after a switch move with its time
     assert np.allclose(a.final.q, b.final.q, rtol=0.0, atol=1e-7)

@@ -1,4 +1,8 @@
-"""Events in a ride: steps up to the first one in which something may happen, taken again from where they began."""
+"""Events in a ride: steps up to the first one in which something may happen, taken again from where they began.
+
+That one is taken in the loops too, as if nothing were looked for, and looked at closely from outside. Only where the
+run ends in it is it left to a plain step.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +15,13 @@ from flexctrl.dynamics.books import Sums
 from flexctrl.dynamics.foresight import calm_steps
 from flexctrl.dynamics.march.lookout import FAR, Lookout
 from flexctrl.dynamics.march.marching import Pacing
+from flexctrl.dynamics.march.onlooking import looked_at
 from flexctrl.dynamics.march.stepper import Memory
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.march.ride import Ride
 
-__all__ = ["EVENT", "FEWEST", "Begun", "go_back", "guarded", "next_span", "warily"]
+__all__ = ["EVENT", "Begun", "go_back", "guarded", "next_span", "warily"]
 
 FEWEST, _WIDEST = 8, 1024
 """Steps that are looked at together."""
@@ -34,13 +39,18 @@ class Begun(NamedTuple):
     newton: int
     factorisations: int
     rejected: int
+    h: float
+    follow: int
+    cap: float
+    led: float
 
     @classmethod
     def of(cls, ride: Ride) -> Begun:
         """Return where a ride is."""
         m, marcher = ride.marcher.march, ride.marcher
         point, sums = ride.stepper.leave(ride.supply), marcher.books(ride.journey.books.sums)
-        return cls(point, ride.stepper.memory, sums, m.due, m.newton, m.factorisations, m.rejected)
+        counted = m.newton, m.factorisations, m.rejected
+        return cls(point, ride.stepper.memory, sums, m.due, *counted, m.h, m.follow, m.cap, m.led)
 
 
 def guarded(ride: Ride, lookout: Lookout, pacing: float | Pacing, count: int) -> tuple[int, int]:
@@ -54,7 +64,8 @@ def guarded(ride: Ride, lookout: Lookout, pacing: float | Pacing, count: int) ->
     calm, _ = lookout.calm(ride.marcher.rows[:done], np.tile(u, (done + 1, 1)))
     if calm < done:
         go_back(ride, begun)
-        status, done = EVENT, ride.marcher.travel(pacing, calm)[1] if calm else 0
+        status, done = (EVENT, ride.marcher.travel(pacing, calm)[1]) if calm else watched(ride, begun, pacing)
+        lookout.sides_of(ride.journey.watch)
     lookout.pass_by(ride.marcher.rows[:done], np.tile(u, (done + 1, 1)))
     return status, done
 
@@ -64,12 +75,14 @@ def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
 
     What is looked at does not depend on the end of the run: a run that goes on looks at the same.
     """
-    j, watch, begun = ride.journey, ride.journey.watch, Begun.of(ride)
+    j, watch, begun, t = ride.journey, ride.journey.watch, Begun.of(ride), ride.marcher.march.t
+    if j.stops.next - t < FEWEST * j.mark.size:
+        return watched(ride, begun, pacing) if t + j.mark.size <= ride.until + ride.tick else (EVENT, 0)
     sizes, span = watch.sizes.copy(), watch.span
     ride.marcher.march.turned = 0.0
     status, done = ride.marcher.travel(pacing, min(count, span))
     far = ride.marcher.march.turned > FAR
-    calm = 0 if far else calm_steps(watch, begun.point, ride.marcher.rows[:done], ride.supply.u)
+    calm = 0 if far else calm_steps(watch, begun.point, ride.marcher.rows[:done], ride.inputs(t, done))
     watch.span = next_span(span, calm, calm < done)
     fitting = int(np.searchsorted(ride.marcher.rows[:done, 0], ride.until + ride.tick, "right"))
     if fitting < calm and j.saved is None:
@@ -78,12 +91,23 @@ def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
     if wanted == done:
         return status, done
     go_back(ride, begun)
-    return EVENT, ride.marcher.travel(pacing, wanted)[1] if wanted else 0
+    if wanted:
+        return EVENT, ride.marcher.travel(pacing, wanted)[1]
+    return watched(ride, begun, pacing) if fitting else (EVENT, 0)
 
 
 def next_span(span: int, calm: int, near: bool) -> int:
     """Return at how many steps (or samples) is looked next, after ``calm`` ones of a span before something was near."""
     return max(FEWEST, 2 * calm) if near else min(_WIDEST, 2 * span)
+
+
+def watched(ride: Ride, begun: Begun, pacing: float | Pacing) -> tuple[int, int]:
+    """Take one step and note the events in it; none where it is to be taken by itself, as the run may end in it."""
+    status, done, clear = looked_at(ride, begun.point, pacing)
+    if clear:
+        return status, done
+    go_back(ride, begun)
+    return EVENT, 0
 
 
 def go_back(ride: Ride, begun: Begun) -> None:
@@ -93,9 +117,9 @@ def go_back(ride: Ride, begun: Begun) -> None:
     m.factorisations = begun.factorisations
     ride.stepper.recall(begun.memory)
     ride.stepper.enter(begun.point)
-    m.newton, m.rejected, m.size = begun.newton, begun.rejected, ride.journey.mark.size
+    m.newton, m.rejected, m.size, m.h = begun.newton, begun.rejected, ride.journey.mark.size, begun.h
     ride.marcher.open(books.first, begun.sums.moved, books.dissipates)
     ride.marcher.go_on(begun.sums)
     ride.marcher.watch(ride.journey.watch.corner_sides, begun.point.state)
-    ride.marcher.follow(ride.journey.mark)
+    m.follow, m.cap, m.led = begun.follow, begun.cap, begun.led
     ride.marcher.keep(keeping, begun.due, spacing)

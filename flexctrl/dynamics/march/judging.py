@@ -48,7 +48,7 @@ def follow(m: March) -> None:
     """Take up how far each part of the machine has been."""
     for i in range(m.flat.n):
         way = m.reach[i] * m.weight[i]
-        m.farthest[m.part[i]] = max(m.farthest[m.part[i]], way + 1.0 - max(way, 1.0))
+        m.farthest[m.part[i]] = max(m.farthest[m.part[i]], min(way, 1.0))
 
 
 def lean(m: March, shared: float, square: float) -> None:

@@ -49,6 +49,7 @@ def told(ride: Ride, deadline: float) -> bool:
             break
     ride.mute = status == SILENT
     if m.jumping:
+        marcher.about_to(j.coming(m.t))
         ride.jumped = status == DONE and marcher.jump(ride.supply.u) == DONE
         m.jumping = 0
     return ride.mute or (ride.well(status) and ride.jumped and done > 0 and not ride.near)

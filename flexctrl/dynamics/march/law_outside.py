@@ -52,10 +52,12 @@ def samples(ride: Ride, deadline: float) -> bool:
             break
         if done > start:
             held.samples.append((t, h, done - start, u, x))
+        if status == DONE and done == wanted:
+            times[done - 1] = stop
         if status != DONE or done < wanted or stop >= nearly:
             mark.left = wanted - done
             break
-        t = clock[0] = times[done - 1] = stop
+        t = clock[0] = stop
         stops.passed += 1
         before = u
         try:
@@ -65,7 +67,7 @@ def samples(ride: Ride, deadline: float) -> bool:
             break
         if u != before:
             marcher.jumps(u)
-        if lookout is not None and lookout.leaps(marcher.rows[done - 1], u):
+        if lookout is not None and lookout.leaps(marcher.rows[done - 1], u, False):
             ride.near = ride.leapt = True
             break
         if time.perf_counter() >= deadline:
@@ -83,6 +85,7 @@ def _sampled(ride: Ride, held: Held, first: np.ndarray, done: int, status: int) 
         ride.legs.parts.append(held)
         ride.written(done, first, held.commands(ride.supply.u))
     if m.jumping:
+        marcher.about_to(ride.journey.coming(m.t))
         ride.jumped = status == DONE and marcher.jump(ride.supply.u) == DONE
         m.jumping = 0
         mark.left = 0

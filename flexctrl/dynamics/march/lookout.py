@@ -42,9 +42,13 @@ class Lookout:
         model = watch.feed.model
         self.last = model.measure(state).tolist()
         self.names = (*model.outputs, *model.inputs)
-        self.sides = watch.sides[: len(watch.events)].tolist()
+        self.sides_of(watch)
         self.steady = [isinstance(e.of, str) and e.of in model.outputs for e in watch.events]
         self.places = [self.names.index(e.of) if isinstance(e.of, str) else -1 for e in watch.events]
+
+    def sides_of(self, watch: Watch) -> None:
+        """Take up the side that each event is on."""
+        self.sides = watch.sides[: len(watch.events)].tolist()
 
     def calm(self, table: np.ndarray, inputs: np.ndarray) -> tuple[int, int]:
         """Return how many steps nothing happens in, and after how many an event may be brought about by a jump.
@@ -115,11 +119,11 @@ class Lookout:
             self.watch.sizes[:] = sizes
         return True
 
-    def leaps(self, row: np.ndarray, u: list[float]) -> bool:
-        """Tell whether inputs that have jumped may bring about an event."""
+    def leaps(self, row: np.ndarray, u: list[float], stands: bool) -> bool:
+        """Tell whether inputs that have jumped may bring about an event; ``stands``: one may be at zero already."""
         signals = (*row[1:].tolist(), *u)
         for i, event in enumerate(self.watch.events):
-            if not self.steady[i] and self.sides[i] != 0.0:
+            if (stands or not self.steady[i]) and self.sides[i] != 0.0:
                 ahead = self.sides[i] * self._value(event, self.places[i], signals)
                 if not ahead > self.watch.dust_of(self.watch.sizes[i]):
                     return True

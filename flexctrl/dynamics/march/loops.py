@@ -135,6 +135,8 @@ def set_out(m: March, law: Law) -> bool:
 def hurried(m: March) -> int:
     """Let the inputs jump if they are to, then take steps of controlled error."""
     if m.jumping == 1:
+        if m.flows.count > 0:
+            m.h = m.size
         status = jump(m)
         if status != DONE:
             return status

@@ -263,8 +263,7 @@ class Marcher(Loops):
     def resupply(self, before: Supply, supply: Supply, pacing: float | Pacing) -> None:
         """Let the inputs jump at the start of a leg, if they do."""
         if before.u.tolist() != supply.u.tolist():
-            if isinstance(pacing, float):
-                self.about_to(pacing)
+            self.about_to(pacing.size if isinstance(pacing, Pacing) else pacing)
             self.jump(supply.u)
 
     def travelled(self, supply: Supply, pacing: float | Pacing, count: int) -> tuple[list[State], list[Supply]]:

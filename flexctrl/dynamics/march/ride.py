@@ -15,7 +15,7 @@ import numpy as np
 
 from flexctrl.dynamics.dense import Dense
 from flexctrl.dynamics.inputs import Stepwise
-from flexctrl.dynamics.march.guarding import EVENT, FEWEST, guarded, warily
+from flexctrl.dynamics.march.guarding import EVENT, guarded, warily
 from flexctrl.dynamics.march.law_inside import told
 from flexctrl.dynamics.march.law_outside import samples
 from flexctrl.dynamics.march.legs import Leg, Legs, Opened, same
@@ -33,7 +33,7 @@ from flexctrl.errors import ControllerError
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["ride"]
+__all__ = ["ride", "rides"]
 
 _NEAR = 1e-9
 _SECONDS = 0.1
@@ -45,24 +45,17 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
 
     They do not go beyond ``until``; where ``most`` is given, there are no more than that, all before the next stop.
 
-    Between samples only, where some freedom has no mass: the march has no rule for how its place jumps. Under a
-    continuous law only where no events are to be found within steps.
+    Between samples only, where some freedom has no mass: the march has no rule for how its place jumps.
     """
-    stepper, plan = journey.stepper, journey.plan
-    if not isinstance(stepper, MarchingStepper):
-        return False
-    if journey.watch.events and _near_stop(journey) and (most is not None or not _looked_out(journey)):
-        return False
-    if plan.feed.continuous and journey.watch.events:
-        return False
-    if plan.feed.sample_time and weightless(plan.model).size:
+    stepper = journey.stepper
+    if not isinstance(stepper, MarchingStepper) or not rides(journey):
         return False
     return Ride(journey, stepper, until, most).go()
 
 
-def _near_stop(journey: Journey) -> bool:
-    """Tell whether there are so few steps to the next stop that events are better looked for in each of them."""
-    return journey.stops.next - journey.point.state.t < FEWEST * journey.mark.size
+def rides(journey: Journey) -> bool:
+    """Tell whether steps that can be marched are."""
+    return not (journey.plan.feed.sample_time and weightless(journey.plan.model).size)
 
 
 def _looked_out(journey: Journey) -> bool:
@@ -118,6 +111,8 @@ class Ride:
                 break
             if self.lookout is None and (self.wary or self.most):
                 well = stop - m.t > self.tick and self._leg(stop)
+                if well and not self.most and stop - m.t <= self.tick and m.t < self.until - self.tick:
+                    self._renew(stop)
                 break
             if self._lowered(stop):
                 well = told(self, deadline)
@@ -125,7 +120,8 @@ class Ride:
                 well = samples(self, deadline)
             else:
                 well = self._leg(stop)
-            if self.near and not self.legs.parts:  # up to the very step
+            if self.near and not self.legs.parts:  # up to the very step, and over it
+                self.near = False
                 well = self._leg(stop)
         some = self._end()
         if self.faults:
@@ -152,6 +148,12 @@ class Ride:
         if self.lookout is not None:
             return guarded(self, self.lookout, pacing, count)
         return warily(self, pacing, count) if self.wary else self.marcher.travel(pacing, self.limited(count))
+
+    def inputs(self, t: float, done: int) -> np.ndarray:
+        """Return the inputs where steps started, at a time, and after each of them."""
+        rows = self.marcher.rows[:done]
+        after = self.marcher.inputs(self.supply, t, done).at(np.arange(done), np.ones(done, dtype=bool), rows)
+        return np.vstack([self.supply.u, after])
 
     def limited(self, count: int) -> int:
         return count if self.most is None else min(count, self.most)
@@ -232,6 +234,8 @@ class Ride:
         mark.steps += leg.steps
         mark.left -= leg.steps if mark.left > 0 else 0
         to_jump = stop - marcher.march.t <= self.tick
+        if to_jump:
+            marcher.rows[leg.steps - 1, 0] = stop
         inputs = marcher.inputs(leg.supply, leg.t, leg.steps)
         if self.weaver is not None:
             rows.between(self.weaver, marcher.rows[: leg.steps], inputs, to_jump)
@@ -263,9 +267,13 @@ class Ride:
             j.rows.drawn(self.weaver.last)
         elif written and abs(self.last.t - stop) < self.tick:
             j.rows.frame(self.last)
+        self.marcher.about_to(j.coming(stop))
         self.jumped = same(u, before.u) or self.marcher.jump(u) == DONE
         self.marcher.under(self.supply)
-        self.leapt = self.lookout is not None and self.lookout.leaps(self.marcher.rows[m.done - 1], u.tolist())
+        if self.lookout is None:
+            self.leapt = self.wary and not same(u, before.u)
+        else:
+            self.leapt = self.lookout.leaps(self.marcher.rows[m.done - 1], u.tolist(), True)
         return self.jumped and not self.leapt
 
     def _end(self) -> bool:
@@ -281,8 +289,8 @@ class Ride:
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)
-        if not j.watch.idle and not self.leapt:
-            j.watch.settle(j.point)
+        if not self.leapt:
+            j.watch.settle_laws(j.point)
         if self.turn is not None:
             j.point = beyond(j, j.point, self.turn)
         if self.leapt:

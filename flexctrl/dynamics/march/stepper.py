@@ -112,6 +112,15 @@ class MarchingStepper:
         self._here = None
         return self.plain.renew(point, supply, step)
 
+    def leap(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint | None:
+        """Return a point under other inputs as a ride does, whose contacts hold; None where one may not."""
+        self.enter(point)
+        self.marcher.about_to(step)
+        if self.marcher.jump(supply.u) == DONE:
+            return self.leave(supply)
+        self._here = None
+        return None
+
     def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later.
 

@@ -1,0 +1,165 @@
+"""Runs that are watched, and runs stopped anywhere and gone on with, are the very runs that they would have been.
+
+Bit for bit: rows, inputs, steps taken and rejected, Newton iterations.
+"""
+
+from __future__ import annotations
+
+import itertools
+from functools import cache
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+END, PERIOD = 0.3, 0.02
+
+
+def structure(*elements: fc.Element, joints: list[Any], drives: tuple[Any, ...] = ()) -> fc.Structure:
+    """A machine whose last part is pushed along x, and whose motion that way is seen."""
+    node = elements[-1].node
+    return fc.Structure(
+        list(elements),
+        joints,
+        list(drives),
+        [fc.Force("push", node, "x"), *(fc.MotorTorque("torque", d) for d in drives)],
+        [fc.Position("x", node, "x"), fc.Velocity("v", node, "x")],
+    )
+
+
+def swung() -> fc.Model:
+    """A load on a rope that goes slack and taut."""
+    rope = fc.Rope("rope", (0, 0, 0), (0.3, 0, -1.0), EA=2e3)
+    load = fc.PointMass("load", rope.end, 1.0)
+    joints = [fc.Support(rope.start), fc.Pin(rope.end, load.node), fc.Support(load.node, "v")]
+    return fc.assemble(structure(rope, load, joints=joints), [fc.LargeRotation(), fc.Gravity(), fc.RopeStretch()])
+
+
+def driven(*effects: fc.Effect) -> fc.Model:
+    """A cart on a rail, with a motor."""
+    cart = fc.PointMass("cart", (0, 0, 0), 2.0)
+    drive = fc.LinearDrive(
+        "drive", cart.node, direction="x", radius=0.1, ratio=5.0, stiffness=400.0, inertia=3e-3, damping=0.05
+    )
+    machine = structure(cart, joints=[fc.Support(cart.node, "v w")], drives=(drive,))
+    return fc.assemble(machine, [fc.LargeRotation(), fc.Flexible(), *effects])
+
+
+def linear() -> fc.Model:
+    """Two masses on springs."""
+    near, far = fc.PointMass("near", (0, 0, 0), 1.0), fc.PointMass("far", (1, 0, 0), 0.3)
+    first = fc.Spring("first", (-1, 0, 0), near.node, stiffness=400.0, damping=1.0)
+    second = fc.Spring("second", near.node, far.node, stiffness=200.0)
+    joints = [fc.Support(first.start), fc.Pin(first.end, near.node), fc.Pin(second.start, near.node)]
+    joints += [fc.Pin(second.end, far.node), fc.Support(near.node, "v w"), fc.Support(far.node, "v w")]
+    return fc.assemble(structure(first, near, second, far, joints=joints), [])
+
+
+MACHINES = {
+    "rope": swung,
+    "play": lambda: driven(fc.Backlash({"drive": 0.02})),
+    "dry": lambda: driven(fc.CoulombFriction({"cart.u": fc.Coulomb(1.0, static=1.5)})),
+    "lag": lambda: driven(fc.MotorLag({"drive": 0.01})),
+    "linear": linear,
+}
+
+
+class Own:
+    """A law of one's own, which begins by pushing."""
+
+    inputs, outputs, sample_time = ("x", "v"), ("push",), PERIOD
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([20.0 * np.sin(9.0 * t) - 2.0 * y[0] - 0.1 * y[1]])
+
+
+NAMES = {"inputs": ["x", "v"], "outputs": ["push"]}
+LAWS: dict[str, Any] = {
+    "none": None,
+    "sampled": control.ss([], [], [], [[-80.0, -0.5]], PERIOD, **NAMES),
+    "own": Own(),
+    "continuous": control.ss([[-30.0]], [[1.0, 0.0]], [[500.0]], [[-80.0, -0.5]], **NAMES),
+}
+METHODS = {
+    "adaptive": fc.AdaptiveAlpha(),
+    "alpha": fc.GeneralizedAlpha(2.3e-3),
+    "explicit": fc.ExplicitRungeKutta(),
+    "midpoint": fc.ConservingMidpoint(2.3e-3),
+    "extrapolated": fc.Richardson(fc.GeneralizedAlpha(2.3e-3)),
+    "exact": fc.Exact(2.3e-3),
+}
+NEVER = (fc.Event("never", "x", at=100.0),)
+MET = (fc.Event("there", "x", at=0.303), fc.Event("here", "x", at=0.01), fc.Event("turns", lambda s: s["v"]))
+EVENTS = {"no": (), "never": NEVER, "met": MET}
+QUICK = ("adaptive", "alpha", "exact")
+NO_RULE = {("dry", "midpoint"), ("lag", "midpoint"), ("lag", "explicit")}
+
+
+def marks(machine: str, law: str, method: str) -> tuple[pytest.MarkDecorator, ...]:
+    """What takes long: steps in Python, and play under a law that is asked at every corner."""
+    if method in QUICK and (machine, law) != ("play", "continuous"):
+        return ()
+    return (pytest.mark.slow,) if law == "sampled" else (pytest.mark.long,)
+
+
+CASES = [
+    pytest.param(machine, law, method, marks=marks(machine, law, method))
+    for machine, law, method in itertools.product(MACHINES, LAWS, METHODS)
+    if (method == "exact") == (machine == "linear") and (machine, method) not in NO_RULE
+]
+
+
+def told(run: fc.Run) -> tuple[Any, ...]:
+    """What a run cost."""
+    r = run.report
+    return r.steps, r.rejected_steps, r.newton_iterations
+
+
+def same(one: fc.Run, other: fc.Run, after: float = 0.0, between: float = 0.0) -> bool:
+    """Whether rows after a time are the same (to ``between``), where runs have ended, and what that has cost."""
+    rows = [np.column_stack([run.t, run.y, run.u])[run.t > after] for run in (one, other)]
+    ends = [np.append(run.final.x, run.final.v) for run in (one, other)]
+    alike = len(rows[0]) == len(rows[1]) and np.allclose(*rows, rtol=0.0, atol=between)
+    return alike and np.array_equal(*ends) and told(one) == told(other)
+
+
+@cache
+def model_of(machine: str) -> fc.Model:
+    return MACHINES[machine]()
+
+
+def ran(case: tuple[str, str, str], events: str, **how: Any) -> fc.Run:
+    machine, law, method = case
+    model = model_of(machine)
+    start = model.rest if machine == "rope" else model.rest.with_(v=np.append(0.3, np.zeros(model.n - 1)))
+    how = {"until": END, "start": start, "every": 0.0137, **how}
+    return fc.simulate(model, LAWS[law], method=METHODS[method], events=EVENTS[events], **how)
+
+
+@pytest.mark.parametrize(("machine", "law", "method"), CASES)
+def test_events_that_are_only_watched_change_no_bit(machine, law, method):
+    case = machine, law, method
+    # beside a flank of play, curves between steps begin where a step was set out, or a nudge of 1e-12 beside it
+    for every, between in ((0.0137, 1e-7 if machine == "play" else 0.0), (None, 0.0)):
+        free = ran(case, "no", every=every)
+        for events in ("never", "met"):
+            assert same(free, ran(case, events, every=every), between=between), (events, every)
+
+
+@pytest.mark.parametrize("events", EVENTS)
+@pytest.mark.parametrize(("machine", "law", "method"), CASES)
+def test_a_run_stopped_anywhere_goes_on_with_the_same_bits(machine, law, method, events):
+    """At a random time, and at a sample."""
+    case = machine, law, method
+    whole = ran(case, events)
+    for cut in (np.random.default_rng(len("".join(case))).uniform(0.02, 0.28), 6 * PERIOD):
+        half = ran(case, events, until=cut)
+        rest = ran(case, events, start=half.checkpoint)
+        assert same(whole, rest, half.t[-1] + 1e-9)
+        assert [(e.name, e.t) for e in (*half.events, *rest.events)] == [(e.name, e.t) for e in whole.events]
