@@ -2,7 +2,9 @@
 
 Metre, kilogram, second; millimetre, tonne, second; micrometre, microgram, millisecond. Statics and frequencies are in
 tests/validation; here are the right-angled frame in motion (B4), a heavy rope that swings with a load (B14), and a load
-on a rope that goes slack. Nothing is told to methods that choose their steps, the first one included.
+on a rope that goes slack. Nothing is told to methods that choose their steps, the first one included. Extrapolated runs
+are solved to 1e-12, next to rounding: with other ρ (0.8, 1) one or two of the elbow's 3,000 Newton iterations hang on
+the last digit, no step does.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ METHODS = {
     "adaptive alpha": lambda u: fc.AdaptiveAlpha(),
     "midpoint": lambda u: fc.ConservingMidpoint(0.02 * u.time),
     "explicit": lambda u: fc.ExplicitRungeKutta(),
-    "extrapolated": lambda u: fc.Richardson(fc.AdaptiveAlpha(rho=1.0)),
+    "extrapolated": lambda u: fc.Richardson(fc.AdaptiveAlpha(rho=0.9)),
 }
 
 
