@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.scales import turning, yardsticks
+from flexctrl.dynamics.scales import once, turning, yardsticks
+from flexctrl.model.plant import Plant
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -29,11 +30,16 @@ def strayed(journey: Journey) -> tuple[str, ...]:
     tuple of str
         Empty while no freedom that travels has gone a million times the size of the machine.
     """
-    model = journey.plan.model
-    yards = np.where(turning(model), np.inf, yardsticks(model))
-    way = journey.books.sums.moved / yards
-    if not way.size or not way.max() > _FAR:
+    model, moved = journey.plan.model, journey.books.sums.moved
+    far = once(model, _far)
+    if not (moved > far).any():
         return ()
-    worst = int(np.argmax(way))
+    worst = int(np.argmax(moved / far))
     blame = "nothing holds it" if journey.plan.feed.controller is None else "the loop is not stable"
-    return (f"{model.coordinates[worst]} has gone {way[worst]:.1g} times the size of the machine, as if {blame}",)
+    times = _FAR * moved[worst] / far[worst]
+    return (f"{model.coordinates[worst]} has gone {times:.1g} times the size of the machine, as if {blame}",)
+
+
+def _far(model: Plant) -> np.ndarray:
+    """A million times the size of the machine in each freedom that travels."""
+    return np.where(turning(model), np.inf, _FAR * yardsticks(model))
