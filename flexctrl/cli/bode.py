@@ -147,7 +147,8 @@ def _text(cut: Cut, data: Mapping[str, Any], found: Mapping[str, Margins]) -> st
             lines.append(f"{name}: no damped resonance")
     if found:
         keys = ("closed_loop", "gain_db", "phase_deg", "delay_s", "modulus", "Ms", "Mt")
-        rows = [(key, *(told(m)[key] for m in found.values())) for key in keys]
+        columns = [told(m) for m in found.values()]
+        rows = [(key, *(column[key] for column in columns)) for key in keys]
         lines += ["", f"loop cut at {cut.input}", grid(("margin", *found), rows)]
     return "\n".join(lines)
 

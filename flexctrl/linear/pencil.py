@@ -286,6 +286,7 @@ def faint_shift(K: Matrix, M: Matrix) -> float:
     """
     k, m = K.diagonal(), M.diagonal()
     both = (k > 0) & (m > 0)
+    if not both.any():
+        return -TINY
     ratios = k[both] / m[both]
-    clear = ratios[ratios > FAINT * np.median(ratios)] if ratios.size else ratios  # others may be rounding over a mass
-    return -TINY * float(clear.min(initial=np.inf if clear.size else 1.0))
+    return -TINY * float(ratios[ratios > FAINT * np.median(ratios)].min())  # less may be rounding over a mass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -97,7 +98,7 @@ class Margins:
     phase_crossings: tuple[Crossing, ...]
     loop: Loop = field(repr=False)
 
-    @property
+    @cached_property
     def verdict(self) -> str:
         """``stable``, ``on the verge (undamped)`` (see :meth:`Loop.is_marginal`) or ``UNSTABLE``."""
         return "on the verge (undamped)" if self.loop.is_marginal() else "stable" if self.stable else "UNSTABLE"

@@ -212,10 +212,9 @@ class Ledger:
         lines.append(str(self.accuracy))
         kept = ", ".join(self.minimal_set) or "nothing"
         size = f"{self.minimal_size.states} of {self.size.states} states"
-        gone = ", ".join(e.name for e in self.entries if not e.keep) or "nothing"
         lines += [
             f"kept: {kept}",
-            f"left out: {gone}",
+            f"left out: {self._left_out}",
             f"{self.changes} (asked: {self.within}), {self.pace}, {size}{self._way}",
         ]
         if all(e.keep for e in self.entries):
@@ -223,10 +222,13 @@ class Ledger:
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
     @property
+    def _left_out(self) -> str:
+        return ", ".join(e.name for e in self.entries if not e.keep) or "nothing"
+
+    @property
     def summary(self) -> str:
         """What the minimal set leaves out of the full one, and what that changes, in a line."""
-        gone = ", ".join(e.name for e in self.entries if not e.keep) or "nothing"
-        return f"left out: {gone}; {self.changes} (asked: {self.within}){self._way}"
+        return f"left out: {self._left_out}; {self.changes} (asked: {self.within}){self._way}"
 
     @property
     def changes(self) -> str:
