@@ -107,6 +107,7 @@ def test_the_table_tells_freedoms_that_effects_add(call, tmp_path):
     code, out, _ = call("table", tmp_path / "heavy.toml")
     assert code == 0
     assert "trolley: 4 degrees of freedom in the join table, 10 under the scene's effects" in out
+    assert [line.split()[-2:] for line in out.splitlines() if line.startswith("rope ")] == [["2", "2"]]  # m, kg
 
 
 def test_bode_gives_margins_and_poles_of_both(told):
@@ -132,6 +133,20 @@ def test_rlocus_finds_where_the_flexible_loop_turns_unstable(told):
     assert data["flexible"]["stable"]
 
 
+@pytest.mark.parametrize("share", [1.0, 0.02, 1e-4])
+def test_bode_and_rlocus_tell_the_same_critical_gains(call, scene, share):
+    """Of the machine and of its twin, however weak the controller: a share of it has as many times the margin."""
+    gains = {"kp": 0.2 * share, "kd": 0.05 * share}
+    text = TROLLEY.replace("kp = 0.2", f"kp = {gains['kp']}").replace("kd = 0.05", f"kd = {gains['kd']}")
+    scene.write_text(text, encoding="utf-8")
+    bode, rlocus = (json.loads(call(command, scene, "--json")[1]) for command in ("bode", "rlocus"))
+    for side in ("flexible", "rigid"):
+        margin = bode[side]["margins"]["gain"]
+        lost = [c["gain"] for c in rlocus[side]["critical_gains"] if c["unstable_above"] and c["gain"] > 1.0]
+        assert min(lost) == pytest.approx(margin, rel=1e-9)
+        assert margin * share == pytest.approx({"flexible": 7.0921, "rigid": 7.9999}[side], rel=1e-4)
+
+
 def test_signals_of_the_loop_can_be_chosen(told):
     data = told("bode", "--input", "push", "--output", "load_z")
     assert data["input"] == "push"
@@ -144,6 +159,7 @@ def test_compare_holds_both_and_their_difference(told):
     travel = data["signals"]["travel"]
     assert set(travel) >= {"flexible", "rigid", "max_difference", "rms_difference", "frequency_hz"}
     assert 0 < travel["rms_difference"] <= travel["max_difference"]
+    assert 0 < travel["rms_difference_known"] < travel["rms_difference"]
 
 
 # -- what is written
@@ -174,6 +190,32 @@ def test_out_holds_pictures_and_data(call, scene, tmp_path, command, files):
         assert "nan" not in "".join(rows[1:])
 
 
+PLANAR = """
+planar = "y"
+[sections]
+tube = { shape = "circular", material = "steel", radius = 0.01 }
+[elements]
+mast = { kind = "beam", start = [0, 0, 0], end = [0, 0, 1], section = "tube" }
+[[joints]]
+kind = "support"
+node = "mast.start"
+held = "u w ry"
+[effects]
+flexible = true
+"""
+
+
+@pytest.mark.parametrize("command", ["table", "modes", "report"])
+@pytest.mark.parametrize("text", [PLANAR, 'planar = "y"\n' + TROLLEY], ids=["mast", "trolley"])
+def test_planar_machines_are_drawn(call, tmp_path, text, command):
+    if command == "report":
+        text = text.split("[simulation]")[0]  # what it says of runs takes long
+    (tmp_path / "flat.toml").write_text(text, encoding="utf-8")
+    code, _, err = call(command, tmp_path / "flat.toml", "--out", tmp_path)
+    assert (code, [line for line in err.splitlines() if " % done" not in line]) == (0, [])
+    assert [*tmp_path.glob("*.png"), *tmp_path.glob("*.html")]
+
+
 def test_notes_stand_below_a_run_and_in_its_data(call, scene, told):
     _, text, _ = call("run", scene)
     notes = told("run")["notes"]
@@ -201,6 +243,21 @@ def test_bad_input_ends_with_2_and_the_message_on_the_error_stream(call, scene):
         assert (code, out) == (2, "")
         assert err.startswith(f"flexctrl: {scene}: [elements.load] weight: unknown key")
         assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("command", ["modes", "bode", "rlocus"])
+def test_what_linear_models_leave_out_is_said_where_they_are_shown(call, scene, command):
+    """Dry friction, and play that no load presses to a flank, are in the simulation alone."""
+    plain = call(command, scene)[1]
+    assert "friction" not in plain
+    assert "play" not in plain
+    loose = TROLLEY.replace(
+        "[effects]", "[effects]\ncoulomb_friction = { travel_drive = 0.1 }\nbacklash = { travel_drive = 0.1 }"
+    )
+    scene.write_text(loose, encoding="utf-8")
+    out = call(command, scene)[1]
+    assert "note: dry friction at travel_drive acts in simulations only" in out
+    assert "note: the play of travel_drive is open at rest" in out
 
 
 @pytest.mark.parametrize(
@@ -342,9 +399,10 @@ def test_a_reader_that_leaves_early_is_no_error(scene):
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["table", "bode", "rlocus"])
 @pytest.mark.parametrize("name", ["ceiling_crane", "bridge_crane", "flexible_arm"])
-def test_shipped_scenes_answer(call, command, name):
-    code, out, err = call(command, EXAMPLES / f"{name}.toml", "--json")
+def test_shipped_scenes_answer(call, command, name, tmp_path):
+    code, out, err = call(command, EXAMPLES / f"{name}.toml", "--json", "--out", tmp_path)
     assert (code, err) == (0, "")
+    assert [*tmp_path.glob("*.png")]
     data = json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} in JSON"))
     assert data["scene"] == name
     if command == "table":
@@ -413,6 +471,20 @@ def test_a_cost_that_is_ended_leaves_nothing_running_and_goes_on(scene, tmp_path
     kept = [json.loads(line)["key"][0] for line in store.read_text(encoding="utf-8").splitlines()]
     assert kept.count("run") == 4
     assert "point" in kept
+
+
+def test_a_cost_that_is_ended_at_once_has_kept_nothing_and_says_so(scene, tmp_path, call, monkeypatch):
+    """Stopped in the first run of the reference: the file has no line to go on from."""
+
+    def stopped(*anything):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flexctrl.study.work_precision.trace", stopped)
+    for out, said in ((("--out", tmp_path), "nothing is kept yet"), ((), "runs so far are lost; --out DIR keeps them")):
+        code, _, err = call("cost", scene, *out)
+        assert code == 1
+        assert err == f"flexctrl: interrupted: no reference was found yet; {said}\n"
+    assert not (tmp_path / "cost.jsonl").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("scene", ["flexible_arm", "bridge_crane"])

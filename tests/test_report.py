@@ -15,6 +15,8 @@ from scenes import TROLLEY
 import flexctrl as fc
 from flexctrl.cli import main
 from flexctrl.cli.answer import Answer
+from flexctrl.cli.health import health
+from flexctrl.errors import FlexctrlError
 from flexctrl.report.modes import animation
 from flexctrl.report.page import Section, page
 from flexctrl.scene.files import scene_from
@@ -97,6 +99,43 @@ def test_ctrl_c_ends_the_report_and_not_the_chapter_alone(tmp_path, monkeypatch,
     assert not (tmp_path / "trolley.html").exists()
 
 
+def test_the_health_of_a_report_tells_the_certificates_of_both_linear_models():
+    scene = scene_from(tomllib.loads(TROLLEY), Place("trolley.toml"), "trolley")
+    lines = health(scene, "", {}).splitlines()
+    cells = {re.split(r"  +", line)[0]: re.split(r"  +", line)[1:3] for line in lines}
+    found = [scene.linear.certificate, scene.twin_linear.certificate]
+    for said, numbers in {
+        "condition of M": [c.condition_mass for c in found],
+        "condition of K": [c.condition_stiffness for c in found],
+        "Taylor slope of the forces": [c.taylor_slope for c in found],
+        "asymmetry of K": [c.asymmetry for c in found],
+    }.items():
+        assert [float(cell) for cell in cells[said]] == pytest.approx(numbers, rel=0.06)
+    for c in found:
+        assert any("; ".join(c.rigid_modes) in line for line in lines)
+
+
+def test_the_health_of_a_report_tells_why_there_is_no_linear_model():
+    """A push on a trolley that nothing holds has no equilibrium."""
+    pushed = tomllib.loads(TROLLEY + "\n[equilibrium]\ninputs = { push = 2.0 }\n")
+    scene = scene_from(pushed, Place("trolley.toml"), "trolley")
+    with pytest.raises(FlexctrlError) as why:
+        _ = scene.linear
+    assert health(scene, "", {}) == f"linear model: {why.value}"
+
+
+def test_the_health_of_a_report_tells_how_well_references_are_known():
+    """The largest disagreement of a reference counts; a study that failed says that it has none."""
+    scene = scene_from(tomllib.loads(TROLLEY), Place("trolley.toml"), "trolley")
+    agreement = {"a coarser mesh": 0.0, "longer steps": 2.5e-4, "another integrator": 5e-5}
+    reference = {"reference": {"setting": "full", "agreement": agreement}}
+    full = {"full": {"judged_steps": 10, "judged_error": 3e-3, "error": None}}
+    lines = health(scene, "", {"ladder": reference, "ledger": full, "cost": {}}).splitlines()[-3:]
+    assert lines[0].startswith("Fidelity: full, known to 2.5e-04; apart from a coarser mesh 0, longer steps 2.5e-04")
+    assert "known to 3.0e-03; the scene's own run ended early" in lines[1]
+    assert lines[2] == "Accuracy: no reference was found"
+
+
 @pytest.mark.slow
 def test_the_page_needs_nothing_else(report):
     text = report.read_text(encoding="utf-8")
@@ -109,6 +148,9 @@ def test_the_page_needs_nothing_else(report):
     assert all(
         line.endswith("*") for line in cost[3:] if not re.match("reference|error|passed|cheapest|no setting", line)
     )
+    trusted = re.search(r'<section id="run".*?<pre>(.*?)</pre>', text, re.DOTALL)[1]
+    for said in ("energy residual", "Taylor slope", "condition of K", "Fidelity: full", "Effects: full", "known to"):
+        assert said in trusted
     for title in (
         "Machine",
         "Modes",
@@ -118,6 +160,7 @@ def test_the_page_needs_nothing_else(report):
         "Fidelity",
         "Effects",
         "Accuracy",
+        "Numerical health",
         "Versions",
     ):
         assert f">{title}<" in text

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
-from flexctrl.cli.loops import DRIFT, Cut, cut_of
+from flexctrl.cli.loops import DRIFT, Cut, cut_of, noted
 from flexctrl.cli.program import Request
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.response import FrequencyResponse
@@ -41,6 +41,7 @@ def _data(
     cut: Cut, responses: Mapping[str, FrequencyResponse], loops: Mapping[str, Loop], found: Mapping[str, Margins]
 ) -> dict[str, Any]:
     data: dict[str, Any] = {"scene": cut.scene.name, "input": cut.input, "output": cut.output}
+    data["notes"] = cut.notes
     for name, linear in cut.machines.items():
         side: dict[str, Any] = {"responds": name in responses, "poles": linear.damped_poles()}
         if name in responses:
@@ -150,7 +151,7 @@ def _text(cut: Cut, data: Mapping[str, Any], found: Mapping[str, Margins]) -> st
         columns = [told(m) for m in found.values()]
         rows = [(key, *(column[key] for column in columns)) for key in keys]
         lines += ["", f"loop cut at {cut.input}", grid(("margin", *found), rows)]
-    return "\n".join(lines)
+    return "\n".join(lines + noted(data["notes"]))
 
 
 __all__ = ["answer", "told"]

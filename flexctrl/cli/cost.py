@@ -31,8 +31,16 @@ def _problem(study: WorkPrecision, store: Path | None) -> str:
         return ""
     times = sum(map(timed, study.points))
     found = f"errors of {len(study.points)} settings and times of {times} were found"
-    kept = f"are kept in {store}; the same command goes on from there" if store else "are lost; --out DIR keeps them"
-    return f"interrupted: {found if study.reference else 'no reference was found yet'}; runs so far {kept}"
+    reached = found if study.reference else "no reference was found yet"
+    return f"interrupted: {reached}; {_kept(study, store)}"
+
+
+def _kept(study: WorkPrecision, store: Path | None) -> str:
+    if store is None:
+        return "runs so far are lost; --out DIR keeps them"
+    if not study.kept:
+        return "nothing is kept yet"
+    return f"runs so far are kept in {store}; the same command goes on from there"
 
 
 def _data(study: WorkPrecision) -> dict[str, object]:

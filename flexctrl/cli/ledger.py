@@ -29,6 +29,7 @@ def answer(request: Request) -> Answer:
 def _data(found: Ledger) -> dict[str, object]:
     minimal = {
         "output_change": found.minimal_change.outputs_worst,
+        "output_change_known": found.minimal_change.outputs_known,
         "outputs": found.minimal_change.outputs,
         "poles_change": found.minimal_change.poles,
         "pole": found.minimal_change.pole,
@@ -71,6 +72,7 @@ def _entry(found: Ledger, e: Entry) -> dict[str, object]:
     if e.change is None or e.size is None:
         return {**base, "failure": e.failure}
     base |= {"cost_told": found.told_apart(e)}
+    base |= {"output_change_known": e.change.outputs_known}
     change = {"output_change": e.change.outputs_worst, "outputs": e.change.outputs, "poles_change": e.change.poles}
     change |= {"pole": e.change.pole}
     size = {"states": e.size.states, "nonzeros": e.size.nonzeros, "instructions": e.size.instructions}

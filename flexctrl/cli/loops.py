@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy as np
 from flexctrl.cli.program import Request
 from flexctrl.errors import SceneError, did_you_mean
 from flexctrl.linear.model import LinearModel
+from flexctrl.model.equilibrium import Rest
+from flexctrl.model.laws.idle import idle
+from flexctrl.model.model import Model
 from flexctrl.scene import Scene
 from flexctrl.study.broken_loop import broken_loop
 from flexctrl.study.loop import Loop, open_loop
@@ -42,6 +46,14 @@ class Cut:
         return {"flexible": self.scene.linear} | twin
 
     @property
+    def notes(self) -> list[str]:
+        """What the linear models leave out of the machine and of its twin."""
+        scene = self.scene
+        own = left_out(scene.model, scene.rest)
+        twin = left_out(scene.twin, scene.twin_rest) if scene.twin.n else []
+        return [*own, *(f"rigid twin: {note}" for note in twin if note not in own)]
+
+    @property
     def title(self) -> str:
         """What the loop is."""
         if self.controlled:
@@ -67,6 +79,27 @@ class Cut:
         span = np.geomspace(1e-2, 1e3, 7)
         size = np.abs(linear.frequency_response(span).values).max()
         return bool(np.abs(chosen.frequency_response(span).values).max() > 1e-12 * size)
+
+
+def left_out(model: Model, rest: Rest) -> list[str]:
+    """Return what a linear model leaves out of a machine.
+
+    Parameters
+    ----------
+    model : Model
+    rest : Rest
+        The equilibrium that it is about.
+
+    Returns
+    -------
+    list of str
+    """
+    return [*model.notes, *idle(model, rest.state)]
+
+
+def noted(notes: Sequence[str]) -> list[str]:
+    """Return notes as lines below a table; none for none."""
+    return ["", *(f"note: {note}" for note in notes)] if notes else []
 
 
 def cut_of(scene: Scene, request: Request) -> Cut:
@@ -103,4 +136,4 @@ def _chosen(kind: str, wanted: str, known: tuple[str, ...], first: tuple[str, ..
     return wanted or first[0]
 
 
-__all__ = ["Cut", "cut_of"]
+__all__ = ["Cut", "cut_of", "left_out", "noted"]

@@ -8,6 +8,7 @@ from dataclasses import asdict
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
+from flexctrl.cli.loops import left_out, noted
 from flexctrl.cli.program import Request
 from flexctrl.errors import SceneError
 from flexctrl.linear.modes import Modes
@@ -48,6 +49,7 @@ def _data(scene: Scene, modes: Modes) -> dict[str, object]:
     shares = [_share(modes, k, part) for k, part in enumerate(parts)]
     return {
         "scene": scene.name,
+        "notes": left_out(scene.model, scene.rest),
         "equilibrium": {"residual": scene.rest.residual, "outputs": scene.rest.outputs},
         "dofs": scene.model.n,
         "frequencies_hz": modes.frequencies,
@@ -79,8 +81,8 @@ def _text(scene: Scene, data: dict, loose: Sequence[Vanishing]) -> str:
     more = f"{count} rigid-body mode{'s' * (count != 1)}" + (
         f", {data['unstable_modes']} unstable" if data["unstable_modes"] else ""
     )
-    notes = "".join(f"\n{_of_mesh(v, data['coordinates'][v.mode])}" for v in loose)
-    return f"{head}\n\n{outputs}\n\n{modes}\n\n{more}{notes}"
+    loose_ones = [_of_mesh(v, data["coordinates"][v.mode]) for v in loose]
+    return "\n".join([f"{head}\n\n{outputs}\n\n{modes}\n\n{more}", *loose_ones, *noted(data["notes"])])
 
 
 def _of_mesh(found: Vanishing, most: str) -> str:

@@ -6,6 +6,7 @@ import importlib
 import platform
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -14,6 +15,7 @@ from typing import Any
 
 import flexctrl
 from flexctrl.cli.answer import Answer, plain
+from flexctrl.cli.health import health
 from flexctrl.cli.program import COMMANDS, Request
 from flexctrl.design.hardware import Noisy
 from flexctrl.errors import FlexctrlError
@@ -22,13 +24,14 @@ from flexctrl.report.modes import animation
 from flexctrl.report.page import Section, page
 from flexctrl.scene import Scene, load_scene
 
+_HEALTH = "Numerical health"
 _TITLES = {
     "table": "Machine",
     "modes": "Modes",
     "bode": "Bode",
     "rlocus": "Root locus",
     "compare": "Closed loop",
-    "run": "Numerical health",
+    "run": _HEALTH,
     "ladder": "Fidelity",
     "ledger": "Effects",
     "cost": "Accuracy",
@@ -53,14 +56,14 @@ def answer(request: Request) -> Answer:
     out = request.out or Path()
     with tempfile.TemporaryDirectory() as folder:
         titles = _TITLES if scene.law is not None else {**_TITLES, "compare": "Simulation"}
-        chapters = [_chapter(n, title, request, Path(folder)) for n, title in titles.items() if _applies(n, scene)]
+        chapters = {n: _chapter(n, t, request, Path(folder)) for n, t in titles.items() if _applies(n, scene)}
         versions = Section("versions", "Versions", _versions(scene), lead=LEADS["versions"])
-        sections = [*(c.section for c in chapters), versions]
+        sections = [*(c.section for n, c in chapters.items() if n != "run"), _health(scene, chapters), versions]
         motion = _motion(scene) if any(s.moving for s in sections) else {}
         text = page(scene.name, " ".join(scene.notes), sections, motion)
     path = out / f"{scene.name}.html"
     path.write_text(text, encoding="utf-8")
-    failed = [c.section.title for c in chapters if c.section.failed]
+    failed = [s.title for s in sections if s.failed]
     data = {
         "scene": scene.name,
         "page": str(path),
@@ -93,6 +96,13 @@ def _chapter(name: str, title: str, request: Request, folder: Path) -> Chapter:
     text, more = _front(found.text) if name == "cost" else (found.text, "")
     section = Section(name, title, text, pictures, moving=name == "modes", lead=LEADS[name], more=more)
     return Chapter(section, found.data)
+
+
+def _health(scene: Scene, chapters: Mapping[str, Chapter]) -> Section:
+    """The run, if there is one, and what the other chapters rest on."""
+    run = chapters.get("run")
+    text = health(scene, run.section.text if run else "", {name: c.data for name, c in chapters.items()})
+    return Section("run", _HEALTH, text, failed=run is not None and run.section.failed, lead=LEADS["run"])
 
 
 def _rank(picture: Path) -> tuple[int, str]:

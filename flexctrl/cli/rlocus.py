@@ -9,16 +9,17 @@ import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
 from flexctrl.cli.bode import told
-from flexctrl.cli.loops import Cut, cut_of
+from flexctrl.cli.loops import Cut, cut_of, noted
 from flexctrl.cli.program import Request
-from flexctrl.plots.root_locus import plot_root_locus
+from flexctrl.plots.root_locus import draw_root_locus
 from flexctrl.scene import load_scene
 from flexctrl.study.frequency import margins
 from flexctrl.study.loop import Loop
-from flexctrl.study.root_locus import CriticalGain, RootLocus, in_s, root_locus
+from flexctrl.study.root_locus import CriticalGain, RootLocus, critical_gains, in_s, root_locus
 
 _LEAST_GAIN = 1e-9
-_GAINS = np.geomspace(1e-3, 30.0, 400)  # of a controller, whose own gain is 1
+_LEAST_SHOWN, _SHOWN, _BEYOND, _COUNT = 1e-3, 30.0, 1.5, 400
+"""Gains drawn of a controller, whose own gain is 1, and how far beyond the one at which stability is lost."""
 
 
 def answer(request: Request) -> Answer:
@@ -26,17 +27,23 @@ def answer(request: Request) -> Answer:
     scene = load_scene(request.scene)
     cut = cut_of(scene, request)
     loops = {name: cut.loop(linear) for name, linear in cut.machines.items() if _moves(cut, linear)}
-    loci = {name: root_locus(loop, _GAINS if cut.controlled else None) for name, loop in loops.items()}
-    critical = {name: _critical(locus) for name, locus in loci.items()}
+    critical = {name: _critical(loop) for name, loop in loops.items()}
+    loci = {name: root_locus(loop, _gains(critical[name]) if cut.controlled else None) for name, loop in loops.items()}
     data = plain(_data(cut, loops, loci, critical))
     _write(request, cut, loops, loci, critical)
     write_json(request.out, "rlocus.json", data)
     return Answer(_text(cut, data), data)
 
 
-def _critical(locus: RootLocus) -> tuple[CriticalGain, ...]:
-    """Critical gains without those at which rounding splits the double pole of rigid-body motion."""
-    return tuple(c for c in locus.critical if c.gain > _LEAST_GAIN)
+def _critical(loop: Loop) -> tuple[CriticalGain, ...]:
+    """All critical gains without those at which rounding splits the double pole of rigid-body motion."""
+    return tuple(c for c in critical_gains(loop) if c.gain > _LEAST_GAIN)
+
+
+def _gains(critical: tuple[CriticalGain, ...]) -> np.ndarray:
+    """The gains drawn: to beyond where stability is lost, however far that is."""
+    lost = min((c.gain for c in critical if c.unstable_above and c.gain > 1.0), default=1.0)
+    return np.geomspace(_LEAST_SHOWN, max(_SHOWN, _BEYOND * lost), _COUNT)
 
 
 def _moves(cut: Cut, linear: Any) -> bool:
@@ -48,6 +55,7 @@ def _data(
 ) -> dict[str, Any]:
     data: dict[str, Any] = {
         "scene": cut.scene.name,
+        "notes": cut.notes,
         "input": cut.input,
         "output": cut.output,
         "controlled": cut.controlled,
@@ -89,9 +97,7 @@ def _write(
         write_csv(request.out, f"rlocus_{name}.csv", columns)
 
     def draw(figure: Any) -> None:
-        figure.set_layout_engine("constrained")
-        ax = plot_root_locus(loci, figure.subplots(), critical=critical.get("flexible", ()))
-        ax.set_title(cut.title, fontsize=11)
+        draw_root_locus(figure, loci, cut.title, critical.get("flexible", ()))
 
     if loci:
         write_picture(request.out, "rlocus.png", draw, size=(9.0, 6.5))
@@ -111,7 +117,7 @@ def _text(cut: Cut, data: Mapping[str, Any]) -> str:
         rows = [(c["gain"], c["hz"], "above" if c["unstable_above"] else "below") for c in side["critical_gains"]]
         if rows:
             lines.append(grid(("critical gain", "Hz", "unstable"), rows, left=0))
-    return "\n".join(lines)
+    return "\n".join(lines + noted(data["notes"]))
 
 
 __all__ = ["answer"]

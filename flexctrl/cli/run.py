@@ -51,11 +51,24 @@ def run_both(scene: Scene, twin: bool) -> tuple[Run, Run | None]:
     -------
     tuple of Run and (Run or None)
     """
-    run = _shown(scene, scene.model, f"{scene.name}")
-    return run, _shown(scene, scene.twin, "rigid twin") if twin and run.status is not Status.INTERRUPTED else None
+    run = shown(scene, scene.model, f"{scene.name}")
+    return run, shown(scene, scene.twin, "rigid twin") if twin and run.status is not Status.INTERRUPTED else None
 
 
-def _shown(scene: Scene, model: Model, what: str) -> Run:
+def shown(scene: Scene, model: Model, what: str) -> Run:
+    """Run a scene's machine, or its twin, and show how far it is.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : Model
+    what : str
+        Is run, in words.
+
+    Returns
+    -------
+    Run
+    """
     with progress(what) as tell:
         return scene.run(model, tell)
 
@@ -147,4 +160,4 @@ def _row(name: str, runs: list[Run]) -> list[float]:
     return [beyond(rounding, value) for number in zip(*each, strict=True) for value in number]
 
 
-__all__ = ["answer", "curves", "draw", "interrupted", "problem", "run_both", "told"]
+__all__ = ["answer", "curves", "draw", "interrupted", "problem", "run_both", "shown", "told"]

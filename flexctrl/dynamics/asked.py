@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint
-from flexctrl.dynamics.events import Event
-from flexctrl.dynamics.record import Record
+from flexctrl.dynamics.events.event import Event
+from flexctrl.dynamics.records.record import Record
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import StructureError, shortened

@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.records.books import Sums
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Mark, Pace, Point
 from flexctrl.errors import StructureError
@@ -24,7 +24,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
 
-_FORMAT = 8
+_FORMAT = 9
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 

@@ -10,26 +10,27 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
-from flexctrl.dynamics.dense import Track
-from flexctrl.dynamics.events import EventError, Occurrence
-from flexctrl.dynamics.explicit import ExplicitRungeKutta
-from flexctrl.dynamics.extrapolation import Richardson
+from flexctrl.dynamics.events.event import EventError, Occurrence
+from flexctrl.dynamics.events.switching import beyond
+from flexctrl.dynamics.events.watch import Crossing, Watch
+from flexctrl.dynamics.events.watching import watched
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.march.ride import ride, rides
 from flexctrl.dynamics.march.stepper import MarchingStepper
-from flexctrl.dynamics.midpoint import ConservingMidpoint
+from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
+from flexctrl.dynamics.methods.extrapolation import Richardson
+from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
+from flexctrl.dynamics.notes.straying import astray
 from flexctrl.dynamics.pacing import controlled, fixed
-from flexctrl.dynamics.record import Unwritten, writing
-from flexctrl.dynamics.rows import Rows
+from flexctrl.dynamics.records.books import Books
+from flexctrl.dynamics.records.dense import Track
+from flexctrl.dynamics.records.record import Unwritten, writing
+from flexctrl.dynamics.records.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper, Twofold
 from flexctrl.dynamics.stops import Stops
-from flexctrl.dynamics.switching import beyond
-from flexctrl.dynamics.watch import Crossing, Watch
-from flexctrl.dynamics.watching import watched
 from flexctrl.errors import ControllerError
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.plant import Plant
@@ -170,10 +171,22 @@ class Journey:
             if nonsense := self.books.nonsense:
                 where = f"at t = {self.point.state.t:.6g} s; {self._remedy}"
                 raise StepError(self.stepper.counts.worst, f"{nonsense} {where}")
+            self._look_back()
             if (now := time.perf_counter()) - self._told > 0.1:
                 self._told = now
                 self._report(now)
             interruption.check()
+
+    def _look_back(self) -> None:
+        """Raise StepError where a loop has thrown the machine away: chosen steps would be ever more and shorter."""
+        if self.plan.feed.controller is None or not isinstance(self.plan.method.pace, Controlled):
+            return
+        if (worst := astray(self)) is not None:
+            gone = f"at t = {self.point.state.t:.6g} s a part has gone a million times the size of the machine"
+            raise StepError(
+                worst,
+                f"the loop is not stable: {gone}; look at signs and gains of the controller, or end the run before",
+            )
 
     def _pause(self) -> None:
         """Take note of what later steps depend on, and what they have cost so far."""

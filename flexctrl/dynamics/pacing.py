@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from flexctrl.dynamics.ending import ends_before
-from flexctrl.dynamics.landing import Missed
-from flexctrl.dynamics.nearing import SHORTEST, SMALLEST
+from flexctrl.dynamics.events.ending import ends_before
+from flexctrl.dynamics.events.landing import Missed
+from flexctrl.dynamics.events.nearing import SHORTEST, SMALLEST
+from flexctrl.dynamics.events.switching import lead
 from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.steps import Controlled, Point, StepError
-from flexctrl.dynamics.switching import lead
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from flexctrl.dynamics.alpha_point import Coefficients
-from flexctrl.dynamics.alpha_steps import Stepper
+from flexctrl.dynamics.alpha.point import Coefficients
+from flexctrl.dynamics.alpha.steps import Stepper
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.consistent import check_state

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from flexctrl.dynamics.checkpoint import Checkpoint
-    from flexctrl.dynamics.dense import Track
-    from flexctrl.dynamics.events import Occurrence
+    from flexctrl.dynamics.events.event import Occurrence
+    from flexctrl.dynamics.records.dense import Track
 
 
 class Status(Enum):

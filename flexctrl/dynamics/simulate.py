@@ -9,28 +9,28 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha
+from flexctrl.dynamics.alpha.first_step import first_step
+from flexctrl.dynamics.alpha.method import AdaptiveAlpha
 from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
-from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
-from flexctrl.dynamics.dense import Track, curves_of
-from flexctrl.dynamics.events import Event
+from flexctrl.dynamics.events.event import Event
+from flexctrl.dynamics.events.nearing import SMALLEST
+from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply, feed_of
-from flexctrl.dynamics.first_step import first_step
 from flexctrl.dynamics.journey import Journey, Plan
-from flexctrl.dynamics.layers import beyond_layers
-from flexctrl.dynamics.linear_plant import LinearPlant
-from flexctrl.dynamics.nearing import SMALLEST
-from flexctrl.dynamics.record import InMemory, Record, Unwritten
-from flexctrl.dynamics.rows import Rows
+from flexctrl.dynamics.linear_motion.plant import LinearPlant
+from flexctrl.dynamics.notes.straying import strayed
+from flexctrl.dynamics.notes.unsure import unsure
+from flexctrl.dynamics.records.books import Books
+from flexctrl.dynamics.records.dense import Track, curves_of
+from flexctrl.dynamics.records.record import InMemory, Record, Unwritten
+from flexctrl.dynamics.records.rows import Rows
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
-from flexctrl.dynamics.settling import quasistatic
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
-from flexctrl.dynamics.straying import strayed
+from flexctrl.dynamics.swift.layers import beyond_layers
+from flexctrl.dynamics.swift.settling import quasistatic
 from flexctrl.dynamics.unbegun import UNASKED, unbegun
-from flexctrl.dynamics.unsure import unsure
-from flexctrl.dynamics.watch import Watch
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.consistent import check_state
@@ -146,7 +146,7 @@ def simulate(
 
 def _plant(linear: LinearModel, method: Integrator | None, step: float) -> tuple[LinearPlant, Integrator]:
     """A linear model as a machine, and its method; outputs that feel inputs at once are known to the exact one only."""
-    from flexctrl.dynamics.exact import Exact
+    from flexctrl.dynamics.linear_motion.exact import Exact
 
     method = method or Exact(step)
     if linear.D.any() and not isinstance(method, Exact):

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.books import Books
 from flexctrl.dynamics.checkpoint import Checkpoint
-from flexctrl.dynamics.dense import Track
+from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.journey import Journey, Plan
-from flexctrl.dynamics.rows import Rows
+from flexctrl.dynamics.records.books import Books
+from flexctrl.dynamics.records.dense import Track
+from flexctrl.dynamics.records.rows import Rows
 from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.steps import Mark, Point, Stepper
 from flexctrl.dynamics.stops import Stops
-from flexctrl.dynamics.watch import Watch
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
 

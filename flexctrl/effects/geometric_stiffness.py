@@ -16,7 +16,8 @@ class GeometricStiffness(Effect):
     """Small motion about the equilibrium under the machine's loads, with the stiffness that these give.
 
     It stands in for `LargeRotation`: K, C and M are those of `linearize` at the equilibrium, constant, so ropes
-    swing and chains hang, but a swing does not lift its load. ``Model.rest`` is that equilibrium. Without either
+    swing and chains hang, but a swing does not lift its load. Outputs are linear as well: a rope that swings pulls by
+    the weight, and one that is pressed has a negative tension. ``Model.rest`` is that equilibrium. Without either
     effect K is as assembled, without prestress. A `Scene` fills in its own ``hold`` and ``rest_inputs``.
 
     Parameters

@@ -165,7 +165,7 @@ def _heavy(structure: Structure, parts: tuple[Effect, ...]) -> tuple[Structure, 
     def named(effect: Effect) -> Effect:
         if not isinstance(effect, Deforming | RopeMass) or not effect.of:
             return effect
-        return type(effect)([piece for name in effect.of for piece in pieces.get(name, (name,))])
+        return replace(effect, of=tuple(piece for name in effect.of for piece in pieces.get(name, (name,))))
 
     return structure, tuple(named(e) for e in parts) if pieces else parts
 

@@ -200,14 +200,14 @@ class SmallMotion:
         return levers.toarray() if self.model.n <= DENSE_UP_TO else levers
 
     def advance(self, state: State, step: np.ndarray, v: np.ndarray, t: float) -> State:
-        """Return the state after a step; what is shown moves to first order."""
+        """Return the state after a step."""
         motion, rest = self.model.motion, self.model.rest
         q = state.q + step
         small = q - rest.q
         raw = (self._levers @ small).reshape(-1, 6)
         x, R = rest.x + raw[:, :3], exponential(raw[:, 3:]) @ rest.R
         driven = motion.unwound(x, R, motion.wound(state, step, rest))
-        return State(x, R, q, v, driven, t, state.dry, motion.shown(rest.shown, small, R))
+        return State(x, R, q, v, driven, t, state.dry)
 
     def energy(self, state: State) -> tuple[float, float, float]:
         """Return kinetic energy, stored energy and dissipated power."""

@@ -50,7 +50,8 @@ class Gauges:
         Whether some output reads rates.
     starts, cells : Wholes
         Where each sum begins; the entries of the workspace in it.
-    weights, sums : Reals
+    weights, levels, sums : Reals
+        Of the entries; what each sum begins with.
     plain : Wholes
         Outputs that are a sum: output, sum.
     angles : Wholes
@@ -73,6 +74,7 @@ class Gauges:
     starts: Wholes
     cells: Wholes
     weights: Reals
+    levels: Reals
     sums: Reals
     plain: Wholes
     angles: Wholes
@@ -86,7 +88,7 @@ class Gauges:
 def read(g: Gauges, z: Reals, y: Reals) -> None:
     """Read all outputs; angles not far from where they were last."""
     for i in range(g.rows):
-        total = 0.0
+        total = g.levels[i]
         for k in range(g.starts[i], g.starts[i + 1]):
             total += g.weights[k] * z[g.cells[k]]
         g.sums[i] = total
@@ -226,6 +228,7 @@ class _Builder:
             starts=np.cumsum([0, *(len(cells) for cells, _ in self.sums)]),
             cells=np.concatenate([empty, *(cells for cells, _ in self.sums)]).astype(int),
             weights=np.concatenate([empty, *(weights for _, weights in self.sums)]),
+            levels=np.zeros(len(self.sums)),
             sums=np.zeros(len(self.sums)),
             plain=np.array(self.plain, dtype=int).ravel(),
             angles=np.array(self.angles, dtype=int).ravel(),
@@ -263,7 +266,7 @@ def _hoist(effects: tuple[Effect, ...]) -> Kernel:
     import casadi as ca
 
     z, p = ca.SX.sym("z", 14), ca.SX.sym("p", len(WINCH_PARAMETERS))
-    return Kernel("hoist", z, p, winch_tension(effects)(z, p)[0])
+    return Kernel("hoist", z, p, ca.fmax(winch_tension(effects)(z, p)[0], 0.0))
 
 
 def _pull(of: type, loose: bool, effects: tuple[Effect, ...]) -> Kernel:

@@ -28,6 +28,7 @@ from flexctrl.model.laws.wind_kinds import wind_families
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import Motion
 from flexctrl.model.signals import Signals, signals_of
+from flexctrl.model.small_signals import small_signals
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
@@ -124,7 +125,8 @@ class Model:
     @cached_property
     def signals(self) -> Signals:
         """Inputs and outputs, ready to be evaluated."""
-        return signals_of(self.structure, self.effects, self.motion)
+        found = signals_of(self.structure, self.effects, self.motion)
+        return found if self.large else small_signals(found, self.motion)
 
     @cached_property
     def gusts(self) -> Gusts:

@@ -265,7 +265,7 @@ def _hoist(s: Structure, effects: tuple[Effect, ...], motion: Motion, winch: Win
         g = evaluated(state, rates)[1:]
         return (cells, g[:7], cells, g[7:])
 
-    return Measure(lambda state, rates: float(evaluated(state, rates)[0]), slope)
+    return Measure(lambda state, rates: max(float(evaluated(state, rates)[0]), 0.0), slope)
 
 
 def winch_tension(effects: tuple[Effect, ...]) -> ca.Function:
@@ -274,7 +274,7 @@ def winch_tension(effects: tuple[Effect, ...]) -> ca.Function:
 
     z, p, still = ca.SX.sym("z", 14), ca.SX.sym("p", len(WINCH_PARAMETERS)), ca.SX(3, 1)
     node, base = (NodeMotion(z[k : k + 3], ca.SX.eye(3), z[7 + k : 10 + k], still, still, still) for k in (0, 3))
-    tension = ca.fmax(rope_pull(effects, paid_out(node, base, ca.vertcat(z[6], z[13], 0.0), p)), 0.0)
+    tension = rope_pull(effects, paid_out(node, base, ca.vertcat(z[6], z[13], 0.0), p))
     return ca.Function("hoist", [z, p], [ca.vertcat(tension, ca.densify(ca.gradient(tension, z)))])
 
 

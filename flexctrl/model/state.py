@@ -51,7 +51,7 @@ class State:
     dry : Dry
         What dry contacts do.
     shown : numpy.ndarray, shape (angles,)
-        What each `Rotation` output shows, turns included [rad].
+        What each `Rotation` output shows, turns included [rad]; empty in small motion, where ``q`` tells.
     """
 
     x: np.ndarray

@@ -20,8 +20,9 @@ from flexctrl.structure.beams import Beam
 from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.drives import RotaryDrive, Winch
 from flexctrl.structure.elements import Part
+from flexctrl.structure.freedoms import TRANSLATIONS
 from flexctrl.structure.join_table import JoinTable
-from flexctrl.structure.joints import Hinge, Joint, Pin, Slide, Support, Weld, main_axis
+from flexctrl.structure.joints import Hinge, InPlane, Joint, Pin, Slide, Support, Weld, main_axis
 from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
 
@@ -55,10 +56,17 @@ def best_plane(structure: Structure, poses: Sequence[Pose] = ()) -> tuple[int, i
     flat = [i for i in range(3) if extent[i] <= 0.01 * extent.max()]
     if not flat:
         return None
-    turning = _turning_axis(structure)
-    normal = turning if turning in flat else min(flat, key=lambda i: (extent[i], i != 1))
-    across, up = (i for i in range(3) if i != normal)
-    return across, up
+    across = _held_axis(structure), _turning_axis(structure)
+    normal = next((axis for axis in across if axis in flat), min(flat, key=lambda i: (extent[i], i != 1)))
+    right, up = (i for i in range(3) if i != normal)
+    return right, up
+
+
+def _held_axis(structure: Structure) -> int:
+    """The axis across the plane that a machine is held in; -1 without one."""
+    joints = () if isinstance(structure.joints, JoinTable) else structure.joints
+    held = [joint.held & TRANSLATIONS for joint in joints if isinstance(joint, InPlane)]
+    return min(held[0]) if held else -1
 
 
 def _turning_axis(structure: Structure) -> int:
@@ -225,6 +233,8 @@ def _draw_symbols(pen: Pen, structure: Structure, pose: Pose) -> None:
     seen: dict[str, Line2D] = {}
     joints = () if isinstance(structure.joints, JoinTable) else structure.joints
     for joint in joints:
+        if isinstance(joint, InPlane):  # of every node; the picture is plane itself
+            continue
         label, style = _symbol(joint)
         drop = 7.0 if isinstance(joint, Support) else 0.0
         pen.mark(pose.x[structure.number(joint.nodes[-1])], drop, **style, zorder=4 - bool(drop))
@@ -242,7 +252,7 @@ def _draw_symbols(pen: Pen, structure: Structure, pose: Pose) -> None:
 
 
 def _symbol(joint: Joint) -> tuple[str, dict[str, Any]]:
-    label, marker, size, face = _SYMBOLS[type(joint)]
+    label, marker, size, face = next(look for kind, look in _SYMBOLS.items() if isinstance(joint, kind))
     return label, {"marker": marker, "markersize": size, "markerfacecolor": face, "markeredgecolor": INK}
 
 

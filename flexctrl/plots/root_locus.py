@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from flexctrl.errors import check_kind
 from flexctrl.plots.style import CYCLE, INK, axes_of, by_label, new_figure, tidy
@@ -14,11 +15,14 @@ from flexctrl.structure.freedoms import check_finite, listed
 from flexctrl.study.root_locus import CriticalGain, RootLocus
 from flexctrl.study.zeros import Zeros
 
-__all__ = ["locus_figure", "plot_root_locus", "zeros_figure"]
+__all__ = ["close_up", "draw_root_locus", "locus_figure", "plot_root_locus", "zeros_figure"]
 
 _CANCELLED = 0.02
 _NARROW = 0.01
 """Half the least width of a picture over its height: without damping, real parts are round-off."""
+
+_BLOT = 0.1
+"""Share of a picture's width and height in which what there is cannot be told apart."""
 
 
 def plot_root_locus(
@@ -77,6 +81,54 @@ def plot_root_locus(
     return ax
 
 
+def draw_root_locus(
+    figure: Figure, loci: Mapping[str, RootLocus], title: str, critical: Sequence[CriticalGain] = ()
+) -> None:
+    """Draw root loci in a figure, and beside them what is slow, where that would be a blot at the origin.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    loci : mapping of str to RootLocus
+    title : str
+    critical : sequence of CriticalGain
+        See :func:`plot_root_locus`.
+    """
+    figure.set_layout_engine("constrained")
+    near = close_up(loci)
+    axes = np.ravel(figure.subplots(1, 2 if near else 1, squeeze=False))
+    plot_root_locus(loci, axes[0], critical=critical)
+    figure.suptitle(title, fontsize=11)
+    if near is None:
+        return
+    figure.set_size_inches(*(figure.get_size_inches() * (1.7, 1.0)))
+    close = plot_root_locus(loci, axes[1], critical=critical, top=near)
+    close.set_title("near the origin", fontsize=10)
+    (left, right), (low, high) = close.get_xlim(), close.get_ylim()
+    axes[0].add_patch(Rectangle((left, low), right - left, high - low, fill=False, color=INK, linewidth=0.8, zorder=6))
+
+
+def close_up(loci: Mapping[str, RootLocus]) -> float | None:
+    """Return how high to look for what is a blot at the origin of the whole picture; None if nothing is.
+
+    Parameters
+    ----------
+    loci : mapping of str to RootLocus
+
+    Returns
+    -------
+    float or None
+        Largest imaginary part to show [rad/s].
+    """
+    shown = {label: locus.in_s() for label, locus in loci.items()}
+    width, height = _window(shown, _top(shown))
+    points = np.concatenate([np.concatenate(_uncancelled(locus)) for locus in shown.values()])
+    rest = max(locus.loop.rest_radius / (locus.loop.dt or 1.0) for locus in loci.values())
+    share = np.maximum(abs(points.real) / (width[1] - width[0]), abs(points.imag) / (2.0 * height))
+    inside = abs(points[(share < _BLOT) & (abs(points) > rest)])
+    return 1.4 * float(inside.max()) if inside.size > 1 else None
+
+
 def locus_figure(locus: RootLocus, top: float | None = None) -> Figure:
     """Draw one root locus in a new figure, with the gains at which stability ends.
 
@@ -125,12 +177,16 @@ def zeros_figure(zeros: Zeros) -> Figure:
 
 def _top(loci: Mapping[str, RootLocus]) -> float:
     """As high as there are poles that move: those on a zero of their own are not worth the room."""
-    moving = [0.0]
-    for locus in loci.values():
-        poles, zeros = np.asarray(locus.poles), np.append(locus.zeros, np.inf)
-        gap = np.abs(poles[:, None] - zeros).min(axis=1)
-        moving += np.abs(poles.imag[gap > _CANCELLED * np.abs(poles)]).tolist()
-    return 1.4 * max(moving) or np.inf
+    moving = [float(abs(pole.imag)) for locus in loci.values() for pole in _uncancelled(locus)[0]]
+    return 1.4 * max(moving, default=0.0) or np.inf
+
+
+def _uncancelled(locus: RootLocus) -> tuple[np.ndarray, np.ndarray]:
+    """Poles without those that a zero keeps where they are, and zeros without those on a pole."""
+    poles, zeros = np.asarray(locus.poles), np.asarray(locus.zeros)
+    gaps = np.abs(poles[:, None] - zeros)
+    moving = gaps.min(axis=1, initial=np.inf) > _CANCELLED * np.abs(poles)
+    return poles[moving], zeros[gaps.min(axis=0, initial=np.inf) > _CANCELLED * np.abs(zeros)]
 
 
 def _window(loci: Mapping[str, RootLocus], top: float) -> tuple[tuple[float, float], float]:

@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 
 from flexctrl.dynamics.run import Run
 from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
-from flexctrl.structure.inputs import FollowerForce, Force
+from flexctrl.structure.inputs import FollowerForce, FollowerTorque, Force, Input, MotorTorque, Torque, WindSpeed
 from flexctrl.structure.outputs import (
     AngularVelocity,
     DriveAngle,
     DriveSpeed,
+    Output,
     Position,
     Rotation,
     SwayAngle,
@@ -34,8 +35,12 @@ _UNITS: dict[type, str] = {
     DriveSpeed: "rad/s",
     SwayAngle: "rad",
     Tension: "N",
-    FollowerForce: "N",
     Force: "N",
+    FollowerForce: "N",
+    Torque: "N m",
+    FollowerTorque: "N m",
+    MotorTorque: "N m",
+    WindSpeed: "m/s",
 }
 
 
@@ -50,7 +55,11 @@ def units(structure: Structure) -> dict[str, str]:
     -------
     dict of str to str
     """
-    return {s.name: _UNITS.get(type(s), "N m") for s in (*structure.outputs, *structure.inputs)}
+    return {signal.name: _unit(signal) for signal in (*structure.outputs, *structure.inputs)}
+
+
+def _unit(signal: Input | Output) -> str:
+    return next(unit for kind, unit in _UNITS.items() if isinstance(signal, kind))
 
 
 def run_figure(run: Run, signals: Sequence[str] | None = None) -> Figure:

@@ -27,11 +27,14 @@ LEADS = {
     ),
     "compare": (
         "The scene through time, as it is and rigid. In the table: each signal at the end and at its largest, "
-        "the root mean square of the difference, and the frequency at which the difference vibrates."
+        "the root mean square of the difference, to what it is known (both runs integrated more finely), and "
+        "the frequency at which the signal vibrates."
     ),
     "run": (
-        "Whether the run can be trusted. The energy residual is what the balance of energy misses, over the "
-        "energy turned over: well below 1e-2 is good. Rejected steps were tried again with shorter ones."
+        "Whether the numbers can be trusted. The energy residual of the run is what the balance of energy misses, "
+        "over the energy turned over: well below 1e-2 is good. Rejected steps were tried again with shorter ones. "
+        "The linear model shows how it was checked against the forces of the machine. At the end, how far the "
+        "references of the other tabs are from coarser meshes, longer steps and another integrator."
     ),
     "ladder": (
         "The same scene from rigid to refined: the largest error of an output against a certified reference, "
@@ -39,9 +42,10 @@ LEADS = {
         "reference knows no better."
     ),
     "ledger": (
-        "What the answer loses without each effect (change of outputs, poles, margins) and how long the run "
-        "then takes (time: 0.5 is twice as fast). Of pole: the pole that changes most, 100 % if it is gone or "
-        "new. Kept, in blue, is the smallest set that changes no output, pole or margin by more than is borne."
+        "What the answer loses without each effect (change of outputs and to what that is known, poles, "
+        "margins) and how long the run then takes (time: 0.5 is twice as fast). Of pole: the pole that changes "
+        "most, 100 % if it is gone or new. Kept, in blue, is the smallest set that changes no output, pole or margin "
+        "by more than is borne."
     ),
     "cost": (
         "Error of many ways to compute the scene against a certified reference, over their time (1: a fixed "

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.effects.damping import ModalDamping
 from flexctrl.effects.effect import Effect

@@ -237,7 +237,8 @@ class Scene:
         found = drawn_up.scene
         assert isinstance(found, Scene)
         way = replace(self._simulation, method=found._simulation.method)
-        return found.with_(simulation=way, notes=(*self.notes, f"automatic: {drawn_up.summary}"))
+        told = (f"automatic: {note}" for note in (drawn_up.summary, *drawn_up.notes))
+        return found.with_(simulation=way, notes=(*self.notes, *told))
 
     # -- models
 

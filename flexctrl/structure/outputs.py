@@ -217,7 +217,8 @@ class DriveSpeed:
 class SwayAngle:
     """Output: the angle of the line from ``top`` to ``load`` against straight down [rad].
 
-    atan2(horizontal offset along ``direction``, drop): positive when the load is ahead of ``top``.
+    atan2(horizontal offset along ``direction``, drop): positive when the load is ahead of ``top``. In small motion its
+    linear part.
 
     Parameters
     ----------
@@ -269,7 +270,8 @@ class Tension:
     ----------
     name : str
     line : Rope, Spring, Winch or str
-        What is under tension, or its name; a spring that is pressed has a negative one.
+        What is under tension, or its name; a spring that is pressed has a negative one, and in small motion, whose
+        forces are linear, a rope too.
 
     Raises
     ------

@@ -185,12 +185,12 @@ def _check_drives(s: Structure) -> None:
 
 
 def _held(s: Structure, drive: Drive) -> bool:
-    """Tell whether the two sides of a drive cannot move against each other along its whole axis."""
+    """Tell whether the two sides of a drive cannot move against each other along its whole axis, or a rope at all."""
     ground: Row = (0, 0, 0, 0, 0, 0)
     table, columns = s.join_table, range(drive.column, drive.column + 3)
     mine = table.rows[s.number(drive.node)]
     other = ground if drive.against is None else table.rows[s.number(drive.against)]
-    for joint in () if isinstance(s.joints, JoinTable) else s.joints:
+    for joint in () if isinstance(s.joints, JoinTable) or isinstance(drive, Winch) else s.joints:
         if isinstance(joint, Hinge if drive.column else Slide):
             sides = [tuple(table.rows[s.number(n)][c] for c in columns) for n in joint.nodes]
             if sorted(sides) == sorted(tuple(row[c] for c in columns) for row in (mine, other)):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha
-from flexctrl.dynamics.extrapolation import Richardson
+from flexctrl.dynamics.alpha.method import AdaptiveAlpha
+from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.errors import FlexctrlError
@@ -16,11 +17,11 @@ from flexctrl.model.model import Model
 from flexctrl.study.answers import outputs_apart
 from flexctrl.study.subject import Subject
 
-__all__ = ["Accuracy", "accurate"]
+__all__ = ["SHARE", "Accuracy", "Held", "accurate", "finer_plan", "refined", "worst"]
 
 _REFINEMENTS = 5
-_SHARE = 1.0 / 3.0
-"""Of the largest change that is borne: what the full run may be off by to judge changes."""
+SHARE = 1.0 / 3.0
+"""Of the largest change that is borne: what runs may be off by to judge changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +70,41 @@ class Accuracy:
         )
 
     def __str__(self) -> str:
-        known = f"known to {100.0 * self.known:.2g} %"
+        known = f"outputs known to {100.0 * self.known:.2g} %"
         if not self.refinements:
-            return f"outputs: {known}"
-        return f"outputs: of runs with {self.steps} steps, {known}; the scene's own is {100.0 * self.own:.2g} % off"
+            return f"full run: {known}"
+        return f"full run: with {self.steps} steps, {known}; the scene's own is {100.0 * self.own:.2g} % off"
 
 
-def accurate(scene: Subject, model: Model, run: Run, bearable: float) -> tuple[Accuracy, Run]:
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A run that is held against a finer one.
+
+    Attributes
+    ----------
+    run : Run
+    finer : Run or None
+        With at least twice as many steps and a tenth of the tolerance; None if it ended early.
+    plan : Simulation
+        Of the run.
+    apart : float
+        How far they are apart; infinite without the finer one.
+    own : float
+        The same of the run that was begun with.
+    refinements : int
+        How many times the run was replaced by a finer one.
+    """
+
+    run: Run
+    finer: Run | None
+    plan: Any
+    apart: float
+    own: float
+    refinements: int
+
+
+def accurate(scene: Subject, model: Model, run: Run, bearable: float) -> tuple[Accuracy, Held]:
     """Return how well a scene's run is known, and a run good enough to judge changes by: itself or a finer one.
-
-    Each is held against one with at least twice as many steps, until they agree within a third of what is borne or
-    finer runs agree no better.
 
     Parameters
     ----------
@@ -93,40 +118,82 @@ def accurate(scene: Subject, model: Model, run: Run, bearable: float) -> tuple[A
 
     Returns
     -------
-    (Accuracy, Run)
+    (Accuracy, Held)
     """
-    plan = scene.simulation
-    own = np.inf
-    best: tuple[Accuracy, Run] | None = None
+    needed = SHARE * bearable
+    held = refined(scene, model, run, lambda one, finer: worst(outputs_apart(finer, one)), lambda _: needed)
+    method, tolerance = held.plan.method, held.plan.tolerance
+    steps = held.run.report.steps
+    return Accuracy(held.own, held.apart, needed, held.refinements, method, tolerance, steps), held
+
+
+def refined(
+    scene: Subject, model: Model, run: Run, apart: Callable[[Run, Run], float], needed: Callable[[Run], float]
+) -> Held:
+    """Return a scene's run, or a finer one: until the next finer one agrees as needed, or agrees no better.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : Model
+        Its own.
+    run : Run
+        Its own.
+    apart : callable
+        (run, finer run) ↦ how far they are apart.
+    needed : callable
+        Run ↦ how near the finer one must be.
+
+    Returns
+    -------
+    Held
+    """
+    plan, own = scene.simulation, np.inf
+    best: Held | None = None
     for refinements in range(_REFINEMENTS + 1):
-        finer = _finer(plan, run)
-        gap, after = _apart(scene.with_(simulation=finer), model, run)
+        finer = finer_plan(plan, run)
+        after = _finished(scene.with_(simulation=finer), model)
+        gap = np.inf if after is None else apart(run, after)
         own = gap if best is None else own
-        if best is None or gap < best[0].known:
-            steps = run.report.steps
-            best = Accuracy(own, gap, _SHARE * bearable, refinements, plan.method, plan.tolerance, steps), run
-        if best[1] is not run or gap <= best[0].needed or after is None:
+        if best is not None and not gap < best.apart:
+            break
+        best = Held(run, after, plan, gap, own, refinements)
+        if after is None or gap <= needed(run):
             break
         plan, run = finer, after
     assert best is not None
     return best
 
 
-def _apart(finer: Subject, model: Model, run: Run) -> tuple[float, Run | None]:
-    """How far a run is from a finer one, and that one if it came to its end."""
+def _finished(scene: Subject, model: Model) -> Run | None:
+    """A scene's run, if it comes to its end."""
     try:
-        after = finer.run(model)
+        run = scene.run(model)
     except FlexctrlError:
-        return np.inf, None
-    if after.status is Status.INTERRUPTED:
+        return None
+    if run.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
-    if after.status is not Status.FINISHED:
-        return np.inf, None
-    return max(outputs_apart(after, run).values(), default=0.0), after
+    return run if run.status is Status.FINISHED else None
 
 
-def _finer(plan: Any, run: Run) -> Any:
-    """A plan with at least twice as many steps as a run took, whatever held them, and a tenth of the tolerance."""
+def worst(changes: Mapping[str, float]) -> float:
+    """Return the largest of some changes; 0 if there are none."""
+    return max(changes.values(), default=0.0)
+
+
+def finer_plan(plan: Any, run: Run) -> Any:
+    """Return a plan with at least twice as many steps as a run took, whatever held them, and a tenth of the tolerance.
+
+    Parameters
+    ----------
+    plan : Simulation
+        Of the run.
+    run : Run
+
+    Returns
+    -------
+    Simulation
+    """
     half = 0.5 * float(run.t[-1] - run.t[0]) / max(run.report.steps, 1)
     tolerance = Tolerance(0.1 * plan.tolerance.relative, 0.1 * plan.tolerance.absolute)
     return replace(plan, method=_with_steps(plan.method or AdaptiveAlpha(), half), tolerance=tolerance)

@@ -19,7 +19,7 @@ from flexctrl.study.gain_family import gain_family
 from flexctrl.study.rounding import of_outputs
 from flexctrl.study.subject import Subject
 
-__all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "outputs_apart"]
+__all__ = ["Answer", "Change", "Curves", "answer_of", "change_between", "changes_known", "outputs_apart"]
 
 _SLOW = 6  # poles that are compared, each with any of twice as many
 _SURELY, _PARTED, _LOOKS = 1e-6, 30.0, 3
@@ -69,12 +69,15 @@ class Answer:
         Gain margin (factor) and phase margin [rad] at each commanded input, the loop cut there.
     growing : complex
         The pole that grows fastest [1/s]; 0 if none does.
+    finer : Run or None
+        The same integrated more finely, which tells how well the run is known; None if there is none.
     """
 
     run: Run
     poles: np.ndarray
     margins: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     growing: complex = 0j
+    finer: Run | None = None
 
 
 @dataclass(frozen=True)
@@ -93,17 +96,25 @@ class Change:
         NaN if the first answer has none.
     pole : complex
         The pole that changes so [1/s], of the first answer if it has it; NaN without any.
+    known : mapping of str to float
+        To what the change of each output is known, over the same magnitude: how much of it the integrators made.
     """
 
     outputs: Mapping[str, float]
     poles: float
     margins: float
     pole: complex = complex("nan")
+    known: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def outputs_worst(self) -> float:
         """The largest change of an output."""
         return max(self.outputs.values(), default=0.0)
+
+    @property
+    def outputs_known(self) -> float:
+        """To what the changes of all outputs are known."""
+        return max(self.known.values(), default=0.0)
 
 
 def answer_of(scene: Subject, run: Run) -> Answer:
@@ -194,7 +205,8 @@ def change_between(first: Answer, second: Answer) -> Change:
     """
     outputs = outputs_apart(first.run, second.run)
     poles, pole = _poles_apart(first.poles, second.poles)
-    return Change(outputs, poles, _margins_apart(first.margins, second.margins), pole)
+    known = changes_known((first.run, first.finer), (second.run, second.finer))
+    return Change(outputs, poles, _margins_apart(first.margins, second.margins), pole, known)
 
 
 def outputs_apart(first: Run | Curves, second: Run | Curves) -> dict[str, float]:
@@ -215,14 +227,49 @@ def outputs_apart(first: Run | Curves, second: Run | Curves) -> dict[str, float]
     return {name: _apart(curves, second, name) for name in curves.outputs}
 
 
+def changes_known(first: tuple[Run, Run | None], second: tuple[Run, Run | None]) -> dict[str, float]:
+    """Return to what changes between two runs are known, by output: how far they are from those between finer runs.
+
+    Errors that both runs have alike take no part. Over the largest |y| of the first run, as `outputs_apart`.
+
+    Parameters
+    ----------
+    first, second : (Run, Run or None)
+        A run and a finer one of the same machine; None if there is none.
+
+    Returns
+    -------
+    dict of str to float
+        Infinite where a finer run is missing.
+    """
+    (run, finer), (other, other_finer) = first, second
+    if finer is None or other_finer is None:
+        return dict.fromkeys(run.outputs, np.inf)
+    curves = Curves.of(run)
+    there = [name for name in curves.outputs if name in other.outputs]
+    known = dict.fromkeys(curves.outputs, 0.0)
+    for name in there:
+        coarse, fine = (_at(curves, b, name) - _at(curves, a, name) for a, b in ((run, other), (finer, other_finer)))
+        known[name] = _relative(curves, name, fine - coarse)
+    return known
+
+
 def _apart(first: Curves, second: Run | Curves, name: str) -> float:
     if name not in second.outputs:
         return 1.0
+    return _relative(first, name, _at(first, second, name) - first[name])
+
+
+def _at(curves: Curves, run: Run | Curves, name: str) -> np.ndarray:
+    """An output of a run at the instants of other curves."""
+    return np.interp(curves.t, run.t, run[name])
+
+
+def _relative(first: Curves, name: str, difference: np.ndarray) -> float:
+    """The largest of a difference over the magnitude of an output; 0 if rounding may leave as much."""
     noise = float(first.noise[first.outputs.index(name)])
-    gap = float(np.abs(np.interp(first.t, second.t, second[name]) - first[name]).max())
-    if gap <= noise:
-        return 0.0
-    return gap / max(float(np.abs(first[name]).max()), noise)
+    gap = float(np.abs(difference).max())
+    return 0.0 if gap <= noise else gap / max(float(np.abs(first[name]).max()), noise)
 
 
 def _poles_apart(first: np.ndarray, second: np.ndarray) -> tuple[float, complex]:

@@ -25,15 +25,16 @@ def ledger(
 ) -> Ledger:
     """Draw up the ledger of a scene.
 
-    Every effect is left out in turn and the scene run again. The full run is held against one with shorter steps; if
-    they are apart by more than a third of what is borne, finer runs are compared (times are those of the scene's own).
-    What keeps the answer (outputs, poles of the closed
-    loop, margins) within ``tolerance`` is a candidate to go; candidates are left out together, as many as the answer
-    bears, and every other effect is tried once more on top of that, one by one. Nothing goes whose absence makes the
-    run dearer, counted or by the clock, and no way to give that saves nothing: beams that are stiffer keep their
-    freedoms. Where the equations are linear they are integrated exactly, with the fewest modes that keep the answer.
-    The minimal set is timed against the full one: where it is slower, the full one is handed out. Differences of times
-    that are less than times of one and the same run scatter by decide nothing.
+    Every effect is left out in turn and the scene run again. Every run is held against one with shorter steps; if they
+    are apart by more than a third of what is borne, and of the change, finer ones are compared (times are those of the
+    scene's own). What keeps the answer (outputs, poles of the closed loop, margins) within ``tolerance`` is a candidate
+    to go; candidates are left out together, as many as the answer bears, and every other effect is tried once more on
+    top of that, one by one. Nothing goes whose absence makes the run dearer, and what has gone comes back where the run
+    is cheaper with it: by the clock where that tells both runs clearly apart (1.5 times), else by what is counted, and
+    by the clock beyond its scatter where as much is counted. No way to give goes that saves nothing: beams that are
+    stiffer keep their freedoms. Where the equations are linear they are integrated exactly, with the fewest modes that
+    keep the answer. The minimal set is timed against the full one: where it is slower, the full one is handed out.
+    Differences of times that are less than times of one and the same run scatter by decide nothing.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ class _Auditor:
             gain = self._gain(choice.trial)
             if gain * (1.0 + self._noise) >= 1.0:
                 return choice, gain
-        return Choice([], self.full, {o.name: DEARER for o in choice.gone}), 1.0
+        return Choice([], self.full, self.full, {o.name: DEARER for o in choice.gone}), 1.0
 
     def _before(self, omission: Omission) -> list[Omission]:
         return [o for o in self.items if o.name in omission.first]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, overload
 
@@ -133,11 +133,14 @@ class Comparison:
     flexible, rigid : Run
     signals : tuple of Difference
         All outputs that both have, then the inputs.
+    known : mapping of str to float
+        To what the rms difference of each signal is known; empty if nothing tells, see `held_against`.
     """
 
     flexible: Run
     rigid: Run
     signals: tuple[Difference, ...]
+    known: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def between(cls, flexible: Run, rigid: Run) -> Comparison:
@@ -168,6 +171,28 @@ class Comparison:
         if flexible.inputs != rigid.inputs or set(names) != set(known) or not seen:
             raise StructureError("compare: the runs have different signals; give two runs of the same machine")
         return cls(flexible, rigid, tuple(_difference(flexible, rigid, name) for name in names))
+
+    def held_against(self, finer: Comparison) -> Comparison:
+        """Return this comparison, knowing how much of the differences the integrators made.
+
+        Parameters
+        ----------
+        finer : Comparison
+            Of the same machine, both runs integrated more finely.
+
+        Returns
+        -------
+        Comparison
+            Its ``known`` is the rms of what both comparisons' differences are apart by.
+        """
+        t, apart = self.flexible.t, {}
+        for name in (s.name for s in self.signals):
+            own = self.flexible[name] - np.interp(t, self.rigid.t, self.rigid[name])
+            other = np.interp(t, finer.flexible.t, finer.flexible[name]) - np.interp(
+                t, finer.rigid.t, finer.rigid[name]
+            )
+            apart[name] = numbers(t, other - own).rms
+        return replace(self, known=apart)
 
     def __getitem__(self, signal: str) -> Difference:
         _ = self.flexible[signal]  # names the signals there are
@@ -217,7 +242,7 @@ class Comparison:
         Path(path).write_text(json.dumps([asdict(s) for s in self.signals], indent=1), encoding="utf-8")
 
     def __str__(self) -> str:
-        heads = ("final", "rigid", "largest", "rigid", "rms diff", "Hz")
+        heads = ("final", "rigid", "largest", "rigid", "rms diff", *(["known to"] if self.known else []), "Hz")
         wide = max(len(s.name) for s in self.signals)
         lines = [" " * wide + "".join(f"{head:>12}" for head in heads)]
         for s in self.signals:
@@ -225,6 +250,7 @@ class Comparison:
             rounding = of_signal(s.name, [self.flexible, self.rigid])
             swings = s.frequency_hz and s.flexible.max_abs >= rounding
             cells = [f"{beyond(rounding, value):12.5g}" for value in values]
+            cells += [f"{beyond(rounding, self.known[s.name]):12.2g}"] if self.known else []
             cells.append(f"{s.frequency_hz:12.4g}" if swings else f"{'–':>12}")
             lines.append(f"{s.name:<{wide}}" + "".join(cells))
         return "\n".join(lines)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.design.controller import LinearController
-from flexctrl.dynamics.alpha import GeneralizedAlpha
+from flexctrl.dynamics.alpha.method import GeneralizedAlpha
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.errors import StructureError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from flexctrl.dynamics.exact import Exact
+from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.study.settings import spacing_of
 from flexctrl.study.subject import Subject
 

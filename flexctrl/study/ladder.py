@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
-from flexctrl.dynamics.exact import Exact
+from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import FlexctrlError, StructureError
@@ -120,14 +120,13 @@ class Ladder:
         return ladder_figure(self)
 
     def __str__(self) -> str:
-        wide, doubt = max(len(r.name) for r in self.rungs), self.reference.uncertainty
+        wide = max(len(r.name) for r in self.rungs)
         lines = [f"{'rung':<{wide}}  {'freedoms':>8}  {'steps':>7}  {'error':>9}  {'time':>8}  {'next takes':>10}"]
         for rung, gain in zip(self.rungs, (*self.gains, np.nan), strict=True):
             if rung.failure:
                 lines.append(f"{rung.name:<{wide}}  {rung.failure}")
                 continue
-            error = f"{rung.error:.2e}" if rung.error > doubt else f"< {doubt:.1e}"
-            told = f"{rung.freedoms:>8}  {rung.steps:>7}  {error:>9}  {rung.time_ratio:8.3g}"
+            told = f"{rung.freedoms:>8}  {rung.steps:>7}  {self.reference.told(rung.error):>9}  {rung.time_ratio:8.3g}"
             beyond = f"  {_times(gain):>10}" if np.isfinite(gain) else ""
             lines.append(f"{rung.name:<{wide}}  {told}{beyond}")
         lines.append(

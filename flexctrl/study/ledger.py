@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.exact import Exact
+from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.effects.automatic import Within
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.study.accuracy import Accuracy
+from flexctrl.study.accuracy import SHARE, Accuracy
 from flexctrl.study.answers import Answer, Change
 from flexctrl.study.subject import Subject
 
@@ -168,7 +168,23 @@ class Ledger:
     @property
     def notes(self) -> tuple[str, ...]:
         """What stands against the numbers."""
-        return tuple(note for note in (self.accuracy.note, self._instability) if note)
+        return tuple(note for note in (self.accuracy.note or self._doubt, self._instability) if note)
+
+    @property
+    def _doubt(self) -> str:
+        """What is known worse than it should be, if the full run is not."""
+        told = {f"without {e.name}": e.change for e in self.entries if e.change is not None}
+        told["of the minimal set"] = self.minimal_change
+        unsure = [name for name, change in told.items() if not self._sure(change)]
+        if not unsure:
+            return ""
+        return (
+            f"changes of outputs {', '.join(unsure)} are not known to a third of them, or of what is asked; give a "
+            "tighter tolerance or shorter steps"
+        )
+
+    def _sure(self, change: Change) -> bool:
+        return change.outputs_known <= SHARE * max(change.outputs_worst, self.within.outputs)
 
     @property
     def _instability(self) -> str:
@@ -202,7 +218,7 @@ class Ledger:
 
     def __str__(self) -> str:
         wide = max([len(e.name) for e in self.entries], default=6)
-        heads = ("outputs", "poles", "of pole", "margins", "time", "states", "nonzeros")
+        heads = ("outputs", "known to", "poles", "of pole", "margins", "time", "states", "nonzeros")
         lines = [f"{'without':<{wide}}" + "".join(f"  {head:>{_width(head)}}" for head in heads)]
         lines += [self._line(e, wide) for e in self.entries]
         lines.append(
@@ -235,16 +251,19 @@ class Ledger:
         """How far the minimal set's answer is from the full one's, in words."""
         change = self.minimal_change
         found = {"outputs": change.outputs_worst, "poles": change.poles, "margins": change.margins}
-        return "within: " + ", ".join(f"{name} {_percent(c)}" for name, c in found.items() if np.isfinite(c))
+        known = {"outputs": f" (known to {_known(change)})" if change.outputs_known else ""}
+        told = [f"{name} {_percent(c)}{known.get(name, '')}" for name, c in found.items() if np.isfinite(c)]
+        return f"within: {', '.join(told)}"
 
     def _line(self, e: Entry, wide: int) -> str:
         if e.change is None or e.size is None:
             return f"{e.name:<{wide}}  {'kept' if e.keep else 'gone with others'}: {e.failure}"
         outputs, poles, margins = (_percent(c) for c in (e.change.outputs_worst, e.change.poles, e.change.margins))
+        known = _known(e.change)
         pole = f"{e.change.pole:.2g}" if e.change.poles > 0.0 else "–"
         time = f"{1.0 / e.cost_ratio:.2f}" if self.told_apart(e) else _SAME
         cells = [f"{c:>10}" for c in (margins, time, e.size.states, e.size.nonzeros)]
-        places = [f"{outputs:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}"]
+        places = [f"{outputs:>10}", f"{known:>10}", f"{poles:>10}", f"{pole:>{_width('of pole')}}"]
         line = "  ".join([f"{e.name:<{wide}}", *places, *cells])
         before = f"  (both without {', '.join(e.first)})" if e.first else ""
         keep = f"  keep{f' ({e.stays})' if e.stays else ''}" if e.keep else ""
@@ -255,5 +274,9 @@ def _percent(value: float) -> str:
     return "–" if not np.isfinite(value) else f"{100.0 * value:.3g} %"  # at most 10 characters, of 1.23e-05 %
 
 
+def _known(change: Change) -> str:
+    return _percent(change.outputs_known) if np.isfinite(change.outputs_known) else "unknown"
+
+
 def _width(head: str) -> int:
-    return 14 if head == "of pole" else 10
+    return 17 if head == "of pole" else 10

@@ -265,8 +265,8 @@ class _Path:
     @classmethod
     def of_states(cls, A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, dt: float | None) -> _Path:
         if len(A):
-            A, (scale, perm) = matrix_balance(A, separate=True)
-            B, C = B[perm] / scale[perm, None], C[:, perm] * scale[perm]
+            A, (scale, _) = matrix_balance(A, permute=False, separate=True)
+            B, C = B / scale[:, None], C * scale
         return cls(A, B, C, D, _rational(A, B, C, D), lambda: deflated_zeros(A, B, C, D), float(dt or 0.0))
 
     @classmethod

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg as la
 from scipy.interpolate import CubicSpline
 
-from flexctrl.dynamics.alpha import GeneralizedAlpha
+from flexctrl.dynamics.alpha.method import GeneralizedAlpha
 from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.dynamics.steps import Integrator

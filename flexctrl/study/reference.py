@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import NamedTuple
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.errors import FlexctrlError
@@ -50,6 +50,20 @@ class Reference:
     def uncertainty(self) -> float:
         """The largest of the disagreements."""
         return max(self.agreement.values(), default=0.0)
+
+    def told(self, error: float) -> str:
+        """Return an error against it in words: of one below what it is known to, that it is.
+
+        Parameters
+        ----------
+        error : float
+
+        Returns
+        -------
+        str
+            At most nine characters.
+        """
+        return f"{error:.2e}" if error > self.uncertainty else f"< {self.uncertainty:.1e}"
 
 
 class Traced(NamedTuple):

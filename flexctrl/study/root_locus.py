@@ -279,7 +279,7 @@ def _gain_range(loop: Loop) -> np.ndarray:
     turned = (CriticalGain(p.margin, p.omega, True) for p in (*phase_crossings(loop, omega, values), *_at_zero(loop)))
     last = [c.gain for c in turned if _is_crossing(loop, c)]
     most = max(10.0 / np.quantile(size, 0.25), 2.0 * max([1.0, *last]))
-    return np.geomspace(least, min(most, DECADES * least), START)
+    return np.geomspace(max(least, most / DECADES), most, START)
 
 
 def _followed(poles_at: Callable[[float], np.ndarray], gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

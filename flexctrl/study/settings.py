@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
-from flexctrl.dynamics.alpha import AdaptiveAlpha, GeneralizedAlpha
-from flexctrl.dynamics.exact import Exact
-from flexctrl.dynamics.extrapolation import Richardson
+from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
+from flexctrl.dynamics.linear_motion.exact import Exact
+from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.effects.component_modes import ComponentModes

@@ -22,12 +22,15 @@ class Choice:
     ----------
     gone : list of Omission
     trial : Trial
+    cheapest : Trial
+        Of all that were gone over to: small steps up may not add up.
     stays : dict of str to str
         Why an effect stays that the answer could do without.
     """
 
     gone: list[Omission]
     trial: Trial
+    cheapest: Trial
     stays: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -41,7 +44,9 @@ def smallest(bench: Bench, items: Sequence[Omission], exact: bool) -> Choice:
 
     From the full scene, or the one that is linear if that is quicker, what keeps the answer alone is left out
     together, first what there is less to compute without: all of it, or halves of it where it does more together. Then
-    everything that is left is tried once more, one by one, until none can go: one may undo what another does.
+    everything that is left is tried once more, one by one, until none can go: one may undo what another does. At last
+    everything that is gone is put back, one by one, where the run is cheaper with it, until nothing more changes: what
+    went with others may cost more than they save.
 
     Parameters
     ----------
@@ -60,6 +65,7 @@ def smallest(bench: Bench, items: Sequence[Omission], exact: bool) -> Choice:
 class _Search:
     def __init__(self, bench: Bench, items: Sequence[Omission], exact: bool) -> None:
         self.bench, self.items, self.exact = bench, items, exact
+        self.undone: set[frozenset[str]] = set()
 
     def found(self) -> Choice:
         choice = self._start()
@@ -68,21 +74,24 @@ class _Search:
         can_go = [o for o in order if alone[o.name] <= 1.0 and o.spares]
         self._extend(choice, [o for o in can_go if self._saves(o)])
         self._extend(choice, can_go)
-        while sum(self._goes(choice, o) for o in order):
-            pass  # one may go now that another has
-        return choice
+        while True:
+            while sum(self._goes(choice, o) for o in order):
+                pass  # one may go now that another has
+            if not sum(self._comes_back(choice, o) for o in tuple(choice.gone)):
+                return choice
 
     def _start(self) -> Choice:
         """The full scene, or the one with the fewest left out that is linear, whichever is quicker."""
-        found = Choice([], self.bench.holding([], self.exact) or self.bench.full)
+        full = self.bench.holding([], self.exact) or self.bench.full
+        found = Choice([], full, full)
         if not self.exact or found.trial.modes is not None:
             return found
         for gone in [self._bundle(o, ()) for o in self.items]:
             if not self.bench.linear(gone):
                 continue
             trial = self.bench.holding(gone, self.exact)
-            if trial is not None and not self.bench.dearer(trial, found.trial):
-                found = Choice(gone, trial)
+            if trial is not None and not self.bench.cheaper(found.trial, trial):
+                found = Choice(gone, trial, trial)
         return found
 
     def _excess(self, omission: Omission) -> float:
@@ -114,7 +123,7 @@ class _Search:
 
     def _goes(self, choice: Choice, omission: Omission) -> bool:
         """Leave out one more, if it can go and is worth it; note why not, if it can."""
-        if omission.name in choice.names:
+        if omission.name in choice.names or not omission.is_in(choice.trial.scene):
             return False
         gone = self._bundle(omission, choice.gone)
         trial = self.bench.holding(gone, self.exact)
@@ -132,12 +141,33 @@ class _Search:
     def _taken(self, choice: Choice, gone: list[Omission]) -> bool:
         """Go over to a larger set of what is left out, if it holds and is not dearer."""
         trial = self.bench.holding(gone, self.exact)
-        if trial is None or self.bench.dearer(trial, choice.trial):
+        if trial is None or frozenset(o.name for o in gone) in self.undone:
             return False
-        choice.gone, choice.trial = gone, trial
+        if self.bench.cheaper(choice.cheapest, trial):
+            return False
+        self._go_over(choice, gone, trial)
         for name in choice.names:
             choice.stays.pop(name, None)
         return True
+
+    def _comes_back(self, choice: Choice, omission: Omission) -> bool:
+        """Put back what has gone, and what cannot go before it, if the run is cheaper with it."""
+        gone = [o for o in choice.gone if o is not omission and omission.name not in o.first]
+        if omission.name not in choice.names or not omission.is_in(self.bench.scene(gone)):
+            return False
+        trial = self.bench.holding(gone, self.exact)
+        if trial is None or not self.bench.cheaper(trial, choice.trial):
+            return False
+        before = choice.names
+        self.undone.add(before)
+        self._go_over(choice, gone, trial)
+        choice.stays |= dict.fromkeys(before - choice.names, DEARER)
+        return True
+
+    def _go_over(self, choice: Choice, gone: list[Omission], trial: Trial) -> None:
+        choice.gone, choice.trial = gone, trial
+        if self.bench.cheaper(trial, choice.cheapest):
+            choice.cheapest = trial
 
 
 def _cheaper(trial: Trial, other: Trial) -> bool:

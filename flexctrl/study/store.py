@@ -146,6 +146,11 @@ class Store:
         """Write down that settings of nearly the same time were timed in turn."""
         self._write(("apart", repr(reference)), {"settings": [repr(s) for s in settings]})
 
+    @property
+    def kept(self) -> int:
+        """How many lines of the file are of the scene and count."""
+        return 0 if self.path is None else len(self.lines)
+
     def _write(self, key: tuple[str, ...], content: dict[str, Any]) -> None:
         line = {"scene": self.scene, "key": list(key)} | content
         self.lines[key] = line

@@ -9,13 +9,13 @@ from time import thread_time
 
 import numpy as np
 
-from flexctrl.dynamics.exact import Exact
+from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.effects.automatic import Within
 from flexctrl.errors import FlexctrlError
 from flexctrl.model.model import Model
-from flexctrl.study.accuracy import accurate
-from flexctrl.study.answers import Answer, answer_of, change_between, outputs_apart
+from flexctrl.study.accuracy import SHARE, accurate, refined, worst
+from flexctrl.study.answers import Answer, answer_of, change_between, changes_known, outputs_apart
 from flexctrl.study.exactly import exactly, fewer_modes
 from flexctrl.study.ledger import Size
 from flexctrl.study.omissions import Omission
@@ -23,8 +23,9 @@ from flexctrl.study.subject import Subject
 
 __all__ = ["LONG", "Bench", "Refused", "Trial"]
 
-_DEARER, _SLOWER = 1.05, 1.15
-_ROUNDS, _CLEARLY = 3, 2.0
+_COUNTED, _SLOWER, _CLEARLY = 1.05, 1.15, 1.5
+"""By what factor runs must be apart: by what is counted, by the clock, and by the clock against the count."""
+_ROUNDS, _SURELY = 3, 2.0
 _SHORT = 0.05
 _REPEATS = 4
 LONG = 5.0
@@ -45,6 +46,8 @@ class Trial:
     model : Model
     judged : Run
         What is compared: the run, or a finer one of the same scene.
+    finer : Run or None
+        What that is held against: how well it is known; None if nothing tells.
     whole : Trial or None
         The same machine with all its modes; it has the same poles and margins.
     rounds : list of float
@@ -56,6 +59,7 @@ class Trial:
     times: list[float]
     model: Model = field(repr=False)
     judged: Run
+    finer: Run | None = None
     whole: Trial | None = None
     rounds: list[float] = field(default_factory=list)
 
@@ -63,8 +67,8 @@ class Trial:
     def answer(self) -> Answer:
         """Curves, poles and margins."""
         if self.whole is not None:
-            return replace(self.whole.answer, run=self.judged)
-        return answer_of(self.scene, self.judged)
+            return replace(self.whole.answer, run=self.judged, finer=self.finer)
+        return replace(answer_of(self.scene, self.judged), finer=self.finer)
 
     @cached_property
     def size(self) -> Size:
@@ -92,11 +96,15 @@ class Trial:
         """How far apart its times are, each the shortest of runs one after the other: the longest over the shortest."""
         return max(self.rounds) / min(self.rounds) - 1.0 if len(self.rounds) > 1 else _ONCE
 
-    def again(self) -> None:
-        """Run once more, unless that takes long: the first run may have compiled; short runs several times."""
+    def again(self) -> float:
+        """Run once more, unless that takes long, and return the time [s]: the shortest of several of a short run.
+
+        The first run may have compiled.
+        """
         if self.times[0] >= LONG:
-            return
+            return self.time
         self.rounds.append(min(self.once() for _ in range(_REPEATS if self.time < _SHORT else 1)))
+        return self.rounds[-1]
 
     def once(self) -> float:
         """Run once more and return the time [s]."""
@@ -127,17 +135,25 @@ class Bench:
     def __init__(self, scene: Subject, within: Within, tick: Callable[[], None]) -> None:
         self.within, self.tick = within, tick
         own = _ran(scene, scene.model)
-        self.accuracy, judged = accurate(scene, own.model, own.run, within.outputs)
-        self.full = replace(own, judged=judged)
+        self.accuracy, held = accurate(scene, own.model, own.run, within.outputs)
+        self.full = replace(own, judged=held.run, finer=held.finer)
         self.plain: dict[frozenset[str], Trial | Refused] = {frozenset(): self.full}
         self.quick: dict[tuple[frozenset[str], bool], Trial | None] = {}
+        self.paces: dict[tuple[int, int], float] = {}
+
+    def scene(self, gone: Sequence[Omission]) -> Subject:
+        """Return the scene without some effects."""
+        scene = self.full.scene
+        for omission in gone:
+            scene = omission.without(scene)
+        return scene
 
     def without(self, gone: Sequence[Omission]) -> Trial | Refused:
         """Return a run of the scene, by its own method, without some effects, or why there is none."""
         names = frozenset(o.name for o in gone)
         if names not in self.plain:
             try:
-                self.plain[names] = self._tried(self._scene(gone))
+                self.plain[names] = self._tried(self.scene(gone))
             except FlexctrlError as error:
                 self.plain[names] = Refused(str(error).splitlines()[0])
             self.tick()
@@ -164,8 +180,12 @@ class Bench:
         return isinstance(trial, Trial) and exactly(trial.scene) is not trial.scene
 
     def excess(self, trial: Trial) -> float:
-        """Return the largest change over what is borne; infinite at once if outputs alone are beyond it."""
-        outputs = max(outputs_apart(self.full.judged, trial.judged).values(), default=0.0)
+        """Return the largest change over what is borne; infinite at once if outputs alone may be beyond it.
+
+        What a change is known to is added where it is more than a third of what is borne.
+        """
+        outputs, known = self._change(trial.judged), self._known(trial.judged, trial.finer)
+        outputs += known if known > SHARE * self.within.outputs else 0.0
         if outputs > self.within.outputs:
             return np.inf
         change = change_between(self.full.answer, trial.answer)
@@ -173,38 +193,44 @@ class Bench:
         asked = (changes[f.name] / getattr(self.within, f.name) for f in fields(self.within))
         return max((float(e) for e in asked if not np.isnan(e)), default=0.0)
 
-    def dearer(self, trial: Trial, best: Trial) -> bool:
-        """Tell whether a run takes longer than another, by what is counted and by the clock.
+    def cheaper(self, trial: Trial, other: Trial) -> bool:
+        """Tell whether a run costs less than another.
 
-        Exact integration costs by its modes. Else the clock tells what is not counted, such as a controller that is
-        asked by Python; both are run in turn until it is clear. What is within the scatter of their times is no
-        difference.
+        Exact integration costs by its modes. Else the clock decides where it tells both clearly apart: what is not
+        compiled, such as a controller that is asked by Python, is not counted. Less clearly, what is counted decides,
+        and where that is as much, the clock, beyond the scatter of their times.
         """
-        if trial.modes is not None and best.modes is not None:
-            return trial.modes > best.modes
-        if trial.modes is None and best.modes is None and trial.size.work > _DEARER * best.size.work:
-            return True
-        for _ in range(_ROUNDS):
-            best.again()
-            trial.again()
-            if trial.time <= max(_SLOWER, 1.0 + best.scatter, 1.0 + trial.scatter) * best.time:
-                return False
-            if trial.time > _CLEARLY * best.time:
-                return True
-        return True
+        if trial.modes is not None and other.modes is not None:
+            return trial.modes < other.modes
+        pace, noise = self._pace(trial, other), max(_SLOWER, 1.0 + trial.scatter, 1.0 + other.scatter)
+        if max(pace, 1.0 / pace) > max(_CLEARLY, noise):
+            return pace > 1.0
+        exact = trial.modes is not None or other.modes is not None
+        saves = 1.0 if exact else other.size.work / max(trial.size.work, 1.0)
+        return saves > 1.0 if max(saves, 1.0 / saves) > _COUNTED else pace > noise
 
-    def _scene(self, gone: Sequence[Omission]) -> Subject:
-        scene = self.full.scene
-        for omission in gone:
-            scene = omission.without(scene)
-        return scene
+    def _pace(self, trial: Trial, other: Trial) -> float:
+        """How many times as fast as another a run is, both run in turn until that is clear; once for each two."""
+        if (id(other), id(trial)) in self.paces:
+            return 1.0 / self.paces[id(other), id(trial)]
+        key = id(trial), id(other)
+        if key not in self.paces:
+            rounds: list[tuple[float, float]] = []
+            while len(rounds) < _ROUNDS:
+                rounds.append((other.again(), trial.again()))
+                slow, fast = (min(times) for times in zip(*rounds, strict=True))
+                apart = max(slow / fast, fast / slow)
+                if apart <= _SLOWER or apart > _SURELY:
+                    break
+            self.paces[key] = slow / fast
+        return self.paces[key]
 
     def _plain(self, gone: Sequence[Omission]) -> Trial | None:
         found = self.without(gone)
         return found if isinstance(found, Trial) and self.excess(found) <= 1.0 else None
 
     def _exact(self, gone: Sequence[Omission]) -> Trial | None:
-        scene = self._scene(gone)
+        scene = self.scene(gone)
         exact = exactly(scene)
         if exact is scene:
             return self._plain(gone)
@@ -213,17 +239,33 @@ class Bench:
             return None
         for fewer in fewer_modes(exact):
             run, taken = timed(fewer, fewer.model)  # of its own, whose equilibrium is found once
-            trial = Trial(fewer, run, [taken], fewer.model, run, whole)
+            trial = Trial(fewer, run, [taken], fewer.model, run, run, whole)
             if run.status is Status.FINISHED and self.excess(trial) <= 1.0:
                 return trial
         return whole
 
     def _tried(self, scene: Subject) -> Trial:
-        """A scene's own run, and one as fine as the full one is judged by if it is integrated alike."""
+        """A scene's own run, and one that its change is known by: as fine as the full one, or finer where it must be.
+
+        What is as accurate on the full scene need not be without some effect: it may hold the steps. A change is to be
+        known to a third of itself, or of what is borne.
+        """
         found = _ran(scene, scene.model)
-        if not self.accuracy.refinements or scene.simulation != self.full.scene.simulation:
-            return found
-        return replace(found, judged=_ran(self.accuracy.of(scene), found.model).run)
+        if scene.simulation != self.full.scene.simulation:  # integrated exactly
+            return replace(found, finer=found.run)
+        alike = self.accuracy.of(scene)
+        begun = _ran(alike, found.model).run if self.accuracy.refinements else found.run
+        held = refined(
+            alike, found.model, begun, self._known, lambda run: SHARE * max(self.within.outputs, self._change(run))
+        )
+        return replace(found, judged=held.run, finer=held.finer)
+
+    def _change(self, run: Run) -> float:
+        return worst(outputs_apart(self.full.judged, run))
+
+    def _known(self, run: Run, finer: Run | None) -> float:
+        """To what the change of a run from the full one is known."""
+        return worst(changes_known((self.full.judged, self.full.finer), (run, finer)))
 
 
 def _ran(scene: Subject, model: Model) -> Trial:

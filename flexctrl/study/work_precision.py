@@ -50,6 +50,8 @@ class WorkPrecision:
         False if it was stopped before all settings were tried.
     notes : tuple of str
         What could not be kept or checked, and why.
+    kept : int
+        How many lines of the store are of this scene.
     """
 
     name: str
@@ -60,14 +62,18 @@ class WorkPrecision:
     held_out: dict[str, tuple[float, ...]] = field(default_factory=dict)
     complete: bool = True
     notes: tuple[str, ...] = ()
+    kept: int = 0
 
     @cached_property
     def pareto(self) -> tuple[Point, ...]:
-        """Points that no other beats in both error and time, the quickest first."""
-        best, front = np.inf, []
+        """Points that no other beats in both error and time, the quickest first.
+
+        Errors below what the reference is known to are as good as each other.
+        """
+        best, front, doubt = np.inf, [], self.reference.uncertainty if self.reference else 0.0
         for point in sorted(filter(timed, self.points), key=lambda p: (p.time_ratio, p.error)):
-            if point.error < best:
-                best = point.error
+            if max(point.error, doubt) < best:
+                best = max(point.error, doubt)
                 front.append(point)
         return tuple(front)
 
@@ -83,13 +89,10 @@ class WorkPrecision:
         return work_precision_figure(self)
 
     def __str__(self) -> str:
-        front = set(map(id, self.pareto))
-        wide = max(len(str(p.setting)) for p in self.points) if self.points else 7
+        rows = [*map(self._row, sorted(self._ran, key=lambda p: (not timed(p), p.time_ratio))), *self._refused]
+        wide = max((len(name) for name, _ in rows), default=7)
         lines = [f"{'setting':<{wide}}  {'error':>9}  {'time':>8}  front"]
-        for p in sorted(self.points, key=lambda p: (not timed(p), p.time_ratio)):
-            time = f"{p.time_ratio:8.3g}" if timed(p) else "       –"
-            told = f"{p.error:9.2e}  {time}  {'*' if id(p) in front else ''}"
-            lines.append(f"{p.setting!s:<{wide}}  {told if not p.failure else p.failure}".rstrip())
+        lines += [f"{name:<{wide}}  {told}".rstrip() for name, told in rows]
         if self.reference is not None:
             agreed = ", ".join(f"{name} {value:.1e}" for name, value in self.reference.agreement.items())
             lines.append(f"reference: {self.reference.setting}; apart from {agreed}")
@@ -100,6 +103,31 @@ class WorkPrecision:
         return "\n".join([*lines, *self._passed_over, self._verdict, *self.notes])
 
     @property
+    def _ran(self) -> list[Point]:
+        return [p for p in self.points if not p.failure]
+
+    def _row(self, p: Point) -> tuple[str, str]:
+        """A setting that ran, and what was found of it."""
+        time = f"{p.time_ratio:8.3g}" if timed(p) else "       –"
+        star = "*" if any(p is one for one in self.pareto) else ""
+        return str(p.setting), f"{self._told(p.error):>9}  {time}  {star}"
+
+    def _told(self, error: float) -> str:
+        return f"{error:.2e}" if self.reference is None else self.reference.told(error)
+
+    @property
+    def _refused(self) -> list[tuple[str, str]]:
+        """Settings that could not be run, those of one fidelity for one reason together, and the reason."""
+        alike: dict[tuple[str, str], list[str]] = {}
+        for p in self.points:
+            if p.failure:
+                alike.setdefault((p.setting.fidelity.value, p.failure), []).append(str(p.setting))
+        return [
+            (names[0] if len(names) == 1 else f"{fidelity}: {len(names)} settings", why)
+            for (fidelity, why), names in alike.items()
+        ]
+
+    @property
     def _verdict(self) -> str:
         if self.chosen is None:
             if not self.complete:
@@ -107,8 +135,10 @@ class WorkPrecision:
             return f"no setting that was tried is within {self.tolerance:g}"
         held = self.held_out.get(str(self.chosen.setting), ())
         none = "" if self.notes else "; there are no loads to hold out"
-        others = f"; {max(held):.2e} at most under held-out loads" if held else none
-        return f"cheapest within {self.tolerance:g}: {self.chosen.setting}, error {self.chosen.error:.2e}{others}"
+        others = f"; {self._told(max(held))} at most under held-out loads" if held else none
+        return (
+            f"cheapest within {self.tolerance:g}: {self.chosen.setting}, error {self._told(self.chosen.error)}{others}"
+        )
 
     @property
     def _passed_over(self) -> list[str]:
@@ -231,7 +261,7 @@ class _Study:
             pass
         points = () if reference is None else tuple(self._points(reference))
         found = self.scene.name, self.tolerance, points, reference, chosen, held_out
-        return WorkPrecision(*found, complete, self.notes)
+        return WorkPrecision(*found, complete, self.notes, self.store.kept)
 
     def _traced(self, setting: Setting) -> Traced:
         """A run of the reference, unless it is known."""

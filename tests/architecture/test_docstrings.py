@@ -12,7 +12,7 @@ import pytest
 
 import flexctrl
 from flexctrl.design.controller import Controller
-from flexctrl.dynamics.record import Record
+from flexctrl.dynamics.records.record import Record
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.kernels.kernel import Backend
 from flexctrl.linear.reduction.selection import Selection

@@ -3,7 +3,7 @@
     python tests/benchmarks/race.py [crane chains loop cold] [--quick] [--page]
 
 Needs the extras ``[fast]`` and ``[bench]``. Times are CPU seconds of this process, the least of several runs, the two
-codes in turns; what is told are ratios. With ``--page`` the run makes ``docs/benchmarks/dynamics.md`` and its plot.
+codes in turns; what is told are ratios. With ``--page`` the run makes ``docs/benchmarks.md`` and its plot.
 """
 
 from __future__ import annotations
@@ -342,7 +342,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("races", nargs="*", choices=[*RACES, []], help="default: all")
     parser.add_argument("--quick", action="store_true", help="fewer settings and steps")
-    parser.add_argument("--page", action="store_true", help="write docs/benchmarks/dynamics.md and its plot")
+    parser.add_argument("--page", action="store_true", help="write docs/benchmarks.md and its plot")
     asked = parser.parse_args()
     found = {name: RACES[name](asked.quick) for name in asked.races or RACES}
     if asked.page:

@@ -1,4 +1,4 @@
-"""The page of a race: docs/benchmarks/dynamics.md and its plot, made of what `race` found."""
+"""The page of a race: docs/benchmarks.md and its plot, made of what `race` found."""
 
 from __future__ import annotations
 
@@ -9,9 +9,20 @@ from typing import Any
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 _HEAD = """\
-# Dynamics against Exudyn
+# Benchmarks
 
 <!-- Made by `python tests/benchmarks/race.py --page` -->
+
+Against another code in one run with it, as ratios: seconds belong to a machine, ratios much less so. This page is
+dynamics against [Exudyn](https://github.com/jgerstmayr/EXUDYN), a multibody code in C++. Each page is made by a script
+in `tests/benchmarks/`; the others are:
+
+```{toctree}
+:maxdepth: 1
+benchmarks/linear
+benchmarks/ladder
+benchmarks/effects
+```
 
 In every comparison both codes take turns in one run, on one thread; the least CPU time of several tries counts. Ratios
 are told; where there are seconds, they are those of a host with other work to do. Sections may be of runs of their own.
@@ -31,7 +42,7 @@ member, 5 µs; these two are {gap:.1e} m apart), over meshes, steps and methods 
 |---|---|---|---|---|
 {rows}
 
-```{{image}} ../_static/race_2.png
+```{{image}} _static/race_2.png
 :alt: Error of x1 - x4 against CPU time for all settings tried, both codes
 :width: 70%
 ```
@@ -82,7 +93,7 @@ def write(found: dict[str, Any]) -> None:
     parts = [_HEAD, versions()]
     makers = {"crane": crane, "chains": chains, "loop": loop, "cold": cold}
     parts += [makers[name](result) for name, result in found.items()]
-    page = DOCS / "benchmarks" / "dynamics.md"
+    page = DOCS / "benchmarks.md"
     page.parent.mkdir(exist_ok=True)
     page.write_text("\n".join(parts), encoding="utf-8")
     if "crane" in found:

@@ -6,7 +6,7 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.design import Step, Tracking, pd
-from flexctrl.dynamics import alpha
+from flexctrl.dynamics.alpha import method as alpha
 
 
 def slack() -> dict:

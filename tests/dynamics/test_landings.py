@@ -8,8 +8,8 @@ from test_corners_and_switches import bouncing
 from test_march_first_order import Rocking, slewing
 
 import flexctrl as fc
+from flexctrl.dynamics.events.roots import nearly
 from flexctrl.dynamics.march.stepper import MarchingStepper
-from flexctrl.dynamics.roots import nearly
 
 pytest.importorskip("llvmlite")
 

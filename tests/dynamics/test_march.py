@@ -12,8 +12,8 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.cranes.ceiling_crane import MEMBER
-from flexctrl.dynamics.alpha_point import Coefficients
-from flexctrl.dynamics.alpha_steps import Stepper
+from flexctrl.dynamics.alpha.point import Coefficients
+from flexctrl.dynamics.alpha.steps import Stepper
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.march.loops import run as tasks
 from flexctrl.dynamics.march.making import Method
@@ -42,7 +42,7 @@ def both(model: fc.Model, monkeypatch: pytest.MonkeyPatch, **how) -> tuple[fc.dy
     """A run by compiled marches, and one by plain steps."""
     marched = fc.simulate(model, **how)
     with monkeypatch.context() as patch:
-        patch.setattr("flexctrl.dynamics.alpha._quickest", lambda plain: plain)
+        patch.setattr("flexctrl.dynamics.alpha.method._quickest", lambda plain: plain)
         return marched, fc.simulate(model, **how)
 
 

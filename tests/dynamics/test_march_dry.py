@@ -28,7 +28,7 @@ def both(model: fc.Model, monkeypatch: pytest.MonkeyPatch, *controller, **how) -
         patch.setattr(MarchingStepper, "step", lambda *given: taken.append(None) or step(*given))
         marched = fc.simulate(model, *controller, **how)
     with monkeypatch.context() as patch:
-        patch.setattr("flexctrl.dynamics.alpha._quickest", lambda plain: plain)
+        patch.setattr("flexctrl.dynamics.alpha.method._quickest", lambda plain: plain)
         return marched, fc.simulate(model, *controller, **how), len(taken)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.alpha_steps import Stepper
+from flexctrl.dynamics.alpha.steps import Stepper
 from flexctrl.model.flat.flattening import can_be_flat
 from flexctrl.structure.refine import refine
 

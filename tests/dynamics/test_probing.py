@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.alpha_point import Coefficients
+from flexctrl.dynamics.alpha.point import Coefficients
 from flexctrl.dynamics.march.making import Method
 from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.probing import probe

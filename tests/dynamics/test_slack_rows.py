@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.stiff_lines import _frequencies, _lines, _pulls
+from flexctrl.dynamics.swift.stiff_lines import _frequencies, _lines, _pulls
 from flexctrl.model.laws import kinks
 from flexctrl.model.model import Model
 

@@ -45,3 +45,24 @@ def test_what_nothing_holds_is_told_so_and_many_turns_are_none():
     rates[model.coordinate("ball_0_rz")] = 1e7
     around = fc.simulate(model, until=1.0, start=model.rest.with_(v=rates), method=fc.GeneralizedAlpha(0.1, 1.0))
     assert not any("as if nothing holds it" in note for note in around.report.notes)
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_chosen_steps_end_where_a_loop_has_thrown_the_machine_away(sampled):
+    """x'' = 1.2e3 x: chosen steps would be ever shorter; what was computed up to there is right, and kept."""
+    spring = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=100.0)
+    mass = fc.PointMass("mass", spring.end, 1.0)
+    structure = fc.Structure(
+        [spring, mass],
+        [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")],
+        inputs=[fc.Force("force", mass.node, "x")],
+        outputs=[fc.Position("x", mass.node, "x"), fc.Velocity("rate", mass.node, "x")],
+    )
+    law = pd(kp=-1300.0, kd=0.0, measured="x", rate="rate", command="force")
+    law = fc.Sampled(law, 1e-4) if sampled else law
+    run = fc.simulate(fc.assemble(structure, [fc.LargeRotation()]), law, until=3.0, inputs={"force": 1.0}, every=0.05)
+    assert run.status is fc.Status.FAILED
+    assert "the loop is not stable" in run.report.message
+    assert run.t[-1] < 2.9
+    grown = run["x"][8] - 1.0, run["x"][6] - 1.0
+    assert grown[0] / grown[1] == pytest.approx(np.exp(0.1 * np.sqrt(1200.0)), rel=0.01)

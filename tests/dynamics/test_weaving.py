@@ -104,7 +104,7 @@ def test_rows_between_samples(pace, law, every, monkeypatch):
     """Rows at samples, and in between, with the inputs in force there; none of them is found by itself."""
     how = {"controller": LAWS[law](), "until": 0.05, "method": PACES[pace], "every": every}
     with monkeypatch.context() as patch:
-        patch.setattr("flexctrl.dynamics.dense.Hermite.at", None)
+        patch.setattr("flexctrl.dynamics.records.dense.Hermite.at", None)
         a = fc.simulate(crane(), **how)
     assert np.allclose(a.t[:-1], every * np.arange(len(a.t) - 1), rtol=1e-12, atol=1e-15)
     with monkeypatch.context() as patch:

@@ -431,7 +431,7 @@ def test_dry_friction_needs_large_rotation_and_mass():
 def test_compiled_friction_is_the_same(monkeypatch):
     """Kernel by kernel: under steps of the same tolerance."""
     pytest.importorskip("llvmlite", reason="the compiled path needs the extra [fast]")
-    monkeypatch.setattr("flexctrl.dynamics.alpha._quickest", lambda plain: plain)
+    monkeypatch.setattr("flexctrl.dynamics.alpha.method._quickest", lambda plain: plain)
     law = fc.LuGre(1e3, kinetic=3.0, static=5.0, stribeck=1e-2, damping=20.0, viscous=0.3)
     effects = [LARGE, fc.LuGreFriction({"arm": law}), fc.CoulombFriction({"motor": fc.Coulomb(0.1, 0.2, 0.5)})]
     runs = []

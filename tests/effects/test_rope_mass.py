@@ -187,3 +187,25 @@ def test_a_rope_drawn_stretched_says_that_it_keeps_the_distance_drawn():
     assert "rope rope is drawn over 1 m, stretched from 0.9 m: without RopeStretch it keeps" in model.notes[0]
     assert fc.linearize(model).modes().omega == pytest.approx(np.sqrt(9.81) * np.ones(2), rel=1e-9)
     assert not fc.assemble(structure, [LARGE, fc.Gravity(), fc.RopeStretch()], fc.CasadiVM()).notes
+
+
+BENDING = (
+    fc.BeamFlexibility(["beam"]),
+    fc.ComponentModes(1, ["beam"]),
+    fc.ComponentModes(2, ["beam"], along=1),
+)
+
+
+@pytest.mark.parametrize("bending", BENDING)
+def test_what_is_named_beside_a_rope_with_mass_is_what_it_is_without_names(bending):
+    """Cutting ropes renames ropes alone, and leaves how many modes beams have."""
+    section = fc.Section(EA=2e6, EI_y=4e3, EI_z=3e3, GJ=2e3, rhoA=4.0, rhoJ=0.05)
+    beam = fc.Beam("beam", (0, 0, 0), (2, 0, 0), section, 2)
+    rope = fc.Rope("rope", (2, 0, 0), (2, 0, -L), EA=1e6, rhoA=RHO, elements=3)
+    structure = fc.Structure([beam, rope], [fc.Support(beam.start), fc.Pin(beam.end, rope.start)])
+    beside = [LARGE, fc.Gravity(), HEAVY, fc.RopeStretch(["rope"])]
+    named, all_of_them = (fc.assemble(structure, [*beside, effect]) for effect in (bending, replace(bending, of=())))
+    assert named.coordinates == all_of_them.coordinates
+    for ours, theirs in ((named.mass(), all_of_them.mass()), (named.stiffness(), all_of_them.stiffness())):
+        assert (ours != theirs).nnz == 0
+    assert [e.of for e in named.effects if isinstance(e, fc.RopeStretch)] == [("rope0", "rope1", "rope2")]

@@ -225,3 +225,55 @@ def test_how_stiff_its_rope_is_does_not_count_in_the_search():
         assert rest.state.x[1] == pytest.approx((0.0, 0.0, -stretched), abs=1e-9)
         iterations.append(rest.iterations)
     assert max(iterations) <= min(iterations) + 2
+
+
+def guided(along: tuple[float, float, float], welded: bool) -> fc.Structure:
+    """A car on the guide of a mast, drawn by a rope from its head, askew to the guide."""
+    mast = fc.RigidBody("mast", (0, 0, 0), 1.0, (1, 1, 1), {"guide": (0, 0, 0), "head": (1.0, 0, 2.0)})
+    boom = fc.RigidBody("boom", (1.0, 0, 2.0), 1.0, (1, 1, 1), {"sheave": (1.0, 0, 2.0)})
+    car = fc.RigidBody("car", (0, 0, 0), 10.0, (1, 1, 1))
+    sheave = boom.point("sheave") if welded else mast.point("head")
+    winch = fc.Winch("winch", car.node, sheave, EA=1e5, radius=0.1, inertia=0.05)
+    joints = [fc.Support(mast.node), fc.Slide(mast.point("guide"), car.node, along)]
+    joints += [fc.Weld(mast.point("head"), boom.node)] if welded else []
+    outputs = [fc.Position("place", car.node, along), fc.DriveAngle("angle", winch)]
+    parts = [mast, boom, car] if welded else [mast, car]
+    return fc.Structure(parts, joints, [winch], [fc.MotorTorque("torque", winch)], outputs)
+
+
+def drawn_along(along: tuple[float, float, float], stretches: bool, torque: float, until: float) -> float:
+    """m s̈ = −m g a_z − T ∂d/∂s; J θ̈ = M + r (T + T²/2EA), or J θ̈ = M + r T where r θ = d − d₀."""
+    a, head = np.array(along), np.array([1.0, 0.0, 2.0])
+    EA, r, J, m = 1e5, 0.1, 0.05, 10.0
+    first = np.linalg.norm(head)
+
+    def slope(t: float, y: np.ndarray) -> list[float]:
+        s, v, angle, spin = y
+        arm = a * s - head
+        d = np.linalg.norm(arm)
+        onto = arm @ a / d
+        if stretches:
+            pull = max(EA * (d / (first + r * angle) - 1.0), 0.0)
+            return [v, -G * a[2] - pull * onto / m, spin, (torque + r * (pull + pull**2 / (2 * EA))) / J]
+        bend = (1.0 - onto**2) / d  # d² d / ds²
+        change = (-m * G * a[2] + (torque / r - J / r**2 * bend * v**2) * onto) / (m + J / r**2 * onto**2)
+        return [v, change, spin, (onto * change + bend * v**2) / r]
+
+    return float(solve_ivp(slope, (0.0, until), np.zeros(4), method="DOP853", rtol=1e-11, atol=1e-13).y[0, -1])
+
+
+@pytest.mark.parametrize("welded", [False, True])
+@pytest.mark.parametrize("along", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 0.6, 0.8)])
+@pytest.mark.parametrize("stretches", [False, True])
+def test_a_rope_draws_a_car_askew_to_its_guide(along, welded, stretches):
+    machine = guided(along, welded)
+    model = elastic(machine) if stretches else rigid(machine)
+    run = fc.simulate(model, until=0.5, inputs={"torque": -12.0}, method=EXPLICIT, tolerance=TIGHT)
+    assert run["place"][-1] == pytest.approx(drawn_along(along, stretches, -12.0, 0.5), rel=1e-5)
+
+
+def test_a_rope_between_what_cannot_move_is_refused():
+    post, hook = (fc.RigidBody(name, (0, 0, z), 1.0, (1, 1, 1)) for name, z in (("post", 2.0), ("hook", 0.0)))
+    winch = fc.Winch("winch", hook.node, post.node, EA=1e5, radius=0.1)
+    with pytest.raises(StructureError, match="its joint holds the displacement"):
+        fc.Structure([post, hook], [fc.Support(post.node), fc.Support(hook.node, "w rx ry")], [winch])

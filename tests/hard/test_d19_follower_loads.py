@@ -1,16 +1,19 @@
 """D19: loads that turn with the machine: an unsymmetric stiffness, flutter and not divergence.
 
-Beck's column has its numbers in tests/validation/test_a13_columns.py.
+Beck's column: a cantilever under a thrust that stays tangent to its end has no other equilibrium near; its first two
+frequencies meet at P L²/EI = 20.0509, and beyond they are a complex pair, one of which grows.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from recorder import Absolute
 
 import flexctrl as fc
 from flexctrl.errors import LinearizationError, StructureError
 
+PAGE = "hard"
 SECTION = fc.Section(EA=1e6, EI_y=1.0, EI_z=1.0, GJ=1.0, rhoA=1.0, rhoJ=1e-3)
 NONLINEAR = (fc.Flexible(), fc.LargeRotation())
 
@@ -27,10 +30,49 @@ def column(load: type, direction: str = "-x", elements: int = 10) -> fc.Model:
     return fc.assemble(structure, NONLINEAR)
 
 
-def poles(load: float) -> np.ndarray:
-    model = column(fc.FollowerForce)
+def poles(load: float, elements: int = 10) -> np.ndarray:
+    model = column(fc.FollowerForce, elements=elements)
     found = fc.linearize(model, fc.equilibrium(model, inputs={"thrust": load})).damped_poles()
     return found[found.imag > 0][:2]
+
+
+def test_becks_column(record):
+    def apart(load: float) -> float:
+        found = poles(load, 20)
+        return float(abs(found[1].imag - found[0].imag))
+
+    low, high = 20.0, 20.2
+    for _ in range(12):
+        low, high = (low, 0.5 * (low + high)) if apart(0.5 * (low + high)) < 1e-6 else (0.5 * (low + high), high)
+    record(
+        "D19 Beck's column, 20 elements: load at which the frequencies meet",
+        ours=0.5 * (low + high),
+        reference=20.0509,
+        source="closed form (Beck 1952)",
+        tolerance=1e-3,
+    )
+    record(
+        "D19 Beck's column at P = 20: two real frequencies",
+        ours=np.sort(poles(20.0, 20).imag),
+        reference=[10.5289, 11.5106],
+        source="closed form",
+        tolerance=1e-3,
+    )
+    record(
+        "D19 Beck's column at P = 20.2: frequencies of the pair apart",
+        ours=apart(20.2),
+        reference=0.0,
+        source="a complex pair",
+        tolerance=Absolute(1e-6),
+    )
+    record(
+        "D19 Beck's column at P = 20.2: sum of the pair's growth rates; one grows, one decays",
+        ours=float(poles(20.2, 20).real.sum()),
+        reference=0.0,
+        source="nothing dissipates",
+        tolerance=Absolute(1e-6),
+    )
+    assert poles(20.2, 20).real.max() > 0.1
 
 
 @pytest.mark.parametrize(("load", "flutters"), [(2.0, False), (10.0, False), (19.5, False), (20.3, True), (24.0, True)])

@@ -16,7 +16,7 @@ import pytest
 from random_structures import HERE, Case, turned_frame, whole
 
 import flexctrl as fc
-from flexctrl.dynamics.linear_plant import LinearPlant
+from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.errors import LinearizationError
 from flexctrl.model.flows import flowing
 

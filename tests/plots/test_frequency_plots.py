@@ -15,7 +15,7 @@ from flexctrl.linear.reduction import ModalTruncation
 from flexctrl.plots.frequency import plot_bode
 from flexctrl.plots.loops import mark_margins, plot_nichols, plot_nyquist, plot_sensitivities
 from flexctrl.plots.reduction import plot_reduction
-from flexctrl.plots.root_locus import plot_root_locus
+from flexctrl.plots.root_locus import close_up, draw_root_locus, plot_root_locus
 from flexctrl.study.frequency import loop_grid, margins
 from flexctrl.study.loop import open_loop
 from flexctrl.study.root_locus import root_locus
@@ -101,6 +101,42 @@ def test_root_locus_draws_every_branch_and_the_critical_gain(machine):
     labels = {text.get_text() for text in ax.texts}
     shown = [c for c in critical if c.unstable_above and c.omega <= ax.get_ylim()[1]]
     assert labels == {f"k = {c.gain:.3g}" for c in shown}
+
+
+def slow_and_fast(fast: float, unit: float = 1.0) -> dict:
+    """An integrator and a swing at about 1 rad/s beside a vibration at a multiple of that, in some unit of time."""
+
+    def pair(omega, zeta):
+        return [1.0, 2.0 * zeta * omega * unit, (omega * unit) ** 2]
+
+    plant = ct.tf(pair(0.8, 0.05), pair(1.0, 0.05)) * ct.tf(pair(0.8 * fast, 0.05), pair(fast, 0.05))
+    plant = plant * ct.tf([0.5 * unit, 0.3 * unit**2], [1.0, 0.0, 0.0])
+    return {"loop": root_locus(open_loop(plant), np.geomspace(1e-3, 30.0, 100))}
+
+
+@pytest.mark.parametrize("fast", [50.0, 300.0, 2000.0])
+def test_slow_poles_beside_fast_ones_are_drawn_large_enough_to_be_told_apart(fast):
+    """In one of the views the swing is well inside, and farther from the origin than a tenth of its height."""
+    figure = plt.figure(figsize=(9.0, 6.5))
+    draw_root_locus(figure, slow_and_fast(fast), "loop")
+    whole, near = figure.axes
+    assert whole.get_ylim()[1] > fast
+    assert 0.1 < 1.0 / near.get_ylim()[1] < 0.95
+    left, right = near.get_xlim()
+    assert left < -0.05 < 0.0 < right
+    assert whole.patches[0].get_bbox().bounds[2:] == pytest.approx((right - left, 2.0 * near.get_ylim()[1]))
+
+
+def test_what_is_about_as_fast_is_drawn_once():
+    figure = plt.figure(figsize=(9.0, 6.5))
+    draw_root_locus(figure, slow_and_fast(2.0), "loop")
+    assert len(figure.axes) == 1
+    assert close_up(slow_and_fast(2.0)) is None
+
+
+@pytest.mark.parametrize("unit", [1e-3, 60.0])
+def test_the_view_does_not_depend_on_the_unit_of_time(unit):
+    assert close_up(slow_and_fast(300.0, unit)) == pytest.approx(unit * close_up(slow_and_fast(300.0)), rel=1e-3)
 
 
 def test_nichols_passes_the_critical_point_at_the_margins(machine):

@@ -12,6 +12,11 @@ from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed, 
 from flexctrl.plots.modes import mode_label, mode_pose, modes_figure
 from flexctrl.plots.pose import pose_of
 from flexctrl.plots.run import comparison_curves, panels, run_curves, units
+from flexctrl.structure.drives import Drive
+from flexctrl.structure.elements import Part
+from flexctrl.structure.inputs import Input
+from flexctrl.structure.joints import InPlane, Joint
+from flexctrl.structure.outputs import Output
 from flexctrl.study.compare import Comparison
 
 EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation())
@@ -25,6 +30,94 @@ def test_nodes_at_one_place_share_their_numbers():
     ax = draw_machine(add_machine_axes(Figure(), ceiling_crane()), ceiling_crane())
     assert written(ax) == {"1", "2", "3", "4, 8", "5", "6", "7", "9, 10", "11, 12", "13"}
     assert [t.get_text() for t in ax.get_legend().get_texts()] == ["support", "pin"]
+
+
+def kinds(union) -> set[type]:
+    """Of a union of types, with all that are derived from them."""
+    found = set(union.__args__) if hasattr(union, "__args__") else {union}
+    return found | {kind for one in found for sub in one.__subclasses__() for kind in kinds(sub)}
+
+
+BOX = fc.Section.box(fc.STEEL, width=0.1, height=0.1, web=0.004, flange=0.004)
+POST, BAR = fc.Beam("post", (0, 0, 0), (0, 0, 1), BOX), fc.Beam("bar", (0, 0, 1), (1, 0, 1), BOX)
+JOINTS = {
+    "support": fc.Support(POST.start),
+    "": InPlane(POST.start, "v rx rz"),
+    "weld": fc.Weld(POST.end, BAR.start),
+    "pin": fc.Pin(POST.end, BAR.start),
+    "hinge": fc.Hinge(POST.end, BAR.start, "y"),
+    "slide": fc.Slide(POST.end, BAR.start, "x"),
+}
+
+
+def test_every_kind_of_joint_is_drawn():
+    """By its own symbol; what holds a machine in the plane of the picture by none."""
+    assert {type(joint) for joint in JOINTS.values()} == kinds(Joint)
+    for label, joint in JOINTS.items():
+        machine = fc.Structure([POST, BAR] if len(joint.nodes) == 2 else [POST], [joint])
+        legend = draw_machine(add_machine_axes(Figure(), machine), machine).get_legend()
+        assert [t.get_text() for t in legend.get_texts()] == [label] if label else legend is None
+
+
+def test_every_kind_of_part_and_drive_is_drawn():
+    """Each adds lines or marks of its own to the picture."""
+    load, body = fc.PointMass("load", BAR.end, 5.0), fc.RigidBody("body", BAR.end, 2.0, (0.1, 0.1, 0.1))
+    rope, spring = fc.Rope("rope", BAR.end, (1, 0, 0), EA=1e5), fc.Spring("spring", BAR.end, (1, 0, 0), 1e3)
+    trolley = fc.Trolley("trolley", BAR, at=0.5, mass=5.0)
+    motor = fc.RotaryDrive("motor", BAR.start, axis="y", stiffness=50.0, ratio=2.0, inertia=1.0)
+    travel = fc.LinearDrive("travel", BAR.start, direction="x", radius=0.1, ratio=2.0, stiffness=50.0, inertia=1.0)
+    winch = fc.Winch("winch", BAR.end, BAR.start, EA=1e5, radius=0.1, ratio=2.0, inertia=0.02)
+    parts, drives = (BAR, load, body, rope, spring, trolley), (motor, travel, winch)
+    assert {type(part) for part in parts} == kinds(Part)
+    assert {type(drive) for drive in drives} == kinds(Drive)
+
+    def drawn(*parts, drives=()):
+        joints = [fc.Pin(BAR.end, part.nodes[0]) for part in parts if part is not trolley]
+        machine = fc.Structure([BAR, *parts], joints, drives)
+        axes = draw_machine(Figure().add_subplot(), machine, numbers=False, symbols=bool(drives))
+        return len(axes.lines)
+
+    assert all(drawn(part) > drawn() > 0 for part in parts[1:])
+    assert all(drawn(drives=[drive]) > drawn() for drive in drives)
+
+
+@pytest.mark.parametrize(("normal", "plane"), [("y", (0, 2)), ("z", (0, 1))])
+def test_a_planar_machine_is_drawn_in_its_plane(normal, plane):
+    """A straight beam lies in many planes; it moves in one."""
+    bar = fc.Beam("bar", (0, 0, 0), (1, 0, 0), BOX)
+    machine = fc.planar(fc.Structure([bar], [fc.Support(bar.start)]), normal)
+    ax = draw_machine(add_machine_axes(Figure(), machine), machine)
+    assert best_plane(machine) == plane
+    assert (ax.get_xlabel(), ax.get_ylabel()) == tuple(f"{'xyz'[i]} (m)" for i in plane)
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == ["support"]
+
+
+def test_every_kind_of_signal_is_drawn_with_its_unit():
+    motor = fc.RotaryDrive("motor", BAR.start, axis="y", stiffness=50.0, ratio=2.0, inertia=1.0)
+    rope = fc.Rope("rope", BAR.end, (1, 0, 0), EA=1e5)
+    end = BAR.end
+    outputs = {
+        fc.Position("x", end, "x"): "m",
+        fc.Velocity("v", end, "x"): "m/s",
+        fc.Rotation("turn", end, "x"): "rad",
+        fc.AngularVelocity("rate", end, "x"): "rad/s",
+        fc.DriveAngle("angle", "motor"): "rad",
+        fc.DriveSpeed("speed", "motor"): "rad/s",
+        fc.SwayAngle("sway", end, rope.end, "x"): "rad",
+        fc.Tension("pull", "rope"): "N",
+    }
+    inputs = {
+        fc.Force("push", end, "x"): "N",
+        fc.FollowerForce("thrust", end, "x"): "N",
+        fc.Torque("moment", end, "x"): "N m",
+        fc.FollowerTorque("twist", end, "x"): "N m",
+        fc.MotorTorque("torque", "motor"): "N m",
+        fc.WindSpeed("gust", "x"): "m/s",
+    }
+    both = outputs | inputs
+    assert {type(signal) for signal in both} == kinds(Output) | kinds(Input)
+    machine = fc.Structure([BAR, rope], [fc.Pin(end, rope.start)], [motor], inputs=inputs, outputs=outputs)
+    assert units(machine) == {signal.name: unit for signal, unit in both.items()}
 
 
 def test_drives_are_named():

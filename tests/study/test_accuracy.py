@@ -1,13 +1,20 @@
 """A ledger judges changes by runs that are accurate enough, and says how well they are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_omissions import cart
+from units import OTHERS, SI, Units
 
 import flexctrl as fc
+from flexctrl.design import MinimumJerk, pd
 from flexctrl.study.accuracy import accurate
 from flexctrl.study.answers import outputs_apart
+from flexctrl.study.omissions import omissions
 
+_FURTHER = 1.3
+"""Runs a tenth of whose tolerance leaves a fifth of their errors are off by 5/4 of how far they are from these."""
 OMEGA = 2.0 * np.pi * 5.0
 
 
@@ -79,9 +86,79 @@ def test_steps_that_samples_hold_are_shortened():
     ]
     run, same = (scene.run() for scene in scenes)
     assert outputs_apart(run, same) == dict.fromkeys(run.outputs, 0.0)
-    found, judged = accurate(scenes[0], scenes[0].model, run, 1.0)
-    assert judged is run
+    found, held = accurate(scenes[0], scenes[0].model, run, 1.0)
+    assert held.run is run
     assert 1e-4 < found.own < 1.0 / 3.0
+
+
+def servo(units: Units = SI, tolerance: fc.Tolerance | None = None) -> fc.Scene:
+    """A cart on an elastic drive, sent to 30 rad of its motor by a servo that samples: sampling holds the steps."""
+    u = units
+    torque, inertia = u.force * u.length, u.mass * u.length**2
+    cart = fc.PointMass("cart", (0, 0, 0), 20.0 * u.mass)
+    rope = fc.Rope("rope", cart.node, (0, 0, -2 * u.length), EA=1e4 * u.force)
+    load = fc.PointMass("load", rope.end, 10.0 * u.mass)
+    shaft = {"ratio": 10.0, "stiffness": 50.0 * torque, "inertia": 1e-2 * inertia, "damping": 0.02 * torque * u.time}
+    drive = fc.LinearDrive("travel", cart.node, direction="x", radius=0.1 * u.length, **shaft)
+    structure = fc.Structure(
+        [cart, rope, load],
+        [fc.Support(cart.node, "v w"), fc.Support(load.node, "v"), *map(fc.Pin, rope.nodes, (cart.node, load.node))],
+        [drive],
+        [fc.MotorTorque("torque", drive)],
+        [fc.DriveAngle("angle", drive), fc.DriveSpeed("speed", drive), fc.SwayAngle("sway", cart.node, load.node, "x")],
+    )
+    law = pd(0.2 * torque, 0.1 * torque * u.time, measured="angle", rate="speed", command="torque")
+    law = fc.Sampled(fc.Tracking(law, {"angle": MinimumJerk(30.0, 1.5 * u.time)}), 0.01 * u.time)
+    plan = fc.Simulation(3.0 * u.time, tolerance=tolerance or fc.Tolerance(), every=0.02 * u.time)
+    effects = [u.gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(beta=1e-3 * u.time)]
+    return fc.Scene(structure, effects, law, simulation=plan)
+
+
+@pytest.fixture(scope="module")
+def drawn_up():
+    return fc.ledger(servo(), 0.01)
+
+
+def test_changes_are_known_to_what_is_said(drawn_up):
+    """Of each effect and of the minimal set: against runs at a ten-thousandth of the tolerance."""
+    exact = fc.Tolerance(1e-8, 1e-11)
+    scene = servo(tolerance=exact)
+    scene = scene.with_(controller=scene.law)
+    without = {o.name: o.without(scene).run() for o in omissions(scene)}
+    full = scene.run()
+    for entry in drawn_up.entries:
+        truth = max(outputs_apart(full, without[entry.name]).values())
+        assert abs(entry.change.outputs_worst - truth) <= _FURTHER * entry.change.outputs_known + 1e-6
+        assert entry.change.outputs_known <= max(entry.change.outputs_worst, 0.01) / 3.0
+
+
+@pytest.mark.parametrize("absolute", [1e-9, 1e-3])
+def test_a_ledger_does_not_hang_on_the_tolerance(drawn_up, absolute):
+    found = fc.ledger(servo(tolerance=fc.Tolerance(1e-4, absolute)), 0.01)
+    assert found.minimal_set == drawn_up.minimal_set
+    for one, other in zip(found.entries, drawn_up.entries, strict=True):
+        known = one.change.outputs_known + other.change.outputs_known
+        assert one.change.outputs_worst == pytest.approx(other.change.outputs_worst, abs=_FURTHER * known + 1e-9)
+
+
+@pytest.mark.parametrize("units", OTHERS)
+def test_a_ledger_does_not_hang_on_units(drawn_up, units):
+    found = fc.ledger(servo(OTHERS[units]), 0.01)
+    assert found.minimal_set == drawn_up.minimal_set
+    assert found.accuracy.known == pytest.approx(drawn_up.accuracy.known, rel=1e-3)
+    for one, other in zip(found.entries, drawn_up.entries, strict=True):
+        assert one.change.outputs_worst == pytest.approx(other.change.outputs_worst, rel=1e-3, abs=1e-8)
+        assert one.change.poles == pytest.approx(other.change.poles, rel=1e-3, abs=1e-6)
+
+
+def test_what_a_run_without_an_effect_is_off_by_is_said(drawn_up):
+    """Where no finer run comes to its end nothing is known of a change, and the words say so."""
+    entry = drawn_up["sampled"]
+    unsure = replace(entry, change=replace(entry.change, known=dict.fromkeys(entry.change.known, np.inf)))
+    told = replace(drawn_up, entries=(unsure,))
+    assert "unknown" in str(told).splitlines()[1]
+    assert any("without sampled" in note for note in told.notes)
+    assert not drawn_up.notes
 
 
 def test_what_cannot_be_judged_is_said():

@@ -47,6 +47,19 @@ def bouncing() -> fc.Structure:
 EFFECTS = (fc.Gravity(), fc.Flexible(), fc.LargeRotation())
 
 
+def test_a_difference_is_known_by_finer_runs():
+    """A load that bounces about its sink, against one that does not: z = −(g/ω²)(1 − cos ωt) is their difference."""
+    model = fc.assemble(bouncing(), EFFECTS)
+    coarse, finer = (compare(model, until=0.6, method=fc.GeneralizedAlpha(h, 1.0), every=1e-2) for h in (5e-3, 2.5e-3))
+    held = coarse.held_against(finer)
+    omega = np.sqrt(4e4 / 2.0 / 5.0)
+    truth = -9.81 / omega**2 * (1.0 - np.cos(omega * coarse.flexible.t))
+    error = numbers(coarse.flexible.t, coarse.flexible["height"] + 2.0 - truth).rms
+    assert held.known["height"] == pytest.approx(0.75 * error, rel=0.1)  # second order: a quarter is left
+    assert "known to" in str(held)
+    assert "known to" not in str(coarse)
+
+
 def test_a_dropped_load_bounces_by_twice_its_static_sink():
     model = fc.assemble(bouncing(), EFFECTS)
     told = []

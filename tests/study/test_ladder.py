@@ -213,3 +213,18 @@ def test_under_a_continuous_law_the_linear_rung_is_run_as_the_scene_is(scene):
     law = control.ss([], [], [], [[-50.0]], inputs=["travel"], outputs=["push"])
     smooth = scene.with_(controller=law)
     assert dict(rungs(smooth))["linear"].method == scene.simulation.method
+
+
+def test_a_scene_whose_ropes_have_mass_has_component_modes_too():
+    """Four elements of the girder become one with modes on either side of the rope, whose pieces stay."""
+    section = fc.Section(EA=2e8, EI_y=4e5, EI_z=3e5, GJ=2e5, rhoA=4.0, rhoJ=0.05)
+    beam = fc.Beam("girder", (0, 0, 0), (8, 0, 0), section, 8)
+    rope = fc.Rope("rope", beam.node(4), (4, 0, -5), EA=1e6, rhoA=2.0, elements=3)
+    joints = [fc.Support(beam.start), fc.Support(beam.end), fc.Pin(beam.node(4), rope.start)]
+    structure = fc.Structure([beam, rope], joints, outputs=[fc.Position("z", beam.node(4), "z")])
+    effects = (fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RopeMass())
+    scene = fc.Scene(structure, effects, simulation=fc.Simulation(0.1, fc.GeneralizedAlpha(1e-3)))
+    own = dict(rungs(scene))["component modes"].of(scene).model
+    amplitudes = [name for name in own.coordinates if "_y" in name or "_z" in name]
+    assert len(own.coordinates) - len(amplitudes) == 6 + 3 * 3
+    assert len(amplitudes) == 2 * 2 * next(e.count for e in own.effects if isinstance(e, fc.ComponentModes))

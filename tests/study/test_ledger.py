@@ -2,9 +2,11 @@
 
 import tomllib
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scenes import TROLLEY
 
 import flexctrl as fc
@@ -330,8 +332,36 @@ def test_its_words_and_picture(drawn_up):
     assert drawn_up.noise > 0.0
     assert "≈ 1 " in str(replace(drawn_up, noise=1e9)).splitlines()[1]
     assert "≈ 1 " not in str(replace(drawn_up, noise=0.0)).splitlines()[1]
-    figure = drawn_up.plot()
-    assert len(figure.axes) == 2
+
+
+@pytest.mark.parametrize("ratios", [[0.9, 1.0, 1.1], [0.02, 1.0, 40.0], [1e-4, 1.0, 1e4], [0.3, 1.0, 2.6]])
+def test_nothing_overlaps_in_its_picture(drawn_up, ratios):
+    """Labels of both axes and their numbers, whatever was measured; none is cut off."""
+    times = np.resize(ratios, len(drawn_up.entries)).tolist()
+    timed = [replace(e, cost_ratio=ratio) for e, ratio in zip(drawn_up.entries, times, strict=True)]
+    figure = replace(drawn_up, entries=tuple(timed)).plot()
+    FigureCanvasAgg(figure).draw()
+    shown = [label for ax in figure.axes for label in _labels(ax)]
+    boxes = [label.get_window_extent() for label in shown]
+    assert len(shown) >= 2 + 3 + 3 + len(timed)
+    for box in boxes:
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1
+    assert not [(a, b) for a, b in combinations(boxes, 2) if a.overlaps(b)]
+
+
+def _labels(ax):
+    low, high = sorted(ax.get_xlim())
+    numbers = [t for t, x in zip(ax.get_xticklabels(), ax.get_xticks(), strict=True) if low <= x <= high]
+    minor = [t for t in ax.get_xticklabels(minor=True) if low <= t.get_position()[0] <= high]
+    names = [t for t in ax.get_yticklabels() if t.get_visible()]
+    return [t for t in (ax.xaxis.label, *numbers, *minor, *names) if t.get_text()]
+
+
+def test_what_changes_nothing_has_no_bar(drawn_up):
+    bars = [patch for patch in drawn_up.plot().axes[0].patches if patch.get_height() == pytest.approx(0.66)]
+    for entry, bar in zip(drawn_up.entries, bars, strict=True):
+        assert bar.get_width() + 1e-7 == pytest.approx(max(entry.change.outputs_worst, 1e-7))
 
 
 def test_wrong_questions_are_answered(scene, drawn_up):

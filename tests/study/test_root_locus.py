@@ -186,6 +186,7 @@ LOOPS = [  # by scipy: what python-control makes of a transfer function depends 
     open_loop(ct.ss(*tf2ss([1.0], [1, 3, 3, 1])), ct.tf([1, 0.1], [0.01, 1])),
     open_loop(ct.ss(*tf2ss([1.0], [1, 0.02, 1, 0])), ct.tf([1, 0.1], [0.01, 1])),
     open_loop(ct.ss(*tf2ss([25.0], [1, 0.1, 16, 0, 0])), ct.tf([1, 0.1], [0.01, 1])),
+    open_loop(ct.ss(*tf2ss([1.0, 3.0], np.poly([-1e-5, 1e-5, -100, -200]) / 2e4))),  # nearly at rest: L grows to 3e10
     open_loop(chain(4, beta=0.02), ct.tf([5, 1], [1e-4, 0.02, 1]), "force", "x1"),
     open_loop(chain(3, beta=0.02), ct.sample_system(ct.tf([5, 1], [0.05, 1]), 0.1, "tustin"), "force", "x1"),
     open_loop(ct.sample_system(ct.ss(ct.tf([1.0], [1, 0.02, 1])), 0.1), ct.tf([2, -1.8], [1, 0.2], 0.1)),

@@ -15,6 +15,7 @@ from flexctrl.scene.reading import Place
 from flexctrl.study import tryouts
 from flexctrl.study.answers import Curves
 from flexctrl.study.held_out import load_cases
+from flexctrl.study.ladder import Ladder, Rung
 from flexctrl.study.reference import Traced, certified, trace
 from flexctrl.study.settings import Fidelity, around, sweep
 from flexctrl.study.store import Point, Store, fingerprint
@@ -91,9 +92,42 @@ def test_what_was_stopped_has_a_picture_and_words(stopped, study, tmp_path):
 
 
 def test_no_point_of_the_front_is_beaten(study):
+    known = {p.setting: max(p.error, study.reference.uncertainty) for p in study.points}
     for a in study.pareto:
-        assert not any(b.error <= a.error and b.time_ratio < a.time_ratio for b in study.points)
-    assert min(p.error for p in study.points) in [p.error for p in study.pareto]
+        assert not any(known[b.setting] <= known[a.setting] and b.time_ratio < a.time_ratio for b in study.points)
+    assert min(known.values()) in [known[p.setting] for p in study.pareto]
+
+
+@pytest.mark.parametrize("doubt", [1e-5, 3e-4, 2e-3, 1.0])
+def test_errors_that_the_reference_does_not_know_are_as_good_as_each_other(study, doubt):
+    """A slower setting is on the front only if it is nearer by what is known; in words it is below that, as a rung."""
+    errors = [1e-2, 1e-3, 1.6e-6, 4e-7]
+    points = tuple(Point(replace(study.points[0].setting, mesh=k), e, float(k), 9) for k, e in enumerate(errors, 1))
+    reference = replace(study.reference, agreement={"longer steps": doubt})
+    found = replace(study, points=points, reference=reference, chosen=points[2], held_out={}, tolerance=0.02)
+    unknown = [p for p in points if p.error <= doubt]
+    assert list(found.pareto) == [p for p in points if p.error > doubt] + unknown[:1]
+    rows = str(found).splitlines()[1:5]
+    assert [row.endswith("*") for row in rows] == [p in found.pareto for p in points]
+    assert [f"< {doubt:.1e}" in row for row in rows] == [p in unknown for p in points]
+    ladder = Ladder("same", (Rung("full", points[2].setting, 1.6e-6, 1.0, 4, 9),), reference)
+    said = reference.told(1.6e-6)
+    assert f"  {said}  " in str(ladder)
+    assert f", error {said}" in str(found).splitlines()[-1]
+
+
+def test_settings_that_are_refused_for_one_reason_are_one_row(study):
+    """Thirty of a fidelity that friction forbids, one that is not: two rows, and what ran as before."""
+    base = study.points[0].setting
+    why = "a law of force that switches is not linear"
+    linear = [replace(base, fidelity=Fidelity.LINEAR, mesh=k) for k in range(1, 31)]
+    refused = tuple(Point(setting, np.inf, np.inf, 0, why) for setting in linear)
+    alone = Point(replace(base, fidelity=Fidelity.COMPONENT_MODES), np.inf, np.inf, 0, why)
+    lines = str(replace(study, points=(*refused, *study.points, alone))).splitlines()
+    rows = [line.split(why)[0].rstrip() for line in lines if why in line]
+    assert rows == ["linear: 30 settings", str(alone.setting)]
+    ran = str(study).splitlines()[1 : 1 + len(study.points)]
+    assert [row.split() for row in lines[1 : 1 + len(ran)]] == [row.split() for row in ran]
 
 
 def test_a_study_goes_on_where_it_was_stopped(scene, tmp_path, monkeypatch):
@@ -254,6 +288,8 @@ def test_stopped_in_its_reference_a_study_keeps_the_runs_that_are_over(tmp_path,
         for _ in range(2)
     )
     assert not stopped.complete
+    assert stopped.kept == 2
+    assert whole.kept > 2
     assert stopped.reference is None
     assert stopped.points == stopped.pareto == ()
     assert "stopped before" in str(stopped)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.design.answers import Answering
-from flexctrl.dynamics.alpha_point import AlphaPoint
+from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.answering import recite
@@ -18,7 +18,7 @@ from flexctrl.dynamics.march.making import CAPACITY, Method
 from flexctrl.dynamics.march.marching import Marcher, Pacing, can_march
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper
-from flexctrl.dynamics.settling import weightless
+from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
 from flexctrl.model.model import Model

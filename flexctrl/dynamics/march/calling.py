@@ -45,7 +45,7 @@ class Remembered:
     Attributes
     ----------
     tangent, mass : numpy.ndarray
-        The workspace when they were made; empty if they have not been.
+        What they are made again from, or they themselves; see `_written`. Empty if they have not been made.
     made_for : float
         Step of the tangent [s].
     numbers : tuple of float
@@ -133,8 +133,8 @@ class Loops:
         """Return what another march needs to go on with the same bits."""
         m, kept = self.march, self._kept
         if (m.factorisations, m.weighings) != kept[0]:
-            tangent = m.tangent.place.copy() if m.made_for > 0.0 else np.zeros(0)
-            mass = m.mass.place.copy() if m.mass_for == 1.0 else np.zeros(0)
+            tangent = _written(m.tangent, self._whole) if m.made_for > 0.0 else np.zeros(0)
+            mass = _written(m.mass, self._whole) if m.mass_for == 1.0 else np.zeros(0)
             self._kept = kept = ((m.factorisations, m.weighings), tangent, mass)
         return Remembered(kept[1], kept[2], m.made_for, tuple(getattr(m, name) for name in _HABITS))
 
@@ -142,19 +142,44 @@ class Loops:
         """Go on as the march whose memory this is."""
         m, f = self.march, self.flattened.flat
         made = m.factorisations
-        for place, mass in ((memory.tangent, False), (memory.mass, True)):
-            if place.size:
-                f.z[:], m.h = place, memory.made_for
+        for kept, factors, mass in ((memory.tangent, m.tangent, False), (memory.mass, m.mass, True)):
+            if kept.size and not self._whole:
+                f.z[:], m.h = kept[: f.z.size], memory.made_for
                 self._make(mass)
+            if kept.size:
+                _read(factors, kept, self._whole)
         m.factorisations, m.made_for = made, memory.made_for
-        if not memory.mass.size:
-            m.mass_for = 0.0
+        m.mass_for = 1.0 if memory.mass.size else 0.0
         self._kept = (made, m.weighings), memory.tangent, memory.mass
         for name, number in zip(_HABITS, memory.numbers, strict=True):
             setattr(m, name, number)
+
+    @property
+    def _whole(self) -> bool:
+        """Whether matrices hang on more than the workspace: motions tried out, or loads; they are kept themselves."""
+        m = self.march
+        return bool(m.probes.groups > 0 or m.asking or m.fronts.beyond > 0)
 
     def _make(self, mass: bool) -> None:
         if self.march.asking:
             self._made((0.0, 0.0, 1.0) if mass else self._seeds, WEIGH if mass else REFACTOR)
         else:
             self._do(WEIGHED if mass else REMADE)
+
+
+def _parts(factors: Packed, whole: bool) -> list[np.ndarray]:
+    """What is remembered of a factorised matrix."""
+    f = factors
+    return [f.place, f.angles, *([f.down, f.up, f.diagonal, f.made] if whole else [])]
+
+
+def _written(factors: Packed, whole: bool) -> np.ndarray:
+    """Return the workspace of a factorised matrix and the turns when it was made, and itself where that is kept."""
+    return np.concatenate(_parts(factors, whole))
+
+
+def _read(factors: Packed, kept: np.ndarray, whole: bool) -> None:
+    """Put back what was written."""
+    parts = _parts(factors, whole)
+    for part, old in zip(parts, np.split(kept, np.cumsum([p.size for p in parts])[:-1]), strict=True):
+        part[:] = old

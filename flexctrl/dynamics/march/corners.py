@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.dynamics.nearing import Bracket
-from flexctrl.dynamics.settling import weightless
+from flexctrl.dynamics.events.nearing import Bracket
+from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.flattened import Flattened

@@ -15,7 +15,6 @@ from flexctrl.model.gauges import show
 __all__ = ["back", "glide", "land", "leap", "level"]
 
 _ALIKE = 1e-9
-_STRAIGHT = 1e-9
 _NOTHING = 1e-150
 """Below this a modal state is zero: processors are slow with the smallest numbers there are."""
 
@@ -51,35 +50,9 @@ def glide(m: March) -> int:
     m.t = later(m.t, m.h)
     row = m.rows[(1 + g.outputs) * m.done :]
     row[0] = m.t
-    spin(m)
     show(g, m.flat.z, row[1:])
     m.done += 1
     return DONE
-
-
-def spin(m: March) -> None:
-    """Turn the nodes whose rotations are shown."""
-    e = m.leap
-    first = m.gauges.rows + e.size - 1 - e.modes + 3 * m.corners.lines
-    for k in range(e.spins):
-        about(e.sight[first + 3 * k :], e.upright[9 * k :], m.flat.z[e.spun[k] :])
-
-
-def about(theta: Reals, before: Reals, after: Reals) -> None:
-    """Turn a rotation by a rotation vector (Rodrigues)."""
-    square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
-    half = 0.5 * math.sqrt(square)
-    bent = math.sin(half) / half if half > _STRAIGHT else 1.0
-    once = bent * math.cos(half)
-    twice = 0.5 * bent * bent
-    for j in range(3):
-        x = before[j]
-        y = before[3 + j]
-        z = before[6 + j]
-        along = theta[0] * x + theta[1] * y + theta[2] * z
-        after[j] = x + once * (theta[1] * z - theta[2] * y) + twice * (theta[0] * along - square * x)
-        after[3 + j] = y + once * (theta[2] * x - theta[0] * z) + twice * (theta[1] * along - square * y)
-        after[6 + j] = z + once * (theta[0] * y - theta[1] * x) + twice * (theta[2] * along - square * z)
 
 
 def sees_corner(m: March) -> bool:

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.books import Sums
-from flexctrl.dynamics.foresight import calm_steps
+from flexctrl.dynamics.events.foresight import calm_steps
 from flexctrl.dynamics.march.lookout import FAR, Lookout
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.onlooking import looked_at
 from flexctrl.dynamics.march.stepper import Memory
+from flexctrl.dynamics.records.books import Sums
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.march.ride import Ride

@@ -1,10 +1,10 @@
-"""Impacts at corners in compiled loops: how stiff and heavy what hits is; see `flexctrl.dynamics.impact`."""
+"""Impacts at corners in compiled loops: how stiff and heavy what hits is; see `flexctrl.dynamics.events.impact`."""
 
 from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.impact import LASTING, SEEN, SMALL, STEPS
+from flexctrl.dynamics.events.impact import LASTING, SEEN, SMALL, STEPS
 from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.record import March
 from flexctrl.dynamics.march.step import press_all
@@ -48,7 +48,7 @@ def along_rates(m: March, t: float, share: float) -> float:
 
 @seldom
 def follow_impact(m: March, stiffer: float) -> None:
-    """Follow an impact by short steps, where these would not see it; see `flexctrl.dynamics.impact.lasts`."""
+    """Follow an impact by short steps, where these would not see it; see `flexctrl.dynamics.events.impact.lasts`."""
     mass = along_rates(m, 0.0, 0.0) - along_rates(m, 0.0, 1.0)
     clear(m.flat.padded, m.flat.step)
     reach(m)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.books import copy
 from flexctrl.dynamics.march.contacts import bear_more, feel
@@ -12,6 +11,7 @@ from flexctrl.dynamics.march.flowing import flow_on, pivot, released
 from flexctrl.dynamics.march.holding import follows, held, settled_lead
 from flexctrl.dynamics.march.record import DONE, FAILED, SINGULAR, WANTS_MASS, March
 from flexctrl.dynamics.march.step import sloped
+from flexctrl.dynamics.swift.easing import eased_change, eased_rate, unresolved
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import accelerate, clear, drive, energy, load, press_entire, pull, push

@@ -1,4 +1,4 @@
-"""Steps that end just before a corner of a law of force, in compiled loops; as `flexctrl.dynamics.landing` has them.
+"""Steps that end just before a corner of a law of force, in compiled loops; as `dynamics.events.landing` has them.
 
 What is out of the common (corners where a run ends, or met at once) is left to plain steps.
 """
@@ -7,11 +7,7 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.march.books import copy, reach
-from flexctrl.dynamics.march.corners import crossed, value, within
-from flexctrl.dynamics.march.record import DONE, FRESH, March
-from flexctrl.dynamics.march.step import step
-from flexctrl.dynamics.nearing import (
+from flexctrl.dynamics.events.nearing import (
     LANDINGS,
     LEAD,
     LEAD_MOST,
@@ -25,6 +21,10 @@ from flexctrl.dynamics.nearing import (
     shorter,
     to_zero,
 )
+from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.corners import crossed, value, within
+from flexctrl.dynamics.march.record import DONE, FRESH, March
+from flexctrl.dynamics.march.step import step
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
 

@@ -10,12 +10,11 @@ import numpy as np
 from flexctrl.dynamics.march.pairs import pairs_of
 from flexctrl.dynamics.march.record import Leap
 from flexctrl.model.flat.flattened import Flattened
-from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 if TYPE_CHECKING:
-    from flexctrl.dynamics.modal_equations import ModalEquations
-    from flexctrl.dynamics.propagator import Propagator
-    from flexctrl.dynamics.quadratic import Turnover
+    from flexctrl.dynamics.linear_motion.modal_equations import ModalEquations
+    from flexctrl.dynamics.linear_motion.propagator import Propagator
+    from flexctrl.dynamics.linear_motion.quadratic import Turnover
 
 __all__ = ["Leaps", "Tables"]
 
@@ -73,7 +72,7 @@ class Leaps:
         self.wide = -(-self.size // 8) * 8
         self.places = np.append(self.pairs.where, self.modes + np.arange(few))
         both = np.hstack([first.C @ self.pairs.basis, first.D])
-        gliding, seen, spun = _seen(F, _from_rest(F, both), ways)
+        gliding, seen = _seen(F, _from_rest(F, both), ways)
         sights = -(-len(seen) // 8) * 8
         self.record = Leap(
             modes=self.modes,
@@ -82,7 +81,6 @@ class Leaps:
             paired=0,
             parted=0,
             sights=sights,
-            spins=len(spun),
             gliding=int(gliding),
             transition=np.zeros(self.size * self.wide),
             state=np.zeros(self.wide),
@@ -94,8 +92,6 @@ class Leaps:
             seen=self._columns(seen, sights),
             sight=np.zeros(sights),
             ways=np.array([F.ordered(row) for row in ways]).ravel(),
-            upright=F.model.rest.R[spun].ravel(),
-            spun=NODE_SLOT * spun + 3,
         )
 
     @property
@@ -197,48 +193,23 @@ def _ways(F: Flattened) -> np.ndarray:
     return np.array([model.loads(model.rest, unit) for unit in units]).reshape(-1, model.n)
 
 
-def _seen(F: Flattened, both: np.ndarray, ways: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
-    """Whether outputs and corners can be told from sums, ways, arms and turns; these; and the nodes that turn."""
-    sums, arms, spun = _sums(F, both), _arms(F, both), _spun(F)
-    if sums is None or arms is None:
-        return False, np.zeros((0, both.shape[1])), np.zeros(0, dtype=int)
+def _seen(F: Flattened, both: np.ndarray, ways: np.ndarray) -> tuple[bool, np.ndarray]:
+    """Whether corners can be told from arms; and outputs, ways and arms, on modal states, inputs and 1."""
+    arms = _arms(F, both)
+    if arms is None:
+        return False, np.zeros((0, both.shape[1]))
     along = ways @ both[: F.model.n]
     along[:, -1] += ways @ F.model.rest.q
-    return True, np.vstack([sums, along, arms, _turns(F, both, spun)]), spun
+    return True, np.vstack([_sums(F, both), along, arms])
 
 
-def _spun(F: Flattened) -> np.ndarray:
-    """The nodes whose rotations are shown."""
-    nodes = np.unique(F.gauges.turns.reshape(-1, 4)[:, 1:3]) // NODE_SLOT
-    return nodes[6 * nodes < F.model.motion.source_base]
-
-
-def _turns(F: Flattened, both: np.ndarray, spun: np.ndarray) -> np.ndarray:
-    """Rotation vectors of nodes, on modal states, inputs and 1."""
-    T = F.model.motion.jacobian(F.model.rest)
-    return np.asarray(T @ both[: F.model.n])[(6 * spun[:, None] + 3 + np.arange(3)).ravel()]
-
-
-def _sums(F: Flattened, both: np.ndarray) -> np.ndarray | None:
-    """The sums that outputs are read from, on modal states, inputs and 1; None where outputs need more than that."""
-    g, motion, n = F.gauges, F.model.motion, F.model.n
-    if g.tense:
-        return None
-    T = motion.jacobian(F.model.rest)
-    on_places, on_rates = (np.asarray(T @ part) for part in (both[:n], both[n:]))
-    found = np.zeros((g.rows, both.shape[1]))
-    wound = np.asarray(motion.winding @ both[:n])
-    wound[:, -1] += motion.winding @ F.model.rest.q
-    winding = dict(zip(g.turns[3::4].tolist(), wound, strict=True))
-    for i in range(g.rows):
-        if i in winding:
-            found[i] = winding[i]
-            continue
-        for k in range(g.starts[i], g.starts[i + 1]):
-            row = _cell(F, int(g.cells[k]), on_places, on_rates)
-            if row is None:
-                return None
-            found[i] += g.weights[k] * row
+def _sums(F: Flattened, both: np.ndarray) -> np.ndarray:
+    """The outputs, likewise."""
+    model, n = F.model, F.model.n
+    T, still = model.motion.jacobian(model.rest), np.zeros(model.motion.raw)
+    on_places, on_rates = model.signals.slopes(model.rest, still, still.size)
+    found = np.asarray((on_places @ T) @ both[:n] + (on_rates @ T) @ both[n:])
+    found[:, -1] += F.gauges.levels
     return found
 
 
@@ -254,23 +225,3 @@ def _arms(F: Flattened, both: np.ndarray) -> np.ndarray | None:
         found[3 * k : 3 * k + 3] = on_places[6 * end : 6 * end + 3] - on_places[6 * start : 6 * start + 3]
         found[3 * k : 3 * k + 3, -1] += F.model.rest.x[end] - F.model.rest.x[start]
     return found
-
-
-def _cell(F: Flattened, cell: int, on_places: np.ndarray, on_rates: np.ndarray) -> np.ndarray | None:
-    """An entry of the workspace on modal states, inputs and 1; None for one that is not linear in them."""
-    motion, base = F.model.motion, F.flat.drive_base
-    if cell >= base:
-        drive, what = divmod(cell - base, DRIVE_SLOT)
-        if drive >= len(motion.drives) or motion.rigid[drive] or what > 1:
-            return None
-        row = np.array((on_places, on_rates)[what][motion.source_base + drive])
-        row[-1] += 0.0 if what else F.model.rest.q[motion.sources[drive]]
-        return row
-    node, what = divmod(cell, NODE_SLOT)
-    if 6 * node >= motion.source_base or not (what < 3 or 12 <= what < 18):
-        return None
-    if what >= 12:
-        return np.asarray(on_rates[6 * node + what - 12])
-    row = np.array(on_places[6 * node + what])
-    row[-1] += F.model.rest.x[node, what]
-    return row

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha_point import AlphaPoint, Coefficients
-from flexctrl.dynamics.dense import Curve
-from flexctrl.dynamics.exact import ExactStepper, ModalPoint
+from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.linear_motion.exact import ExactStepper, ModalPoint
 from flexctrl.dynamics.march.calling import Remembered
 from flexctrl.dynamics.march.leaping import Leaps, Tables
 from flexctrl.dynamics.march.making import Method
 from flexctrl.dynamics.march.marching import Marcher
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
+from flexctrl.dynamics.records.dense import Curve
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Point
 from flexctrl.kernels.native import Packed

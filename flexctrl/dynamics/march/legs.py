@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.alpha_point import AlphaPoint
-from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
+from flexctrl.dynamics.records.books import Sums
 from flexctrl.dynamics.steps import Mark, Point
 from flexctrl.model.state import State
 

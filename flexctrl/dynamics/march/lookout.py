@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexctrl.dynamics.events import Event, EventError
+from flexctrl.dynamics.events.event import Event, EventError
+from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.march.weaving import Weaver
-from flexctrl.dynamics.watch import Watch
 from flexctrl.model.state import State
 
 __all__ = ["FAR", "Lookout"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.events.nearing import SHORTEST, SMALLEST
 from flexctrl.dynamics.march.answering import commanded, take
 from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle, shelve
 from flexctrl.dynamics.march.closing import in_doubt
@@ -34,7 +35,6 @@ from flexctrl.dynamics.march.record import (
 )
 from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
 from flexctrl.dynamics.march.turning import start_anew, turn_corner
-from flexctrl.dynamics.nearing import SHORTEST, SMALLEST
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import energy
 

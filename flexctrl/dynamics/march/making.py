@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha_point import Coefficients
-from flexctrl.dynamics.coning import coning_of
+from flexctrl.dynamics.alpha.coning import coning_of
+from flexctrl.dynamics.alpha.point import Coefficients
 from flexctrl.dynamics.march.answer import no_answer
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
@@ -22,7 +22,7 @@ from flexctrl.dynamics.march.record import (
 )
 from flexctrl.dynamics.march.shelf import width_of
 from flexctrl.dynamics.scales import components
-from flexctrl.dynamics.stiff_lines import firmest
+from flexctrl.dynamics.swift.stiff_lines import firmest
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import Flattened
 

@@ -10,10 +10,8 @@ from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
-from flexctrl.dynamics.alpha_point import AlphaPoint
-from flexctrl.dynamics.books import Sums
+from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Feed, Supply
-from flexctrl.dynamics.frames import Later
 from flexctrl.dynamics.inputs import Inputs, Stepwise
 from flexctrl.dynamics.march.calling import Loops
 from flexctrl.dynamics.march.contacts import enter_contacts
@@ -30,9 +28,11 @@ from flexctrl.dynamics.march.record import (
 )
 from flexctrl.dynamics.march.shelf import states_of, width_of
 from flexctrl.dynamics.march.weaving import Weaver
+from flexctrl.dynamics.records.books import Sums
+from flexctrl.dynamics.records.frames import Later
 from flexctrl.dynamics.scales import components, farthest
 from flexctrl.dynamics.steps import Mark
-from flexctrl.dynamics.stiff_lines import told_by_differences
+from flexctrl.dynamics.swift.stiff_lines import told_by_differences
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import can_be_flat

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from flexctrl.dynamics.crossings import crossings, offset
-from flexctrl.dynamics.dense import Dense
-from flexctrl.dynamics.events import Direction, EventError
+from flexctrl.dynamics.events.crossings import crossings, offset
+from flexctrl.dynamics.events.event import Direction, EventError
+from flexctrl.dynamics.events.watch import Crossing, Watch
+from flexctrl.dynamics.events.watching import TOGETHER
 from flexctrl.dynamics.march.record import TURN, TURNED
-from flexctrl.dynamics.watch import Crossing, Watch
-from flexctrl.dynamics.watching import TOGETHER
+from flexctrl.dynamics.records.dense import Dense
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.march.marching import Pacing

@@ -86,17 +86,14 @@ class Leap:
         The energy dissipated over a step as a quadratic form in the state; where nothing couples pairs (``parted``)
         first their own entries, as above but for one mixed, doubled, then columns of inputs and 1, doubled.
     seen : Reals
-        What the state adds to the sums that outputs are read from, to the ways of the inputs, to the arms of lines that
-        have corners (3 each) and to the turns of nodes whose rotation is shown (3 each), column by column.
+        What the state adds to the sums that outputs are read from, to the ways of the inputs and to the arms of lines
+        that have corners (3 each), column by column.
     sight : Reals
-        These sums, ways, arms and turns.
-    upright, spun : Reals, Wholes
-        Rotations of these nodes as drawn, and where they stand in the workspace.
+        These sums, ways and arms.
     ways : Reals
         What a unit of each degree of freedom adds to the ways of the inputs, input by input.
-    sights, spins, gliding : int
-        Number of sums, ways, arms and turns, filled up to a multiple of eight; of these nodes; whether outputs are all
-        read from them.
+    sights, gliding : int
+        Number of sums, ways and arms, filled up to a multiple of eight; whether corners are all read from them.
     aloft : int
         Whether the state is ahead of degrees of freedom and nodes.
     h : float
@@ -111,7 +108,6 @@ class Leap:
     paired: int
     parted: int
     sights: int
-    spins: int
     gliding: int
     transition: Reals
     state: Reals
@@ -123,8 +119,6 @@ class Leap:
     seen: Reals
     sight: Reals
     ways: Reals
-    upright: Reals
-    spun: Wholes
     aloft: int = 0
     h: float = -1.0
     lost: float = 0.0
@@ -132,8 +126,8 @@ class Leap:
 
 def no_leap() -> Leap:
     """Return the leaps of a model that is not linear."""
-    e, none = np.zeros(0), np.zeros(0, dtype=int)
-    return Leap(0, 0, 0, 0, 0, 0, 0, 0, e, e, e, e, e, e, e, e, e, e, e, none)
+    e = np.zeros(0)
+    return Leap(0, 0, 0, 0, 0, 0, 0, e, e, e, e, e, e, e, e, e, e)
 
 
 @dataclass
@@ -213,7 +207,7 @@ class March:
     drawing, entered : int
         Whether balances are drawn, and steps since the run's start: often at first, then every few.
     begun, moving, turnover, gap, made : float
-        Energy at the run's start and what of it was kinetic; see `flexctrl.dynamics.books.Sums`.
+        Energy at the run's start and what of it was kinetic; see `flexctrl.dynamics.records.books.Sums`.
     power, gained, lost : float
         Dissipated power; work of the inputs and energy dissipated.
     v, rate, algorithmic, trend : Reals
@@ -223,7 +217,7 @@ class March:
     weight, turns, dust : Reals
         One over the yardsticks; 1 for what turns; mass that is but rounding.
     coning, cones : int, Wholes
-        Rotations that turn all ways, and their degrees of freedom, three each; see `flexctrl.dynamics.coning`.
+        Rotations that turn all ways, and their degrees of freedom, three each; see `flexctrl.dynamics.alpha.coning`.
     fastest : float
         The largest rate of what turns at the start of the step.
     turned : float

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.dense import Dense
+from flexctrl.dynamics.events.switching import beyond
+from flexctrl.dynamics.events.watch import Crossing
 from flexctrl.dynamics.inputs import Stepwise
 from flexctrl.dynamics.march.guarding import EVENT, guarded, warily
 from flexctrl.dynamics.march.law_inside import told
@@ -24,10 +25,9 @@ from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.record import DONE, SILENT, TURN, TURNED
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.march.weaving import Weaver
-from flexctrl.dynamics.settling import weightless
+from flexctrl.dynamics.records.dense import Dense
 from flexctrl.dynamics.steps import Controlled, Fixed
-from flexctrl.dynamics.switching import beyond
-from flexctrl.dynamics.watch import Crossing
+from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.errors import ControllerError
 
 if TYPE_CHECKING:

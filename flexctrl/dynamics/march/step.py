@@ -1,6 +1,6 @@
 """Generalised alpha in compiled loops: one step.
 
-The method, its Newton iterations and its tests are those of `alpha_steps`, but for the tangent, which is kept longer
+The method, its Newton iterations and its tests are those of `alpha.steps`, but for the tangent, which is kept longer
 (see `march.axes`), and for Newton's tolerance, which is a share of the method's own error.
 """
 
@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.coning import LARGEST, eta
+from flexctrl.dynamics.alpha.coning import LARGEST, eta
+from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.contacts import feel, firmness
 from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
-from flexctrl.dynamics.newton import ASTRAY, ITERATIONS, POOR, small_enough
-from flexctrl.dynamics.stiff_lines import SHORT, STIFF, SURE, TURNING
+from flexctrl.dynamics.swift.stiff_lines import SHORT, STIFF, SURE, TURNING
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
@@ -23,7 +23,7 @@ from flexctrl.model.flat.fronts import factor, whose
 
 __all__ = ["blended", "press_all", "refactored", "sloped", "step", "to_rate", "to_v"]
 
-_TURNED = 0.03
+_TURNED = 0.1
 _TRUSTED = 8
 _FINEST = 1e-12
 """Increments of probes in a step that has failed, at the least."""

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from flexctrl.dynamics import alpha_steps
-from flexctrl.dynamics.alpha_point import AlphaPoint
+from flexctrl.dynamics.alpha import steps as alpha_steps
+from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.calling import Remembered
 from flexctrl.dynamics.march.making import Method

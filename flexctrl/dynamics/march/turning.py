@@ -1,11 +1,12 @@
 """Corners of laws of force in compiled loops: a step ends just before one, and the next starts anew beyond.
 
-As `flexctrl.dynamics.switching` does. What is out of the common (corners where a run
+As `flexctrl.dynamics.events.switching` does. What is out of the common (corners where a run
 ends, met at once or through a sheave; steps to one that fail) is left to them.
 """
 
 from __future__ import annotations
 
+from flexctrl.dynamics.events.nearing import LEAST, NUDGES
 from flexctrl.dynamics.march.books import accept, copy, reach
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import comes_through, value
@@ -13,7 +14,6 @@ from flexctrl.dynamics.march.impact import follow_impact, stiffness
 from flexctrl.dynamics.march.joining import start_anew
 from flexctrl.dynamics.march.landing import shortened
 from flexctrl.dynamics.march.record import CONTROLLED, CORNER, DONE, FRESH, SAMPLED, TURN, TURNED, March
-from flexctrl.dynamics.nearing import LEAST, NUDGES
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, keep

@@ -1,4 +1,4 @@
-"""Rows between the steps of a march, in compiled loops: the curves of `flexctrl.dynamics.dense.Hermite`."""
+"""Rows between the steps of a march, in compiled loops: the curves of `flexctrl.dynamics.records.dense.Hermite`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ALIGNED = 1e-6
 class Weave:
     """Rows that are due within steps whose ends are known.
 
-    Coordinates are those of `flexctrl.dynamics.local.Local`: the degrees of freedom in the order of elimination, then
+    Coordinates are those of `dynamics.methods.local.Local`: the degrees of freedom in the order of elimination, then
     angles about held axes, about which rotations wander.
 
     Attributes

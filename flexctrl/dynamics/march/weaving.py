@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from flexctrl.dynamics.frames import Later
 from flexctrl.dynamics.march.shelf import row_of, states_of, width_of
 from flexctrl.dynamics.march.weave import Weave, weave
+from flexctrl.dynamics.records.frames import Later
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.widened import widened
@@ -26,7 +26,7 @@ _PAIR = 24
 
 
 class Weaver:
-    """Finds rows between steps, as `flexctrl.dynamics.dense.Hermite` does, many at once.
+    """Finds rows between steps, as `flexctrl.dynamics.records.dense.Hermite` does, many at once.
 
     Parameters
     ----------

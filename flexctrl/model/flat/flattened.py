@@ -70,7 +70,8 @@ class Flattened:
         f.z[: forces.slot_count] = forces.slots(state, state.v, still)
         f.pose.reshape(-1, 12)[:] = np.hstack([state.x, state.R.reshape(-1, 9)])
         f.q[:], f.driven[:] = self.ordered(state.q), state.driven
-        self.gauges.shown[:], self.gauges.summed[:] = state.shown, self.model.motion.winding @ state.q
+        if self.gauges.turning:
+            self.gauges.shown[:], self.gauges.summed[:] = state.shown, self.model.motion.winding @ state.q
         f.step[:], f.v[:], f.rate[:] = 0.0, self.ordered(state.v), 0.0
 
     @property

@@ -17,6 +17,8 @@ from flexctrl.mechanics.rotation import turned_rows
 from flexctrl.model.flat import binding
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.layout import Layout
+from flexctrl.model.flat.small_gauges import small_gauges
+from flexctrl.model.gauges import Gauges
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = ["SmallLayout"]
@@ -30,7 +32,7 @@ class SmallLayout(Layout):
         self.carried, self.linked = 0, np.zeros(0, dtype=int)
         return super()._sizes() | {
             **dict.fromkeys(("force", "load"), self.padded),
-            "shift": 6 * nodes,
+            "shift": self.motion.raw,
             "drawn": 12 * nodes,
             "back": self.padded if self.model.about else 0,
         }
@@ -91,6 +93,10 @@ class SmallLayout(Layout):
         return none, none, none
 
     @cached_property
+    def _gauges(self) -> Gauges:
+        return small_gauges(self)
+
+    @cached_property
     def _levers(self) -> sp.coo_matrix:
         """Raw motion per unit of each degree of freedom."""
         return sp.coo_matrix(self.motion.jacobian(self.motion.rest))
@@ -108,7 +114,7 @@ class SmallLayout(Layout):
 
     @cached_property
     def runs(self) -> dict[str, Any]:
-        cells = np.arange(6 * len(self.motion.place))
+        cells = np.arange(self.motion.raw)
         return {
             "turn": (),
             **self._linkage(),

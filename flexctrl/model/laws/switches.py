@@ -126,6 +126,24 @@ class Switches:
         W, back = self._hold(state)
         return motion - back @ (W @ motion)
 
+    def at_rest(self, state: State) -> State:
+        """Return a state in which what sticks does not move and is held where it is: nothing of it is to fade.
+
+        Parameters
+        ----------
+        state : State
+
+        Returns
+        -------
+        State
+        """
+        if not self.sticks(state):
+            return state
+        order, (_, _, places) = self.slips.order, self.slips.at(state, state.v, state.v)
+        anchor = state.dry.anchor.copy()
+        anchor[order] = np.where(self.phases(state) == STUCK, places, anchor[order])
+        return state.with_(v=self.still(state, state.v), dry=Dry(state.dry.phase, anchor))
+
     def _hold(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Return W of the contacts that stick, and its pseudo-inverse."""
         return self._once("hold", state, lambda: self._holds(state))

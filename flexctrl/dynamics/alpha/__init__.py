@@ -1,0 +1,1 @@
+"""Generalised alpha: its steps one by one."""

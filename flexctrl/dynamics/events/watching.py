@@ -1,0 +1,85 @@
+"""What happens over a step: events noted, and the step ended where one of them, a switch or a corner asks for that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from flexctrl.dynamics.events.crossings import met, offset
+from flexctrl.dynamics.events.landing import landed
+from flexctrl.dynamics.events.switching import anew, is_brief, withheld
+from flexctrl.dynamics.events.watch import Crossing
+from flexctrl.dynamics.records.dense import Curve
+from flexctrl.dynamics.steps import Point, StepError
+from flexctrl.model.laws.friction_kinds import STUCK
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["TOGETHER", "watched"]
+
+_CHATTER = 20
+TOGETHER = 1e-7
+
+
+def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Crossing | None]:
+    """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
+    watch, curve = journey.watch, journey.track.curve(before, after)
+    found = met(watch, journey.track.curve, before, after, journey.rows.every)
+    landing = next((c for c in found if watch.stops(c.gauge) and not journey.is_over(c)), None)
+    switch = -1 if landing is None else landing.gauge - len(watch.events)
+    if 0 <= switch < len(watch.names) and journey.mark.stuck >= _CHATTER:
+        name = watch.names[switch]
+        raise StepError(journey.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
+    if landing is None or journey.mark.stuck >= _CHATTER:
+        _note(journey, found, curve, before)
+        watch.settle(after)
+        journey.mark.stuck = 0
+        return after, None
+    earlier, slid = [c for c in found if c.t < landing.t], after
+    after, landing = landed(journey, before, after, landing)
+    switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
+    brief = 0 <= switch < len(watch.names) and is_brief(journey, before, after, slid, switch)
+    closest = {c.gauge: c for c in sorted(found, key=lambda c: -abs(c.t - landing.t))}.values()
+    there = [c for c in closest if c.gauge != landing.gauge and _is_there(journey, c, before, after, slid)]
+    _note(journey, [c for c in earlier if c not in there], curve, before)
+    watch.settle(after)
+    together = sorted((*there, landing), key=lambda c: c.gauge)
+    for c in together:
+        watch.cross(c)
+        if not 0 <= c.gauge - len(watch.events) < len(watch.names):
+            journey.happens(replace(c, t=landing.t), after.state, after.supply.u)
+    journey.end_by(together, landing.t)
+    if watch.last_word(landing.gauge):
+        return after, None
+    short = landing.t - before.state.t < 1e-6 * journey.mark.size
+    journey.mark.stuck = journey.mark.stuck + 1 if short else 0
+    if switch >= len(watch.names):
+        return after, landing
+    return _switched(journey, after, landing, switch, brief), None
+
+
+def _is_there(journey: Journey, crossing: Crossing, before: Point, after: Point, slid: Point) -> bool:
+    """Tell whether an event asked for, seen in a step, happens just where that ends now that it is cut short."""
+    watch, t, whole = journey.watch, before.state.t, slid.state.t - before.state.t
+    if crossing.gauge >= len(watch.events):
+        return False
+    if after.state.t == t:
+        return crossing.t - t <= TOGETHER * whole
+    off = offset(watch, journey.track.curve(before, after), before, after, crossing.gauge)
+    return abs(off) <= TOGETHER * whole
+
+
+def _switched(journey: Journey, at: Point, landing: Crossing, switch: int, brief: bool) -> Point:
+    """Go on under the law of force that holds from now on; note whether the contact slides under it."""
+    fresh = at if brief else anew(journey, at, switch)
+    slides = not brief and journey.plan.model.switches.phases(fresh.state)[switch] != STUCK
+    journey.happens(replace(landing, rising=bool(slides)), at.state, at.supply.u)
+    return withheld(journey, at, switch) if brief else fresh
+
+
+def _note(journey: Journey, met: Sequence[Crossing], curve: Curve, before: Point) -> None:
+    for c in met:
+        journey.watch.cross(c)
+        journey.happens(c, curve.at(c.t), before.supply.u)

@@ -1,0 +1,1 @@
+"""Linear models through time: integrated exactly."""

@@ -1,0 +1,1 @@
+"""Other methods: explicit, in momenta, extrapolated; what they share."""

@@ -1,0 +1,225 @@
+"""Richardson extrapolation on the rotation group: a method run twice side by side, with steps h and h/2.
+
+The difference δ of the two shapes is taken in the degrees of freedom, rotations by the logarithm of the relative
+rotation; the extrapolated shape is the finer one moved on by δ/(2^p − 1). Both runs go on from their own states, so
+the pair is as stable as the method itself. Steps are chosen as the coarser run alone would choose them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.steps import Counts, Integrator, Joining, Pace, Point, Stepper
+from flexctrl.dynamics.swift.settling import quasistatic
+from flexctrl.errors import StructureError
+from flexctrl.mechanics.rotation import logarithm
+from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
+from flexctrl.model.solve import factorise
+from flexctrl.model.state import State
+
+__all__ = ["Richardson"]
+
+_TIGHT = 1e-12
+"""What Newton's method leaves open must not show in the difference of two runs: undamped, it adds up."""
+
+
+@dataclass(frozen=True)
+class Richardson:
+    """A method of lower order run with steps h and h/2, and extrapolated.
+
+    Two more orders for a method that is symmetric in time (`ConservingMidpoint`, ``GeneralizedAlpha(h, rho=1.0)``),
+    one more for others, at three times the cost of the coarser run. As damped and as stable as the method itself.
+    Errors of both runs grow with time, so this is for runs in which the coarser one still follows the motion. Beyond a
+    corner of a law of force both go on from where the finer one is. Steps of `AdaptiveAlpha` are those that it takes by
+    itself: a tolerance is kept by the coarser run, and what is extrapolated is as much better as with fixed steps.
+
+    Parameters
+    ----------
+    method : Integrator
+        Of order 2: `GeneralizedAlpha`, `AdaptiveAlpha`, `ConservingMidpoint`; its step is the longer of the two.
+
+    Raises
+    ------
+    StructureError
+        For a method of another order.
+    """
+
+    method: Integrator
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.method, Integrator) or self.method.order != 2:
+            raise StructureError(f"Richardson: {self.method!r}; give a method of order 2, as GeneralizedAlpha(1e-3)")
+
+    @property
+    def order(self) -> int:
+        return 4 if self.method.symmetric else 3
+
+    @property
+    def symmetric(self) -> bool:
+        return False
+
+    @property
+    def damping(self) -> str:
+        return self.method.damping
+
+    @property
+    def pace(self) -> Pace:
+        return self.method.pace
+
+    def stepper(self, model: Plant, feed: Feed, tolerance: Tolerance) -> _Stepper:
+        tight = replace(tolerance, absolute=min(tolerance.absolute, _TIGHT))
+        coarse, fine = (self.method.stepper(model, feed, tight) for _ in range(2))
+        return _Stepper(model, feed, coarse, fine, 1.0 / 3.0)
+
+
+@dataclass(frozen=True)
+class _Point(Point):
+    """A point with those of both runs."""
+
+    coarse: Point
+    fine: Point
+
+    @property
+    def firm(self) -> _Point:
+        """The finer run: an extrapolation of what steps do not resolve, gone on from again and again, grows."""
+        return replace(self, state=self.fine.state, rate=self.fine.rate, supply=self.fine.supply)
+
+
+@dataclass
+class _Stepper:
+    """Two steppers side by side."""
+
+    model: Plant
+    feed: Feed
+    coarse: Stepper[Any]
+    fine: Stepper[Any]
+    weight: float
+    counts: Counts = field(default_factory=Counts)
+
+    def __post_init__(self) -> None:
+        self.between = Difference(self.model)
+
+    @property
+    def memory(self) -> tuple[Any, Any]:
+        return self.coarse.memory, self.fine.memory
+
+    @memory.setter
+    def memory(self, memory: tuple[Any, Any]) -> None:
+        self.recall(memory)
+
+    def recall(self, memory: tuple[Any, Any]) -> None:
+        """Go on as the steppers whose memories these are."""
+        self.coarse.recall(memory[0])
+        self.fine.recall(memory[1])
+
+    def start(self, state: State, supply: Supply, step: float) -> _Point:
+        """Return the point of a state, both runs together."""
+        coarse, fine = self.coarse.start(state, supply, step), self.fine.start(state, supply, 0.5 * step)
+        return _Point(fine.state, fine.rate, fine.supply, coarse, fine)
+
+    def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
+        """Return the point under other inputs; the runs stay apart."""
+        coarse, fine = (self._switched(run, point.state) for run in (point.coarse, point.fine))
+        coarse = self.coarse.renew(coarse, self._own(coarse, supply), step)
+        fine = self.fine.renew(fine, self._own(fine, supply), 0.5 * step)
+        rate = fine.rate + self.weight * (fine.rate - coarse.rate)
+        point = replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
+        if not quasistatic(self.model).size:
+            return point
+        state = self.moved_on(coarse.state, fine.state)
+        return replace(point, state=state, supply=self._supply(supply, state, coarse, fine))
+
+    def fed(self, point: _Point, supply: Supply) -> _Point:
+        """Return the point with other states or rates of its law: what either run goes on from, at corners, too."""
+        coarse, fine = (replace(run, supply=self._own(run, supply)) for run in (point.coarse, point.fine))
+        return replace(point, supply=supply, coarse=coarse, fine=fine)
+
+    def join(self, point: _Point, supply: Supply, step: float) -> _Point:
+        """Return the point with both runs in its state: apart, they would meet a corner of a law of force apart."""
+        coarse = _joined(self.coarse, replace(point.coarse, state=point.state), supply, step)
+        fine = _joined(self.fine, replace(point.fine, state=point.state), supply, 0.5 * step)
+        return replace(point, rate=fine.rate, supply=supply, coarse=coarse, fine=fine)
+
+    def _own(self, run: Point, supply: Supply) -> Supply:
+        """What a run is supplied with: the states of a continuous law are integrated, by each run its own."""
+        return replace(supply, x=run.supply.x) if self.feed.continuous else supply
+
+    def _switched(self, run: Any, state: State) -> Any:
+        """A run whose dry contacts stick or slide as those of a state do."""
+        return replace(run, state=self.model.switches.like(run.state, state))
+
+    def step(self, point: _Point, h: float) -> _Point:
+        """Return the point a step later."""
+        before = self._spent()
+        coarse = self.coarse.step(point.coarse, h)
+        fine = self.fine.step(self.fine.step(point.fine, 0.5 * h), 0.5 * h)
+        spent = self._spent()
+        self.counts.newton += spent[0] - before[0]
+        self.counts.factorisations += spent[1] - before[1]
+        self.counts.worst = self.fine.counts.worst
+        state = self.moved_on(coarse.state, fine.state)
+        rate = fine.rate + self.weight * (fine.rate - coarse.rate)
+        return _Point(state, rate, self._supply(point.supply, state, coarse, fine), coarse, fine)
+
+    def _spent(self) -> tuple[int, int]:
+        a, b = self.coarse.counts, self.fine.counts
+        return a.newton + b.newton, a.factorisations + b.factorisations
+
+    def moved_on(self, coarse: State, fine: State) -> State:
+        """Return the extrapolated state."""
+        gap = self.between(coarse, fine)
+        v = fine.v + self.weight * (fine.v - coarse.v)
+        return self.model.advance(fine, self.weight * gap, v, fine.t)
+
+    def _supply(self, held: Supply, state: State, coarse: Point, fine: Point) -> Supply:
+        if not self.feed.continuous:
+            return held
+        return self.feed.within(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
+
+    def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
+        """Return the error that the step added to the coarser run, over what is allowed.
+
+        By how the two runs part over a step nothing is to be told: what they differ by already goes on by itself,
+        and no shorter step makes it less.
+        """
+        return self.coarse.error(before.coarse, after.coarse, h, moved, tolerance)
+
+
+def _joined(stepper: Stepper[Any], run: Any, supply: Supply, step: float) -> Any:
+    """Start a run anew, as the method by itself does beyond a corner."""
+    plain = stepper.plain if isinstance(stepper, MarchingStepper) else stepper
+    return plain.join(run, supply, step) if isinstance(plain, Joining) else plain.start(run.state, supply, step)
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How two neighbouring shapes differ, in the degrees of freedom; right to first order in the difference.
+
+    Attributes
+    ----------
+    model : Plant
+    """
+
+    model: Plant
+
+    def __call__(self, one: State, other: State) -> np.ndarray:
+        """Return the step from one state to the other, shape (n,)."""
+        if not (isinstance(self.model, Model) and self.model.large):
+            return other.q - one.q
+        motion = self.model.motion
+        turned = logarithm(other.R @ np.swapaxes(one.R, 1, 2))
+        own = np.append(other.q - one.q, 0.0)
+        driven = np.where(motion.rigid, motion.ratios * (other.driven - one.driven), own[motion.sources])
+        raw = np.concatenate([np.hstack([other.x - one.x, turned]).ravel(), driven, own[motion.inner]])
+        if motion.plain:
+            return motion.collect(other, raw) / motion.collect(other, np.ones(motion.raw))
+        T = motion.jacobian(other)
+        return factorise(sp.csr_matrix(T.T @ T))(T.T @ raw)

@@ -1,0 +1,1 @@
+"""What a run keeps: rows, frames, energy books, states between the steps."""

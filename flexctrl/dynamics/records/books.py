@@ -1,0 +1,259 @@
+"""The energy books of a run: work in, dissipated, and what is stored."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.linear_motion.plant import LinearPlant
+from flexctrl.dynamics.march.record import OFTEN
+from flexctrl.dynamics.methods.local import Local
+from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
+from flexctrl.dynamics.run import Tolerance
+from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.steps import Point
+from flexctrl.dynamics.swift.settling import dragged, quasistatic
+from flexctrl.dynamics.swift.stiff_lines import noise, stiffest
+from flexctrl.model.state import State
+
+__all__ = ["Books", "Sums"]
+
+_ABSURD, _UNRESOLVED, _DOUBTFUL = 0.5, 0.2, 0.05
+_MOSTLY = 0.9
+_VISIBLE = 1e-3
+_FELT = 3e-3
+_SLIGHT, _RESTING = 10.0, 1e-2
+_ROUND_OFF = 1e-6
+_LOBATTO = ((0.5 * (1.0 - (3.0 / 7.0) ** 0.5), 49.0 / 180.0), (0.5, 64.0 / 180.0))
+_ENDS = 1.0 / 20.0
+_OVERSHOT = 2.0
+
+
+@dataclass
+class Sums:
+    """What the books hold.
+
+    Attributes
+    ----------
+    start, moving : float
+        Energy at the start, and what of it was kinetic [J].
+    work, lost : float
+        Work of the inputs and energy dissipated so far [J].
+    kinetic, stored : float
+        When the balance was drawn last [J].
+    gap, turnover : float
+        Largest |energy − start − work + lost| and largest energy turned over [J].
+    made : float
+        Energy − start − work + lost when the balance was drawn last [J].
+    power : float
+        Dissipated now [W].
+    closure : float
+        Largest violation of conditions that close rigid loops.
+    entered : int
+        Steps since the start.
+    moved : numpy.ndarray, shape (n,)
+        How far each degree of freedom has been from its start.
+    """
+
+    start: float = 0.0
+    moving: float = 0.0
+    work: float = 0.0
+    lost: float = 0.0
+    kinetic: float = 0.0
+    stored: float = 0.0
+    gap: float = 0.0
+    turnover: float = 0.0
+    made: float = 0.0
+    power: float = 0.0
+    closure: float = 0.0
+    entered: int = 0
+    moved: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+class Books:
+    """What a run has turned over, drawn up every few steps."""
+
+    def __init__(self, feed: Feed, state: State, order: int, tolerance: Tolerance) -> None:
+        self.feed, self.model, self.order = feed, feed.model, order
+        self.first = state.q
+        self.lawful = self.model.large
+        self.reach = yardsticks(self.model)
+        self.slight = _SLIGHT * tolerance.absolute * self.reach
+        probe = np.linspace(1.0, 2.0, self.model.n)
+        changing = bool(self.model.switches.names or self.model.kinks.names)  # what is loose now may damp later
+        self.dissipates = changing or self.model.energy(state.with_(v=probe))[2] != 0.0
+        kinetic, stored, power = self.model.energy(state)
+        self.sums = Sums(
+            kinetic + stored, kinetic, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n)
+        )
+
+    def enter(self, before: Point, after: Point, curve: Curve) -> None:
+        """Enter a step."""
+        sums = self.sums
+        if before.supply.u.any() or after.supply.u.any() or self.dissipates:
+            if self.order > 2:
+                self._integrate(before, after, curve)
+            else:
+                self._trapezoid(before, after)
+        sums.moved = np.maximum(sums.moved, np.abs(after.state.q - self.first))
+        sums.entered += 1
+        if sums.entered < OFTEN or sums.entered % OFTEN == 0:
+            self.close(after)
+
+    def jump(self, before: Point, after: Point) -> None:
+        """Note that rates have jumped with the inputs, and with them what is dissipated.
+
+        Places of what has no mass have jumped too: what the inputs did on the way and springs do not store is lost.
+        """
+        if self.model.motion.flows.size or dragged(self.model).size:
+            self.turn(after)
+        if isinstance(self.model, LinearPlant) or quasistatic(self.model).size:
+            (k0, v0, _), (k1, v1, _) = (self.model.energy(point.state) for point in (before, after))
+            moved = after.state.q - before.state.q
+            work = float(self.model.loads(after.state, after.supply.u) @ moved)
+            self.sums.work += work
+            self.sums.lost += work - (k1 + v1 - k0 - v0)
+            self.sums.moved = np.maximum(self.sums.moved, np.abs(after.state.q - self.first))
+
+    def turn(self, point: Point) -> None:
+        """Note that what is dissipated jumps."""
+        if self.dissipates:
+            self.sums.power = self.model.energy(point.state)[2]
+
+    def _trapezoid(self, before: Point, after: Point) -> None:
+        loads = self.model.loads
+        step = after.state.q - before.state.q
+        forces = loads(before.state, before.supply.u) + loads(after.state, after.supply.u)
+        self.sums.work += 0.5 * float(forces @ step)
+        if self.dissipates:
+            power = self.model.energy(after.state)[2]
+            self.sums.lost += 0.5 * (self.sums.power + power) * (after.state.t - before.state.t)
+            self.sums.power = power
+
+    def _integrate(self, before: Point, after: Point, curve: Curve) -> None:
+        """Integrate the powers over a step by Lobatto's rule with five points, where the method knows no better."""
+        if isinstance(curve, Booked) and (known := curve.turned_over()) is not None:
+            self.sums.work += known[0]
+            self.sums.lost += known[1]
+            return
+        t, h = before.state.t, after.state.t - before.state.t
+        first, last = self._powers(before.state, before.supply.u), self._powers(after.state, after.supply.u)
+
+        def within(share: float, state: State) -> np.ndarray:
+            return self._powers(state, self.feed.between(before.supply, after.supply, (share, h), state).u)
+
+        def mean(curve: Curve) -> np.ndarray:
+            inner = (*_LOBATTO, (1.0 - _LOBATTO[0][0], _LOBATTO[0][1]))
+            return sum((w * within(share, curve.at(t + share * h)) for share, w in inner), _ENDS * (first + last))
+
+        total = mean(curve)
+        ends = 0.5 * (first[1] + last[1])
+        if min(first[1], last[1]) > 0.0 and total[1] > _OVERSHOT * ends:  # it swings where damping is too stiff for it
+            calm = Hermite(Local(self.model), before.state, after.state)
+            total = within(0.5, calm.secant()) if total[1] > _OVERSHOT * mean(calm)[1] else total
+        self.sums.work += h * float(total[0])
+        self.sums.lost += h * float(total[1])
+        self.sums.power = float(last[1])
+
+    def _powers(self, state: State, u: np.ndarray) -> np.ndarray:
+        lost = self.model.energy(state)[2] if self.dissipates else 0.0
+        return np.array([self.model.loads(state, u) @ state.v, lost])
+
+    def close(self, point: Point) -> None:
+        """Draw the balance."""
+        s = self.sums
+        s.kinetic, s.stored, _ = self.model.energy(point.state)
+        gap = s.kinetic + s.stored - s.start - s.work + s.lost
+        s.turnover = max(s.turnover, abs(s.work), s.lost, abs(s.stored + s.kinetic - s.start))
+        s.turnover = max(s.turnover, s.kinetic, abs(s.kinetic - s.moving), abs(s.stored - (s.start - s.moving)))
+        s.gap, s.made = max(s.gap, abs(gap)), gap
+        s.closure = max(s.closure, self.model.motion.closure_error(point.state))
+
+    @property
+    def overflown(self) -> bool:
+        """Whether energies are larger than all numbers."""
+        s = self.sums
+        return not math.isfinite(s.work + s.lost + s.made)
+
+    @property
+    def nonsense(self) -> str:
+        """What is wrong with a run whose method makes energy from nothing, a large share of all; empty if none is."""
+        s = self.sums
+        if not (self.lawful and s.entered >= OFTEN and s.made > _ABSURD * s.turnover):
+            return ""
+        if (s.moved < _VISIBLE * self.reach).all() or s.made < _ROUND_OFF * abs(s.start):
+            return ""
+        return f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
+
+    @property
+    def unresolved(self) -> str:
+        """What the books say against a motion that has reached its end; empty if they can stand behind it.
+
+        They have missed a large share of what was turned over, and the method's own damping is not why: that takes
+        energy and gives none back, so that the largest gap is the last.
+        """
+        s = self.sums
+        damped = s.made < 0.0 and -s.made >= _MOSTLY * s.gap
+        if not self._doubtful(_UNRESOLVED) or damped:
+            return ""
+        return f"the energy books missed {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the books say against a motion that goes on: they miss a visible share of what was turned over."""
+        s = self.sums
+        if not self._doubtful(_DOUBTFUL):
+            return (*self._stiff, *self._made)
+        return (
+            *self._stiff,
+            f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is "
+            f"{'not' if self.residual > _UNRESOLVED else 'poorly'} resolved; take smaller steps or a smaller Tolerance",
+        )
+
+    @property
+    def _stiff(self) -> tuple[str, ...]:
+        """What is to be said of lines so stiff that the last digits of places are felt in a motion that is seen."""
+        if not self.lawful:
+            return ()
+        unsure, gone = noise(self.model), float((self.sums.moved / self.reach).max(initial=0.0))
+        way = self.model.structure.size * min(gone, 1.0)
+        if unsure * way <= _FELT * self.sums.turnover or not self._seen:
+            return ()
+        name, stiffness = stiffest(self.model)
+        return (
+            f"{name} is so stiff ({stiffness:.3g} N/m) that the last digits of places make forces of {unsure:.2g} N in "
+            f"it, beside about {self.sums.turnover / way:.2g} N that move the machine: its tension is no better than "
+            "that, nor whether it is slack; make it softer, or rigid",
+        )
+
+    @property
+    def _made(self) -> tuple[str, ...]:
+        """What is to be said of motion too small to be seen, yet beyond the tolerance, that the method itself makes."""
+        s = self.sums
+        beyond = (s.moved >= self.slight).any() and s.made >= _ROUND_OFF * abs(s.start)
+        if not (self.lawful and beyond and s.made > _ABSURD * s.turnover):
+            return ()
+        return (
+            f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: it would be nearer to rest "
+            "than it seems; take smaller steps, a smaller Tolerance, or an implicit method",
+        )
+
+    @property
+    def _seen(self) -> bool:
+        """Whether the motion is large enough to be seen."""
+        return bool((self.sums.moved >= _VISIBLE * self.reach).any())
+
+    def _doubtful(self, share: float) -> bool:
+        """Whether the books miss more than a share, in a motion large enough to be seen."""
+        s = self.sums
+        visible = self._seen and s.gap >= _ROUND_OFF * abs(s.start)
+        return bool(self.lawful and self.residual > share and visible)
+
+    @property
+    def residual(self) -> float:
+        """The largest gap over the largest energy turned over; 0 where nothing moves by a tenth of the tolerance."""
+        resting = (self.sums.moved < _RESTING * self.slight).all()
+        return self.sums.gap / self.sums.turnover if self.sums.turnover > 0.0 and not resting else 0.0

@@ -1,0 +1,205 @@
+"""Between the steps: states at any time of a step, and of a whole run."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.methods.local import Local
+from flexctrl.dynamics.steps import Point, Stepper
+from flexctrl.model.plant import Plant
+from flexctrl.model.state import State
+
+__all__ = ["Booked", "Curve", "Dense", "Hermite", "Track", "curves_of"]
+
+
+class Curve(Protocol):
+    """The motion over one step."""
+
+    def at(self, t: float) -> State:
+        """Return the state at a time of the step."""
+
+
+@runtime_checkable
+class Dense(Protocol):
+    """A stepper that knows its motion within a step better than `Hermite` does."""
+
+    def curve(self, before: Any, after: Any) -> Curve:
+        """Return the motion over a step it has taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hermite:
+    """The cubic through places and rates at both ends, in the coordinates from the start of the step.
+
+    Its error over a step of length h is O(h⁴) in places and O(h³) in rates: in places no more than that of a method of
+    up to the fourth order, in rates of up to the third.
+
+    Attributes
+    ----------
+    local : Local
+    start, end : State
+    """
+
+    local: Local
+    start: State
+    end: State
+
+    @cached_property
+    def _ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates at the end, rates at both ends, and what rates have beside those of the coordinates."""
+        h = self.end.t - self.start.t
+        xi = self.local.between(self.start, self.end)
+        first = np.append(self.start.v, np.zeros(len(xi) - len(self.start.v)))
+        last = self.local.rates(self.start, xi, self.end)[0]
+        return xi, h * first, h * last, self.end.v - last[: len(self.end.v)]
+
+    def at(self, t: float) -> State:
+        """Return the state at a time of the step."""
+        h = self.end.t - self.start.t
+        s = (t - self.start.t) / h
+        xi, first, last, turning = self._ends
+        bend, twist = 3.0 * xi - 2.0 * first - last, first + last - 2.0 * xi
+        place = s * (first + s * (bend + s * twist))
+        rate = (first + s * (2.0 * bend + s * 3.0 * twist))[: len(turning)] / h
+        return self.local.place(self.start, place, rate + s * s * turning, t)
+
+    def secant(self) -> State:
+        """Return the middle of the step with its mean rates, which noise in the rates at its ends does not touch."""
+        h = self.end.t - self.start.t
+        middle = self.at(self.start.t + 0.5 * h)
+        return middle.with_(v=self._ends[0][: len(middle.v)] / h)
+
+
+@runtime_checkable
+class Booked(Protocol):
+    """A curve that knows what was turned over on it."""
+
+    def turned_over(self) -> tuple[float, float] | None:
+        """Return the work of the inputs and what was dissipated [J]; None where that is to be integrated."""
+
+
+def curves_of(model: Plant, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:
+    """Return how the motion over a step of a stepper is found: its own way, or `Hermite`."""
+    if isinstance(stepper, Dense):
+        return stepper.curve
+    local = Local(model)
+    return lambda before, after: Hermite(local, before.state, after.state)
+
+
+class Stretched(Protocol):
+    """Steps between two points; ``states`` and ``supplies`` are those after each of them."""
+
+    @property
+    def states(self) -> Sequence[State]: ...
+
+    @property
+    def supplies(self) -> Sequence[Supply]: ...
+
+    @property
+    def before(self) -> Point: ...
+
+    @property
+    def after(self) -> Point: ...
+
+
+class Parted(Protocol):
+    """Steps in parts: the one at a time, and where the last one ends."""
+
+    def part(self, t: float) -> Stretched: ...
+
+    @property
+    def after(self) -> Point: ...
+
+
+class Repeatable(Parted, Protocol):
+    """Many steps that can be done again: where they start, and the bytes it takes to remember."""
+
+    @property
+    def bytes(self) -> float: ...
+
+    @property
+    def start(self) -> Point: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Steps between two points; ``states`` has those after each of them."""
+
+    states: Sequence[State]
+    before: Point
+    after: Point
+
+    @property
+    def supplies(self) -> Sequence[Supply]:
+        return (self.before.supply,) * (len(self.states) - 1) + (self.after.supply,)
+
+    def part(self, t: float) -> Stretch:
+        """The only part."""
+        return self
+
+
+@dataclass
+class Track:
+    """The steps of a run, as far as there is room to keep them.
+
+    Attributes
+    ----------
+    feed : Feed
+    room : float
+        Bytes; a run that needs more keeps nothing.
+    curve : callable
+        (point before, point after) → the motion over that step.
+    """
+
+    feed: Feed
+    room: float
+    curve: Callable[[Point, Point], Curve]
+    used: float = 0.0
+    starts: list[float] = field(default_factory=list)
+    stretches: list[Parted] = field(default_factory=list)
+
+    def keep(self, states: Sequence[State], before: Point, after: Point) -> None:
+        """Keep one step or many."""
+        if self.used > self.room:
+            return
+        self.used += 500.0 + len(states) * (1500.0 + 8.0 * (12 * len(after.state.x) + 5 * after.state.q.size))
+        if self.used > self.room:
+            self.starts, self.stretches = [], []
+            return
+        self.starts.append(before.state.t)
+        self.stretches.append(Stretch(states, before, after))
+
+    def remember(self, ride: Repeatable) -> None:
+        """Keep many steps that can be done again."""
+        if self.used <= self.room:
+            self.used += ride.bytes
+            self.starts.append(ride.start.state.t)
+            self.stretches.append(ride)
+        if self.used > self.room:
+            self.starts, self.stretches = [], []
+
+    def state(self, t: float) -> tuple[State, np.ndarray]:
+        """Return the state and the inputs at a time."""
+        before, after = self._step(self.stretches[max(0, bisect_right(self.starts, t) - 1)].part(t), t)
+        for end in (after, before):
+            if t == end.state.t:
+                return end.state, end.supply.u
+        h = after.state.t - before.state.t
+        state = self.curve(before, after).at(t)
+        share = ((t - before.state.t) / h, h)
+        return state, self.feed.between(before.supply, after.supply, share, state).u
+
+    def _step(self, s: Stretched, t: float) -> tuple[Point, Point]:
+        if len(s.states) == 1:
+            return s.before, s.after
+        ends = [s.before.state, *s.states]
+        i = min(max(1, bisect_right([state.t for state in ends], t)), len(ends) - 1)
+        told = [s.before.supply, *s.supplies]
+        return replace(s.before, state=ends[i - 1], supply=told[i - 1]), replace(s.after, state=ends[i], supply=told[i])

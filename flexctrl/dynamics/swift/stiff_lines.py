@@ -1,0 +1,189 @@
+"""Lines so stiff that steps do not see them give way: how steps over them are solved, and how well they can be.
+
+The force of such a line hangs on the last digits of places. Solved for a step by Newton's method, it is what balances
+accelerations; but with a tangent made elsewhere, a correction along where the line pointed then leaves a share of that
+force across it: (h ω/2)² times the angle between, of the correction itself. So each iteration has a tangent of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.dynamics.alpha.newton import small_enough
+from flexctrl.dynamics.scales import once
+from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
+from flexctrl.model.rounding import DIGITS
+from flexctrl.structure.drives import Winch
+from flexctrl.structure.lines import Rope, Spring
+
+__all__ = ["SHORT", "STIFF", "SURE", "TURNING", "Caution", "firmest", "noise", "stiffest", "told_by_differences"]
+
+STIFF = 10.0
+"""Radians of its vibration against the masses at its ends in a step that a line is stiff from on."""
+SURE = 1e-11
+"""Size of the last correction of steps over such lines."""
+
+_HEAVY = 5e5
+"""Mass that a load moves with along a rigid rope over that across it: from where on lines are stiff as ropes are, and
+up to where differences of forces, right to eight digits, make a tangent."""
+
+TURNING, SHORT = 0.5, 1.0 / 64.0
+"""Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
+shortened by that share from then on."""
+
+Line = Rope | Spring | Winch
+
+
+@dataclass
+class Caution:
+    """How Newton's iterations over stiff lines go; the compiled loops do the same.
+
+    Attributes
+    ----------
+    enough : float
+        Size of the last correction.
+    short : float
+        By what share corrections are shortened.
+    """
+
+    enough: float
+    short: float = 0.0
+
+    def over(self, size: float, contraction: float, iteration: int) -> bool:
+        """Tell whether a correction was the last; that is never a short one.
+
+        What goes back and forth between a slack rope and a taut one goes a little less far from then on.
+        """
+        if small_enough(size, contraction, self.enough):
+            last = not self.short
+            self.short = 0.0
+            return last
+        if contraction > TURNING and iteration > 1:
+            self.short = SHORT
+        return False
+
+
+def firmest(model: Plant) -> float:
+    """Return the highest frequency of a line against the masses at its ends [rad/s]; 0 where none turns.
+
+    Infinite where a rigid rope hangs from a motor beside whose inertia its load is nothing.
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    float
+    """
+    wall = np.inf if once(model, _spreads).max(initial=0.0) > _HEAVY else 0.0
+    return float(max(once(model, _frequencies).max(initial=0.0), wall))
+
+
+def told_by_differences(model: Plant) -> bool:
+    """Tell whether differences of forces make tangents for loads beside the inertia of motors that they hang from.
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    bool
+    """
+    return bool(once(model, _spreads).max(initial=0.0) <= _HEAVY)
+
+
+def _spreads(model: Plant) -> np.ndarray:
+    """The mass with which a rigid rope's end moves along it over that across, for each winch, shape (winches,)."""
+    if not (isinstance(model, Model) and model.large):
+        return np.zeros(0)
+    winches = [d for d in model.structure.drives if isinstance(d, Winch) and not model.bends(d)]
+    if not winches:
+        return np.zeros(0)
+    still = np.zeros(model.n)
+    mass = -model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs)))
+    moves, found = sp.csr_matrix(model.motion.jacobian(model.rest)), []
+    for winch in winches:
+        first = 6 * model.structure.number(winch.node)
+        own = np.unique(moves[first : first + 3].indices)
+        spread = np.linalg.eigvalsh(mass[own][:, own].toarray()) if own.size else np.ones(1)
+        found.append(spread[-1] / max(spread[0], spread[-1] / np.finfo(float).max))
+    return np.array(found)
+
+
+def _frequencies(model: Plant) -> np.ndarray:
+    """Frequencies of the lines as drawn, each as if the others let go, shape (lines,)."""
+    lines = _lines(model)
+    if not (lines and isinstance(model, Model)):
+        return np.zeros(0)
+    still = np.zeros(model.n)
+    slope = model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs)))
+    mass = -slope.diagonal()
+    pulls = _pulls(model, lines) @ model.motion.jacobian(model.rest)
+    light = mass <= model.dust
+    mobility = np.where(light, 0.0, 1.0 / np.where(light, 1.0, mass))
+    return np.sqrt(pulls.power(2) @ mobility * [_stiffness(line) for line in lines])
+
+
+def _lines(model: Plant) -> tuple[Line, ...]:
+    """What pulls along a line between two nodes and turns with it: nothing in small motion."""
+    if not (isinstance(model, Model) and model.large):
+        return ()
+    parts = (*model.structure.elements, *model.structure.drives)
+    return tuple(p for p in parts if isinstance(p, Spring) or (isinstance(p, Rope | Winch) and model.bends(p)))
+
+
+def _stiffness(line: Line) -> float:
+    """Stiffness as drawn [N/m]."""
+    return line.stiffness if isinstance(line, Rope | Spring) else line.EA / line.length
+
+
+def _pulls(model: Model, lines: tuple[Line, ...]) -> sp.csr_matrix:
+    """How each raw coordinate lengthens each line, shape (lines, raw)."""
+    rows, columns, values = [], [], []
+    for i, line in enumerate(lines):
+        nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
+        first, second = (model.structure.number(node) for node in nodes)
+        arm = model.rest.x[second] - model.rest.x[first]
+        arm = arm / np.linalg.norm(arm)
+        columns += [6 * end + k for end in (second, first) for k in range(3)]
+        values += [*arm.tolist(), *(-arm).tolist()]
+        if isinstance(line, Winch):
+            columns.append(model.motion.source_base + model.structure.drives.index(line))
+            values.append(-1.0 / line.effective_ratio)
+        rows += [i] * (7 if isinstance(line, Winch) else 6)
+    return sp.csr_matrix((values, (rows, columns)), shape=(len(lines), model.motion.raw))
+
+
+def stiffest(model: Plant) -> tuple[str, float]:
+    """Return the name and the stiffness [N/m] of the stiffest line; 0 for none.
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    str, float
+    """
+    return max(((p.name, _stiffness(p)) for p in _lines(model)), key=lambda found: found[1], default=("", 0.0))
+
+
+def noise(model: Plant) -> float:
+    """Return what force the last digits of places make in the stiffest line [N].
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    float
+    """
+    reach = max(model.structure.size, float(np.abs(model.rest.x).max(initial=0.0)))
+    return DIGITS * stiffest(model)[1] * reach
