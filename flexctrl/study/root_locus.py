@@ -237,11 +237,11 @@ def _on_response(loop: Loop, most: float) -> list[CriticalGain]:
 
 
 def _at_zero(loop: Loop) -> tuple[Crossing, ...]:
-    """The crossing of a real pole through s = 0 (z = 1)."""
-    if loop.at_rest(loop.poles).any():
+    """The crossing of a real pole through s = 0 (z = 1); a zero there leaves of L(0) its rounding."""
+    if not len(loop.poles) or loop.at_rest(loop.poles).any():
         return ()
-    value = float(loop.at(np.zeros(1))[0].real)
-    return (Crossing(0.0, -1.0 / value),) if value < 0.0 else ()
+    value, nearby = loop.at(np.array([0.0, 0.1 * _slowest(loop)]))
+    return (Crossing(0.0, -1.0 / float(value.real)),) if value.real < -NOISE * abs(nearby) else ()
 
 
 def _slowest(loop: Loop) -> float:

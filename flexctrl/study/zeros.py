@@ -117,6 +117,7 @@ def deflated_zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -
     """
     if not len(A):
         return np.zeros(0, complex)
+    speed = float(np.linalg.norm(A, 2)) or 1.0
     A, B, C, D = _unit_gains(A, B, C, D)
     tol = 1e-12 * float(np.linalg.norm(np.block([[A, B], [C, D]]), 2))
     A, B, C, D = _deflated(A, B, C, D, tol)
@@ -127,7 +128,7 @@ def deflated_zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -
         return np.asarray(eigvals(A)) if n else np.zeros(0, complex)
     kernel = qr(np.hstack([C, D]).T)[0][:, len(D) :]
     alpha, beta = eig(np.hstack([A, B]) @ kernel, kernel[:n], right=False, homogeneous_eigvals=True)
-    finite = abs(beta) > 1e-13 * abs(alpha) / np.linalg.norm(A, 2)
+    finite = abs(beta) * speed > 1e-13 * abs(alpha)
     return np.asarray(alpha[finite] / beta[finite])
 
 

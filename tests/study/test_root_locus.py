@@ -104,6 +104,23 @@ def test_sixty_states_agree_with_python_control_and_a_hundred_and_thirty_do_not(
         ct.root_locus_map(ct.ss(large.A, large.B, large.C, large.D), gains=[1.0, 3.0])
 
 
+@pytest.mark.parametrize("rest", [0.0, 1e-16, -1e-16])
+def test_what_rounding_leaves_of_a_zero_at_rest_is_no_critical_gain(rest):
+    """A washout's states are made by SLICOT or scipy; the latter leaves L(0) = ∓1e-16, no gain of 1e16."""
+    loop = open_loop(ct.ss([[0, 1], [-4, -0.4]], [[0], [1]], [[rest, 1]], [[0]]), ct.ss([[-3]], [[1]], [[1]], [[0]]))
+    assert root_locus(loop).critical == ()
+    assert root_locus(loop).gains[-1] < 1e6
+    assert abs(loop.zeros).min() < 1e-12
+
+
+def test_a_static_gain_turned_about_is_critical_at_rest():
+    """1 − k/4 = 0: however small its static gain is beside its peak, a pole passes s = 0."""
+    for static in (1.0, 1e-6):
+        loop = open_loop(ct.ss(ct.tf([1.0, -static], [1, 0.4, 4])))
+        (found,) = (c for c in root_locus(loop).critical if c.omega == 0)
+        assert found.gain == pytest.approx(4 / static)
+
+
 @pytest.mark.slow
 def test_critical_gains_of_a_flexible_loop_are_its_gain_margins():
     """Two independent routes: eigenvalues over the gain, and crossings of the frequency response."""
