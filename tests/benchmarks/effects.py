@@ -17,7 +17,7 @@ import flexctrl as fc
 from flexctrl.effects.effect import Effect
 
 ROOT = Path(__file__).resolve().parents[2]
-STEP, STEPS, REPEATS = 1e-3, (1000, 5000), 7
+STEP, STEPS, REPEATS = 1e-3, (1000, 15_000), 11
 PAGE = """# What each effect costs
 
 <!-- Made by `python tests/benchmarks/effects.py --page` -->
