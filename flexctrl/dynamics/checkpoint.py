@@ -22,7 +22,7 @@ from flexctrl.errors import StructureError
 from flexctrl.model.plant import Plant
 from flexctrl.structure.freedoms import check_path, check_seconds
 
-__all__ = ["Autosave", "Checkpoint", "load_checkpoint", "machine_of"]
+__all__ = ["Autosave", "Checkpoint", "check_same", "load_checkpoint", "machine_of"]
 
 _FORMAT = 9
 _HOUSE = "flexctrl."
@@ -170,6 +170,26 @@ class Autosave:
     def __post_init__(self) -> None:
         check_path(self.path, "Autosave")
         check_seconds(self.seconds, "seconds", "Autosave", endless=True)
+
+
+def check_same(what: str, now: object, before: object) -> None:
+    """Raise where a run is asked for another way than the one that its checkpoint was taken from.
+
+    Parameters
+    ----------
+    what : str
+        What of it, in words.
+    now, before : object
+        Here, and there.
+
+    Raises
+    ------
+    StructureError
+    """
+    if now != before:
+        raise StructureError(
+            f"simulate: the checkpoint is of another {what} ({before} there, {now} here); give what the run had"
+        )
 
 
 def machine_of(model: Plant) -> str:

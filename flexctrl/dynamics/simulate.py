@@ -12,7 +12,7 @@ import numpy as np
 from flexctrl.dynamics.alpha.first_step import first_step
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha
 from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
-from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
+from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same, machine_of
 from flexctrl.dynamics.events.event import Event
 from flexctrl.dynamics.events.nearing import SMALLEST
 from flexctrl.dynamics.events.watch import Watch
@@ -131,13 +131,16 @@ def simulate(
     plan = Plan(
         plant, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, tell, autosave, time.perf_counter()
     )
+    watch = _watch(plan, events_of(events))
+    if isinstance(start, Checkpoint):
+        _check_going_on(plan, start, watch, spacing)
     stepper = plan.method.stepper(plant, feed, plan.tolerance)
     curve = curves_of(plant, stepper)
     recorder = record.start((*plant.outputs, *plant.inputs), start.rows if isinstance(start, Checkpoint) else 0)
     try:
         rows = Rows(feed, spacing, until, recorder, curve)
         track = Track(feed, record.states, curve)
-        return _run(plan, stepper, start, events_of(events), rows, track)
+        return _run(plan, stepper, start, watch, rows, track)
     finally:
         recorder.close()
         if isinstance(stepper, Reusable):
@@ -178,11 +181,10 @@ def _run(
     plan: Plan,
     stepper: Stepper[Any],
     start: State | Rest | Checkpoint | None,
-    events: tuple[Event, ...],
+    watch: Watch,
     rows: Rows,
     track: Track,
 ) -> Run:
-    watch = _watch(plan, events)
     try:
         if isinstance(start, Checkpoint):
             journey = _resumed(plan, stepper, start, watch, rows, track)
@@ -242,23 +244,20 @@ def _first(plan: Plan, pace: Controlled, state: State, supply: Supply, span: flo
     return min(pace.first, pace.largest)
 
 
+def _check_going_on(plan: Plan, start: Checkpoint, watch: Watch, every: float | None) -> None:
+    """Raise unless a run goes on as it was; its controller is asked later, on a model that is its own."""
+    check_same("model", machine_of(plan.model), start.machine)
+    check_same("method", repr(plan.method), start.method)
+    check_same("tolerance", plan.tolerance, start.tolerance)
+    check_same("number of events", watch.count if start.passed != UNASKED else 0, len(start.sides))
+    check_same("spacing of rows (every)", every, start.every)
+
+
 def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch, rows: Rows, track: Track) -> Journey:
     """A run that goes on."""
-    asked = start.passed != UNASKED
-    for what, now, before in (
-        ("model", machine_of(plan.model), start.machine),
-        ("method", repr(plan.method), start.method),
-        ("tolerance", plan.tolerance, start.tolerance),
-        ("controller", len(plan.feed.first(start.point.state).x) if asked else 0, len(start.point.supply.x)),
-        ("number of events", watch.count if asked else 0, len(start.sides)),
-        ("spacing of rows (every)", rows.every, start.every),
-    ):
-        if now != before:
-            raise StructureError(
-                f"simulate: the checkpoint is of another {what} ({before} there, {now} here); give what the run had"
-            )
-    if not asked:
+    if start.passed == UNASKED:
         return _begun(plan, stepper, start.point.state, watch, rows, track)
+    check_same("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x))
     stepper.recall(start.memory)
     stepper.counts.take(start.counts)
     watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from long_running import Servo, arm
 
 import flexctrl as fc
 from flexctrl.errors import MechanismError, StructureError
@@ -125,6 +126,32 @@ def test_a_run_goes_on_as_it_was_asked_for_and_not_backwards(model):
     with pytest.raises(StructureError, match=r"another spacing of rows \(every\) \(None there, 0.05 here\)"):
         fc.simulate(model, until=0.2, start=stopped, every=0.05)
     assert fc.simulate(model, until=0.2, start=stopped).status is fc.Status.FINISHED
+
+
+class Unasked:
+    """A law that must not be asked."""
+
+    inputs, outputs, sample_time = ("angle", "speed"), ("torque",), 1e-3
+
+    def initial(self):
+        raise AssertionError("asked")
+
+
+INNER = [fc.MotorLag({"motor": 0.05}), fc.LuGreFriction({"motor": fc.LuGre(1e3, 0.2)})]
+
+
+@pytest.mark.parametrize("effect", INNER, ids=lambda e: type(e).__name__)
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-3)], ids=lambda m: type(m).__name__)
+def test_a_checkpoint_of_another_model_is_told_before_anything_is_asked_or_written(tmp_path, effect, method):
+    """Models with and without freedoms of an effect's own, the law and its signals the same; so is what is written."""
+    models, stream = (arm(effect), arm()), fc.CsvStream(tmp_path / "rows.csv")
+    for one, other in (models, models[::-1]):
+        how = {"method": method, "record": stream}
+        half = fc.simulate(one, Servo(), until=0.01, **how)
+        written = stream.path.read_bytes()
+        with pytest.raises(StructureError, match="the checkpoint is of another model"):
+            fc.simulate(other, Unasked(), until=0.02, start=half.checkpoint, **how)
+        assert stream.path.read_bytes() == written
 
 
 @pytest.mark.parametrize("speed", [1e200, -1e60, 1e49, 1e20])
