@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from flexctrl.cli.progress import Pace, progress
+from flexctrl.cli.progress import Pace, progress, spoken
 
 
 def test_the_time_left_follows_from_what_was_done():
@@ -38,3 +38,20 @@ def test_a_log_shows_life_every_ten_seconds(monkeypatch, capsys):
         "crane: cost: 26 % done, 37 s left",
         "crane: cost: 50 % done, 25 s left",
     ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.0, "0 s"), (99.6, "100 s"), (150.0, "2 min"), (9000.0, "2 h"), (5e5, "6 days"), (1e300, "over 1000 days")],
+)
+def test_a_time_to_wait_is_told_in_a_unit_one_would_say_it_in(seconds, words):
+    assert spoken(seconds) == words
+
+
+def test_a_run_without_an_end_in_sight_is_told_in_few_letters(monkeypatch, capsys):
+    clock = iter([0.0, 1.0, 20.0])
+    monkeypatch.setattr("flexctrl.cli.progress.time.monotonic", lambda: next(clock))
+    with progress("crane") as tell:
+        tell(0.0)
+        tell(1e-300)
+    assert capsys.readouterr().err == "crane: 0 % done, over 1000 days left\n"

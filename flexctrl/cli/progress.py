@@ -16,6 +16,10 @@ _SILENT = 10.0
 """Between lines of a log, and before the first [s]."""
 _AT_ONCE = 5e-3
 """Within this, what is told was known before [s]."""
+_SPANS = ((1.0, "s"), (60.0, "min"), (3600.0, "h"), (86400.0, "days"))
+"""Units that a time to wait is told in, from two of them on [s]."""
+_LONGEST = 1000 * 86400.0
+"""What will take longer is not told any closer [s]."""
 
 
 @dataclass
@@ -90,7 +94,25 @@ def _lines(what: str) -> Progress:
 
 
 def _told(left: float) -> str:
-    return f", {left:.0f} s left" if math.isfinite(left) else ""
+    return f", {spoken(left)} left" if math.isfinite(left) else ""
+
+
+def spoken(seconds: float) -> str:
+    """Return a time to wait in the unit one would say it in.
+
+    Parameters
+    ----------
+    seconds : float
+
+    Returns
+    -------
+    str
+        ``"25 s"``, ``"12 min"``, ``"5 h"``, ``"3 days"``, at most ``"over 1000 days"``.
+    """
+    if seconds > _LONGEST:
+        return f"over {_LONGEST / _SPANS[-1][0]:.0f} days"
+    span, word = next((span, word) for span, word in reversed(_SPANS) if seconds >= 2 * span or span == 1.0)
+    return f"{seconds / span:.0f} {word}"
 
 
 @contextmanager
@@ -100,7 +122,7 @@ def _bar(what: str) -> Iterator[Progress]:
     def tell(done: float) -> None:
         full = round(_WIDTH * min(max(done, 0.0), 1.0))
         left = pace.left(done, time.monotonic())
-        told = f"  {left:5.0f} s left" if math.isfinite(left) else ""
+        told = f"  {spoken(left):>7} left" if math.isfinite(left) else ""
         bar = "█" * full + "·" * (_WIDTH - full)
         sys.stderr.write(f"\r{what} {bar} {100 * done:3.0f} %{told}\033[K")
         sys.stderr.flush()
@@ -112,4 +134,4 @@ def _bar(what: str) -> Iterator[Progress]:
         sys.stderr.flush()
 
 
-__all__ = ["Pace", "progress"]
+__all__ = ["Pace", "progress", "spoken"]

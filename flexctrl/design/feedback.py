@@ -101,13 +101,40 @@ def pid(kp: float, ki: float, kd: float, *, measured: str, rate: str | FilteredR
     -------
     control.StateSpace
         Continuous; its states are ``integral`` and ``filtered``, as far as needed.
+
+    Raises
+    ------
+    ControllerError
+        If the rate is the measured signal itself, or a gain is no finite number.
     """
     require_finite("pid: gain", kp, ki, kd)
+    check_rate(measured, rate, "pid")
     if isinstance(rate, FilteredRate):
         # With the filtered signal z, T ż = y − z, the filtered rate is (y − z)/T.
         slow = [("filtered", -1 / rate.time, 1 / rate.time, kd / rate.time)] if kd else []
         return _law(_integral(ki) + slow, [[-kp - kd / rate.time]], [measured], command)
     return _law(_integral(ki), [[-kp, -kd]], [measured, rate], command)
+
+
+def check_rate(measured: str, rate: str | FilteredRate, owner: str) -> None:
+    """Raise if the signal of the rate is the measured one itself.
+
+    Parameters
+    ----------
+    measured : str
+    rate : str or FilteredRate
+    owner : str
+        The law, for the message.
+
+    Raises
+    ------
+    ControllerError
+    """
+    if rate == measured:
+        raise ControllerError(
+            f"{owner}: rate = {rate!r} is the measured signal itself; give the signal of its rate, "
+            "or the time constant of a filter that makes it (in Python: FilteredRate)"
+        )
 
 
 def state_feedback(gain: np.ndarray, plant: Any) -> Any:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flexctrl.design.controller import Controller, LinearController, as_controller
-from flexctrl.design.feedback import FilteredRate, pid, state_feedback
+from flexctrl.design.feedback import FilteredRate, check_rate, pid, state_feedback
 from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
 from flexctrl.design.optimal import bryson, lqr
 from flexctrl.design.piecewise import Constant, PiecewisePolynomial, Trajectory, simplified
@@ -116,6 +116,9 @@ class PID(Law):
     rate: str | FilteredRate = field(default_factory=lambda: FilteredRate(0.01))
     reference: Reference | None = None
     limit: float = np.inf
+
+    def __post_init__(self) -> None:
+        check_rate(self.measured, self.rate, "PID")
 
     def build(self, scene: Scene) -> Controller:
         """Return the law."""

@@ -27,6 +27,7 @@ from flexctrl.scene.reading import (
     flag,
     keys,
     known,
+    legal_name,
     mapping,
     number,
     one_of,
@@ -115,21 +116,22 @@ def scene_from(content: Mapping[str, Any], place: Place, name: str) -> Scene:
     Scene
     """
     keys(content, place, dict.fromkeys(_KEYS, lambda value, where: value))
-    title = text(content.get("name", _legal(name)), place.at("name"))
+    title = legal_name(content.get("name", _legal(name)), place.at("name"))
     base = parts.machine(content["machine"], place.at("machine")) if "machine" in content else None
     structure = parts.structure(content, place, title, base)
     inputs, outputs = ([signal.name for signal in side] for side in (structure.inputs, structure.outputs))
     driven = known("input", inputs)
     rests = {"hold": mapping(number), "inputs": by_name(driven, number)}
     rest = keys(content.get("equilibrium", {}), place.at("equilibrium"), rests)
+    moves = laws.moves(content.get("moves", {}), place.at("moves"))
     channel = Kind(Channel, {"input": driven, "output": known("output", outputs)})
     notes = several(text)(content.get("notes", []), place.at("notes"))
     scene = checked(
         lambda: Scene(
             structure=structure,
             effects=physics.effects(content.get("effects", {}), place.at("effects"), structure),
-            controller=laws.controller(content, place, structure),
-            loads=by_name(driven, _load)(content.get("loads", {}), place.at("loads")),
+            controller=laws.controller(content, place, structure, moves),
+            loads=by_name(driven, laws.load(moves))(content.get("loads", {}), place.at("loads")),
             simulation=_simulation(content["simulation"], place.at("simulation")) if "simulation" in content else None,
             hold=rest.get("hold", {}),
             rest_inputs=rest.get("inputs", {}),
@@ -174,11 +176,6 @@ def _legal(name: str) -> str:
     """A file's stem as a name."""
     word = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
     return word if word[:1].isalpha() else f"scene_{word}"
-
-
-def _load(value: Any, place: Place) -> Any:
-    """Read a constant load, or one that moves."""
-    return laws.move(value, place).times(1.0) if isinstance(value, Mapping) else number(value, place)
 
 
 def _simulation(value: Any, place: Place) -> Simulation:

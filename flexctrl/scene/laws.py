@@ -18,6 +18,7 @@ from flexctrl.design.trajectories import (
     TimeOptimalPendulum,
     TrapezoidalVelocity,
 )
+from flexctrl.errors import did_you_mean
 from flexctrl.scene.control import PID, Controlled, Gains, Hardware, Move, Reference, StateFeedback, Transfer
 from flexctrl.scene.reading import (
     Kind,
@@ -94,8 +95,40 @@ def _shaper(value: Any, place: Place) -> Shaper:
     return of_kind(value, place, SHAPERS)
 
 
-def controller(content: Mapping[str, Any], place: Place, machine: Structure) -> Controlled | None:
-    """Read the tables ``moves``, ``controllers`` and ``hardware``.
+moves = mapping(move)
+"""Reader of the table ``moves``."""
+
+
+def load(moves: Mapping[str, Move]) -> Reader:
+    """Return the reader of a load: a number (constant), the name of a move, or a table of one's kind.
+
+    Parameters
+    ----------
+    moves : mapping of str to Move
+        Those that have names.
+
+    Returns
+    -------
+    callable
+    """
+
+    def read(value: Any, place: Place) -> Any:
+        if isinstance(value, str) and value not in moves:
+            raise place.refuse(
+                f"there is no move {value!r}; a load is a number, the name of one of the [moves], "
+                f"or a table {{ kind = … }} as there{did_you_mean(value, moves)}"
+            )
+        if isinstance(value, str):
+            return moves[value].times(1.0)
+        return move(value, place).times(1.0) if isinstance(value, Mapping) else number(value, place)
+
+    return read
+
+
+def controller(
+    content: Mapping[str, Any], place: Place, machine: Structure, moves: Mapping[str, Move]
+) -> Controlled | None:
+    """Read the tables ``controllers`` and ``hardware``.
 
     Parameters
     ----------
@@ -105,6 +138,8 @@ def controller(content: Mapping[str, Any], place: Place, machine: Structure) -> 
         The file.
     machine : Structure
         Whose signals and drives may be named.
+    moves : mapping of str to Move
+        What may be followed.
 
     Returns
     -------
@@ -116,7 +151,6 @@ def controller(content: Mapping[str, Any], place: Place, machine: Structure) -> 
     SceneError
         Naming table, key and what was expected.
     """
-    moves = mapping(move)(content.get("moves", {}), place.at("moves"))
     kinds = _law_kinds(moves, machine)
     read = several(lambda item, where: of_kind(item, where, kinds))
     laws = read(content.get("controllers", []), place.at("controllers"))
@@ -192,4 +226,4 @@ def _reference(moves: Mapping[str, Move], drives: Reader) -> Reader:
     return read
 
 
-__all__ = ["MOVES", "SHAPERS", "controller", "move"]
+__all__ = ["MOVES", "SHAPERS", "controller", "load", "move", "moves"]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from flexctrl.errors import FlexctrlError, SceneError, did_you_mean, shortened
+from flexctrl.structure.freedoms import LEGAL, check_name
 
 T = TypeVar("T")
 
@@ -51,8 +52,10 @@ Reader = Callable[[Any, Place], Any]
 
 def number(value: Any, place: Place) -> float:
     """Read a finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float):
         raise place.expected("a number", value)
+    if not math.isfinite(value):
+        raise place.expected("a finite number", value)
     return float(value)
 
 
@@ -82,6 +85,14 @@ def text(value: Any, place: Place) -> str:
     if not isinstance(value, str):
         raise place.expected("a text in quotes", value)
     return value
+
+
+def legal_name(value: Any, place: Place) -> str:
+    """Read a name that python-control accepts."""
+    try:
+        return check_name(value, "")
+    except FlexctrlError:
+        raise place.expected(LEGAL, value) from None
 
 
 def table(value: Any, place: Place) -> Mapping[str, Any]:

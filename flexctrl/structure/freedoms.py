@@ -26,6 +26,10 @@ _INDEX = {name: i for i, name in enumerate(FREEDOMS)} | {name: i for i, name in 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _AXIS_HINT = "; u v w are displacements along x y z, rx ry rz rotations about them"
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+LEGAL = (
+    "ASCII letters, digits and underscores, a letter or an underscore first (python-control allows no dots or blanks)"
+)
+"""What a name is, in words."""
 
 HUGE = 1e50
 """Numbers from here on are refused: powers of them would overflow."""
@@ -78,10 +82,7 @@ def parse_point(point: Sequence[float], owner: str) -> Vector:
 def check_name(name: str, kind: str) -> str:
     """Return ``name`` if it is an identifier: signal names must be legal for python-control."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise StructureError(
-            f"{kind} {name!r}: a name is letters, digits and underscores and starts with a letter "
-            "(python-control allows no dots or blanks)"
-        )
+        raise StructureError(f"{kind}: name = {shortened(name)}; expected {LEGAL}")
     return name
 
 
@@ -134,10 +135,11 @@ def check_finite(value: float, what: str, owner: str, *, least: float = -math.in
 
 
 def check_seconds(value: float, what: str, owner: str, *, endless: bool = False) -> float:
-    """Return ``value`` as a float if it is a time above zero, which may be infinite if ``endless``."""
+    """Return ``value`` as a float if it is a time above zero, which may be endless (infinite) if ``endless``."""
     seconds = _number(value)
-    if not seconds > 0.0 or (math.isinf(seconds) and not endless):
-        raise StructureError(f"{owner}: {what} = {shortened(value)}; expected seconds > 0")
+    if not seconds > 0.0 or (seconds >= HUGE and not endless):
+        bound = f" below {HUGE:g}" if seconds > 0.0 else ""
+        raise StructureError(f"{owner}: {what} = {shortened(value)}; expected seconds > 0{bound}")
     return seconds
 
 

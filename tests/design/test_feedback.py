@@ -61,6 +61,11 @@ def test_pid_response_is_that_of_its_formula(ki, kd):
         assert pi(kp, ki, measured="angle", command="torque")(s) == pytest.approx(-(kp + ki / s))
 
 
+def test_a_signal_is_not_its_own_rate():
+    with pytest.raises(ControllerError, match="pid: rate = 'angle' is the measured signal itself"):
+        pd(2.0, 0.7, measured="angle", rate="angle", command="torque")
+
+
 def test_pid_with_a_measured_rate_adds_only_the_integrator():
     law = pid(2.0, 3.0, 0.7, **NAMES)
     np.testing.assert_allclose(law(2j), [[-(2.0 + 3.0 / 2j), -0.7]])

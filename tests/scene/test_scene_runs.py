@@ -18,6 +18,16 @@ def test_loads_push_beside_the_controller(written):
     assert np.abs(run["torque"]).max() > 0.0
 
 
+def test_a_load_that_names_a_move_is_the_move(written):
+    """With its shaper: the same run as with the move written out."""
+    shaped = '{ kind = "ramp", slope = 10.0, duration = 0.08, shaper = { kind = "zv", omega = 30.0 } }'
+    named = load_scene(written(TROLLEY.replace("[moves]", f"[moves]\nhop = {shaped}") + '\n[loads]\npush = "hop"\n'))
+    spelled = load_scene(written(TROLLEY + f"\n[loads]\npush = {shaped}\n"))
+    run = named.run()
+    assert run["push"][-1] == pytest.approx(0.8)
+    assert (run["push"] == spelled.run()["push"]).all()
+
+
 def test_a_run_that_starts_in_equilibrium_stays_there_without_a_move(written):
     text = TROLLEY.replace("distance = 0.5", "distance = 0.0")
     run = load_scene(written(text)).run()

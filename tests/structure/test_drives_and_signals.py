@@ -47,7 +47,7 @@ def test_drive_data_are_numbers(name, value):
         (lambda: rotary(node="beam"), "RotaryDrive 'slew': 'beam' is no node"),
         (lambda: rotary(against=3), "3 is no node"),
         (lambda: rotary(node=ROPE.end), "node 1 of rope has no rotations to drive"),
-        (lambda: rotary(name="slew motor"), "a name is letters"),
+        (lambda: rotary(name="slew motor"), "RotaryDrive: name = 'slew motor'; expected ASCII letters"),
         (lambda: linear(radius=0.0), "LinearDrive 'travel': radius = 0.0; expected a number > 0"),
         (lambda: linear(radius="0.5"), "radius = '0.5'"),
         (lambda: linear(direction=()), "expected three finite numbers"),
@@ -71,7 +71,7 @@ def test_drives_and_lines_may_be_named_or_given():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: fc.Force("a.b", BEAM.end, "x"), r"Force 'a.b': a name is letters"),
+        (lambda: fc.Force("a.b", BEAM.end, "x"), r"Force: name = 'a.b'; expected ASCII letters"),
         (lambda: fc.Force("push", [], "x"), "Force 'push': names no node"),
         (lambda: fc.Force("push", 5, "x"), "Force 'push': 5 is no node"),
         (lambda: fc.Force("push", [BEAM.end, "tip"], "x"), "'tip' is no node"),

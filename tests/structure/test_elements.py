@@ -134,7 +134,7 @@ def test_places_are_three_finite_numbers(place):
 @pytest.mark.parametrize("name", ["", "a b", "a.b", "1a", "ä", "a\n", None, 5, ("a",)])
 def test_names_are_identifiers(name):
     for make in (lambda: beam(name=name), lambda: body(name=name), lambda: body(points={name: (0, 0, 0)})):
-        with pytest.raises(StructureError, match="a name is letters, digits and underscores"):
+        with pytest.raises(StructureError, match="expected ASCII letters, digits and underscores"):
             make()
 
 

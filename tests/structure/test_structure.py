@@ -164,7 +164,7 @@ def test_the_node_of_an_equal_part_is_as_good():
         (A, [], {}, "Structure: elements = .*; expected a list"),
         ([A], CLAMP, {}, "Structure: joints = .*; expected a list"),
         ("abc", [], {}, "elements = 'abc'; expected a list"),
-        ([A], [], {"name": "my crane"}, "Structure 'my crane': a name is letters"),
+        ([A], [], {"name": "my crane"}, "Structure: name = 'my crane'; expected ASCII letters"),
     ],
 )
 def test_impossible_structures_are_refused(elements, joints, rest, message):
