@@ -128,12 +128,13 @@ def test_a_run_goes_on_as_it_was_asked_for_and_not_backwards(model):
     assert fc.simulate(model, until=0.2, start=stopped).status is fc.Status.FINISHED
 
 
-class Unasked:
+class Unasked(Servo):
     """A law that must not be asked."""
 
-    inputs, outputs, sample_time = ("angle", "speed"), ("torque",), 1e-3
-
     def initial(self):
+        raise AssertionError("asked")
+
+    def command(self, t, x, y):
         raise AssertionError("asked")
 
 
