@@ -152,6 +152,10 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
 class Autosave:
     """Checkpoints written while a run goes on, each replacing the one before.
 
+    The first is written ``seconds`` after the run has begun; one that ends sooner writes none. The clock is looked at
+    between steps, or between stretches of those that compiled loops take at once. A file takes some milliseconds to
+    write: a run that is to save more often does little else.
+
     Parameters
     ----------
     path : str or Path

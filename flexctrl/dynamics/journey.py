@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ from flexctrl.model.state import State
 __all__ = ["Journey", "Plan"]
 
 _FORESEEN = 20_000
+_SECONDS = 0.1
 
 
 @dataclass(frozen=True)
@@ -172,9 +174,13 @@ class Journey:
                 where = f"at t = {self.point.state.t:.6g} s; {self._remedy}"
                 raise StepError(self.stepper.counts.worst, f"{nonsense} {where}")
             self._look_back()
-            if (now := time.perf_counter()) - self._told > 0.1:
+            if (now := time.perf_counter()) - self._told > _SECONDS:
                 self._told = now
-                self._report(now)
+                self.plan.tell(self.point.state.t / self.plan.until)
+                self._foresee()
+            if self.plan.autosave is not None and now - self._kept > self.plan.autosave.seconds:
+                self._kept = now
+                self._keep(self.plan.autosave.path)
             interruption.check()
 
     def _look_back(self) -> None:
@@ -219,15 +225,17 @@ class Journey:
             return smaller
         return f"{smaller}, or ConservingMidpoint({pace.step:g}), which keeps energies of springs in such steps"
 
-    def _report(self, now: float) -> None:
-        self.plan.tell(self.point.state.t / self.plan.until)
-        self._foresee()
+    @property
+    def glance(self) -> float:
+        """After how long at most a run looks at the clock on the wall [s]."""
         autosave = self.plan.autosave
-        if autosave is not None and now - self._kept > autosave.seconds:
-            self._kept = now
-            self.rows.recorder.flush()
-            with writing(autosave.path):
-                (self.saved or self.snapshot()).save(autosave.path)
+        return _SECONDS if autosave is None else min(_SECONDS, autosave.seconds)
+
+    def _keep(self, path: str | Path) -> None:
+        """Write a checkpoint of where the run stands, and all rows until there."""
+        self.rows.recorder.flush()
+        with writing(path):
+            (self.saved or self.snapshot()).save(path)
 
     def _foresee(self) -> None:
         """Raise StepError if the run would take more steps than it may, at the pace of the latter half of them."""

@@ -217,6 +217,39 @@ def test_the_clock_on_the_wall_has_no_say(name, tmp_path, monkeypatch):
         assert run.report.energy == runs[0].report.energy
 
 
+def _saving(name: str, until: float, folder: Path, seconds: float, monkeypatch) -> list[fc.Checkpoint]:
+    """What a case saves on its way."""
+    found, save = [], fc.Checkpoint.save
+    monkeypatch.setattr(fc.Checkpoint, "save", lambda self, path: found.append(self) or save(self, path))
+    model, controller, method, inputs = CASES[name]
+    how = {"until": until, "method": method, "inputs": inputs, "autosave": fc.Autosave(folder / "autosave", seconds)}
+    fc.simulate(model(), controller() if controller else None, **how)
+    monkeypatch.undo()
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "explicit"])
+def test_a_run_saves_as_often_as_it_is_asked_to_however_short_it_is(name, tmp_path, monkeypatch):
+    """Runs of milliseconds, open and closed loops, in plain steps and in compiled ones, save and go on from there."""
+    saved = _saving(name, 0.05, tmp_path, 1e-9, monkeypatch)
+    assert saved
+    assert 0.0 < saved[0].t <= saved[-1].t < 0.0501
+    if name in ("plain", "sampled_plain", "midpoint"):
+        assert len(saved) == 50  # each step
+    model, controller, method, inputs = CASES[name]
+    law = controller() if controller else None
+    once = fc.simulate(model(), law, until=0.1, method=method, inputs=inputs)
+    last = fc.load_checkpoint(tmp_path / "autosave")
+    assert last.t == saved[-1].t
+    for start in (saved[0], last):
+        rest = fc.simulate(model(), law, until=0.1, method=method, start=start)
+        assert all(np.array_equal(value, ends(rest)[part]) for part, value in ends(once).items())
+
+
+def test_a_run_that_ends_before_its_first_save_writes_none(tmp_path, monkeypatch):
+    assert not _saving("marched", 0.05, tmp_path, 600.0, monkeypatch)
+
+
 def test_a_stream_of_something_else_is_not_gone_on_with(tmp_path):
     half = ran("marched", 0.05, tmp_path, "parts")
     (tmp_path / "marched_parts.csv").write_text("t,other\n0.0,1.0\n")

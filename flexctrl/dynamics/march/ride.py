@@ -41,7 +41,7 @@ _FAR = 100.0
 
 
 def ride(journey: Journey, until: float, most: int | None = None) -> bool:
-    """Take as many steps of a run as can be marched, for about a tenth of a second; tell whether there were any.
+    """Take as many steps of a run as can be marched, until the clock is looked at; tell whether there were any.
 
     They do not go beyond ``until``; where ``most`` is given, there are no more than that, all before the next stop.
 
@@ -99,7 +99,7 @@ class Ride:
 
     def go(self) -> bool:
         """Ride on from stop to stop."""
-        deadline, m = time.perf_counter() + _SECONDS, self.marcher.march
+        deadline, m = time.perf_counter() + min(_SECONDS, self.journey.glance), self.marcher.march
         well = True
         while well and m.t < self.until - self.tick:
             stop = self.journey.stops.next
