@@ -18,6 +18,7 @@ import flexctrl
 from flexctrl.cli import main
 from flexctrl.cli.answer import plain
 from flexctrl.cli.program import COMMANDS
+from flexctrl.scene import load_scene
 
 REPORT = {"scene", "status", "steps", "rejected_steps", "newton_iterations", "wall_s", "dofs", "energy_residual"}
 
@@ -108,6 +109,22 @@ def test_the_table_tells_freedoms_that_effects_add(call, tmp_path):
     assert code == 0
     assert "trolley: 4 degrees of freedom in the join table, 10 under the scene's effects" in out
     assert [line.split()[-2:] for line in out.splitlines() if line.startswith("rope ")] == [["2", "2"]]  # m, kg
+
+
+def test_the_table_tells_the_mass_that_is_in_the_model(call, tmp_path):
+    """The masses of all elements are those that move with the machine, whether ropes have theirs or not."""
+    text = TROLLEY.replace("EA = 2e5 }", "EA = 2e5, rhoA = 1.0 }")
+    note = "note: mass of rope rope, 2 kg, is left out: no effect rope_mass gives it any"
+    for effects, said in (("", True), ("rope_mass = true\n", False)):
+        path = tmp_path / "heavy.toml"
+        path.write_text(text.replace("[effects]\n", f"[effects]\n{effects}"), encoding="utf-8")
+        code, out, _ = call("table", path)
+        assert (code, note in out) == (0, said)
+        _, data, _ = call("table", path, "--json")
+        model = load_scene(path).model
+        sideways = np.array([name.endswith("_u") for name in model.coordinates], dtype=float)
+        moving = sideways @ model.mass() @ sideways
+        assert sum(e["mass"] for e in json.loads(data)["elements"]) == pytest.approx(moving)
 
 
 def test_bode_gives_margins_and_poles_of_both(told):
@@ -243,6 +260,22 @@ def test_bad_input_ends_with_2_and_the_message_on_the_error_stream(call, scene):
         assert (code, out) == (2, "")
         assert err.startswith(f"flexctrl: {scene}: [elements.load] weight: unknown key")
         assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("command", ["modes", "bode", "rlocus"])
+def test_what_linear_models_leave_out_of_the_controller_is_said(call, scene, command):
+    hardware = "[hardware]\nnoise = { angle = 1e-4 }\nsteps = { angle = 1e-3, torque = 1e-2 }"
+    scene.write_text(TROLLEY.replace("[hardware]", hardware), encoding="utf-8")
+    notes = call(command, scene)[1].split("note: ")[1:]
+    alone = "the machine is shown by itself, without the scene's controller"
+    law = [
+        "limits of torque act in simulations only",
+        "rounding of angle, torque acts in simulations only",
+        "noise of angle acts in simulations only",
+    ]
+    assert [n.rstrip() for n in notes if not n.startswith("rigid twin: ")] == ([alone] if command == "modes" else law)
+    if command != "modes":
+        assert alone in call(command, scene, "--input", "push", "--output", "travel")[1]
 
 
 @pytest.mark.parametrize("command", ["modes", "bode", "rlocus"])

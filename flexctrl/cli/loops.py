@@ -14,7 +14,7 @@ from flexctrl.model.equilibrium import Rest
 from flexctrl.model.laws.idle import idle
 from flexctrl.model.model import Model
 from flexctrl.scene import Scene
-from flexctrl.study.broken_loop import broken_loop
+from flexctrl.study.broken_loop import broken_loop, unlinear
 from flexctrl.study.loop import Loop, open_loop
 
 DRIFT = 1e-6
@@ -47,11 +47,12 @@ class Cut:
 
     @property
     def notes(self) -> list[str]:
-        """What the linear models leave out of the machine and of its twin."""
+        """What the linear models leave out of the machine, of its twin and of the controller."""
         scene = self.scene
         own = left_out(scene.model, scene.rest)
         twin = left_out(scene.twin, scene.twin_rest) if scene.twin.n else []
-        return [*own, *(f"rigid twin: {note}" for note in twin if note not in own)]
+        law = unlinear(scene.law) if self.controlled else without_law(scene)
+        return [*own, *(f"rigid twin: {note}" for note in twin if note not in own), *law]
 
     @property
     def title(self) -> str:
@@ -97,6 +98,11 @@ def left_out(model: Model, rest: Rest) -> list[str]:
     return [*model.notes, *idle(model, rest.state)]
 
 
+def without_law(scene: Scene) -> list[str]:
+    """Return a note that a scene's controller has no part in what is shown; nothing for a scene without one."""
+    return [] if scene.controller is None else ["the machine is shown by itself, without the scene's controller"]
+
+
 def noted(notes: Sequence[str]) -> list[str]:
     """Return notes as lines below a table; none for none."""
     return ["", *(f"note: {note}" for note in notes)] if notes else []
@@ -136,4 +142,4 @@ def _chosen(kind: str, wanted: str, known: tuple[str, ...], first: tuple[str, ..
     return wanted or first[0]
 
 
-__all__ = ["Cut", "cut_of", "left_out", "noted"]
+__all__ = ["Cut", "cut_of", "left_out", "noted", "without_law"]

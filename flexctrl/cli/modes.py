@@ -8,7 +8,7 @@ from dataclasses import asdict
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
-from flexctrl.cli.loops import left_out, noted
+from flexctrl.cli.loops import left_out, noted, without_law
 from flexctrl.cli.program import Request
 from flexctrl.errors import SceneError
 from flexctrl.linear.modes import Modes
@@ -49,7 +49,7 @@ def _data(scene: Scene, modes: Modes) -> dict[str, object]:
     shares = [_share(modes, k, part) for k, part in enumerate(parts)]
     return {
         "scene": scene.name,
-        "notes": left_out(scene.model, scene.rest),
+        "notes": [*left_out(scene.model, scene.rest), *without_law(scene)],
         "equilibrium": {"residual": scene.rest.residual, "outputs": scene.rest.outputs},
         "dofs": scene.model.n,
         "frequencies_hz": modes.frequencies,

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
+from flexctrl.cli.loops import noted
 from flexctrl.cli.program import Request
+from flexctrl.effects.rope_mass import RopeMass
 from flexctrl.linear.condense import Audit, Freedom
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.plots.machine import add_machine_axes, draw_machine
-from flexctrl.scene import load_scene
+from flexctrl.scene import Scene, load_scene
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import IDENTIFIERS
@@ -25,7 +27,9 @@ def answer(request: Request) -> Answer:
     scene = load_scene(request.scene)
     machine, audit = scene.structure, _audit(scene.model)
     table = machine.join_table
-    elements = [_element(machine, part) for part in machine.elements]
+    light = _light(scene)
+    elements = [_element(machine, part) | ({"mass": 0.0} if part in light else {}) for part in machine.elements]
+    left_out = [f"mass of rope {p.name}, {p.mass:.5g} kg, is left out: no effect rope_mass gives it any" for p in light]
     data = plain(
         {
             "scene": scene.name,
@@ -42,7 +46,7 @@ def answer(request: Request) -> Answer:
             },
             "elements": elements,
             "audit": {kind.name.lower(): audit.named(kind) for kind in Freedom} | {"mechanisms": audit.mechanisms},
-            "notes": [*scene.notes, *scene.model.notes],
+            "notes": [*scene.notes, *scene.model.notes, *left_out],
         }
     )
     columns = {"node": range(1, len(table.rows) + 1), "label": table.labels}
@@ -56,8 +60,14 @@ def answer(request: Request) -> Answer:
     parts = grid(heads, [tuple(row.values()) for row in elements], left=2)
     effects = "" if table.free == scene.model.n else f" in the join table, {scene.model.n} under the scene's effects"
     text = "\n\n".join([f"{scene.name}: {table.free} degrees of freedom{effects}", str(table), parts, str(audit)])
-    notes = "".join(f"\nnote: {note}" for note in data["notes"])
-    return Answer(text + notes, data)
+    return Answer("\n".join([text, *noted(data["notes"])]), data)
+
+
+def _light(scene: Scene) -> list[Rope]:
+    """Ropes with a mass that the scene's effects leave out."""
+    masses = [part for effect in scene.effects for part in effect.parts() if isinstance(part, RopeMass)]
+    ropes = [p for p in scene.structure.elements if isinstance(p, Rope) and p.mass]
+    return [p for p in ropes if not any(e.weighs(p) for e in masses)]
 
 
 def _element(machine: Structure, part: Part) -> dict[str, Any]:

@@ -9,14 +9,22 @@ import numpy as np
 import scipy.linalg as la
 
 from flexctrl.design.controller import Controller, LinearController, as_controller
-from flexctrl.design.hardware import Delayed
+from flexctrl.design.hardware import Delayed, Noisy, Quantised, RateLimited, Saturated
 from flexctrl.design.tracking import Commanded, OpenLoop, Together
 from flexctrl.design.wrapping import Wrapper
 from flexctrl.errors import ControllerError, StructureError, check_kind, did_you_mean
 from flexctrl.linear.model import LinearModel
 from flexctrl.study.loop import Loop, open_loop
 
-__all__ = ["broken_loop", "linear_law"]
+__all__ = ["broken_loop", "linear_law", "unlinear"]
+
+_UNLINEAR: dict[type, tuple[str, str]] = {
+    RateLimited: ("limits", "rate limits of {} act"),
+    Saturated: ("limits", "limits of {} act"),
+    Quantised: ("steps", "rounding of {} acts"),
+    Noisy: ("std", "noise of {} acts"),
+}
+"""Hardware that is left out of a linear law: where its signals stand, and what is said of them."""
 
 
 def linear_law(controller: Any) -> LinearController:
@@ -39,6 +47,27 @@ def linear_law(controller: Any) -> LinearController:
         If there is a law in it that is not linear.
     """
     return _law(as_controller(controller))
+
+
+def unlinear(controller: Any) -> tuple[str, ...]:
+    """Say in words what `linear_law` leaves out of a controller: limits, rounding and noise, with their signals.
+
+    Parameters
+    ----------
+    controller : Controller or python-control system
+
+    Returns
+    -------
+    tuple of str
+        From the outside inwards; empty for a law that is linear.
+    """
+    law = as_controller(controller)
+    if isinstance(law, Together):
+        return tuple(dict.fromkeys(said for part in law.parts for said in unlinear(part)))
+    own = next((said for kind, said in _UNLINEAR.items() if isinstance(law, kind)), None)
+    names = ", ".join(name for name, size in getattr(law, own[0]).items() if size) if own else ""
+    said = (f"{own[1].format(names)} in simulations only",) if own and names else ()
+    return (*said, *(unlinear(law.controller) if isinstance(law, Wrapper) else ()))
 
 
 def _law(controller: Controller) -> LinearController:
