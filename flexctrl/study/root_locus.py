@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.study.frequency import NOISE, Crossing, loop_grid, phase_crossings
 from flexctrl.study.loop import Loop, check_loop
 
@@ -240,8 +240,17 @@ def _at_zero(loop: Loop) -> tuple[Crossing, ...]:
     """The crossing of a real pole through s = 0 (z = 1); a zero there leaves of L(0) its rounding."""
     if not len(loop.poles) or loop.at_rest(loop.poles).any():
         return ()
-    value, nearby = loop.at(np.array([0.0, 0.1 * _slowest(loop)]))
+    value, nearby = _still(loop), loop.at(np.array([0.1 * _slowest(loop)]))[0]
     return (Crossing(0.0, -1.0 / float(value.real)),) if value.real < -NOISE * abs(nearby) else ()
+
+
+def _still(loop: Loop) -> complex:
+    """L at rest, where no pole is."""
+    try:
+        return complex(loop.at(np.zeros(1))[0])
+    except LinearizationError:  # what rounding leaves of free motion that the loop neither drives nor sees
+        still = (np.eye(len(loop.A)) if loop.dt else 0.0) - loop.A
+        return complex((loop.D + loop.C @ np.linalg.solve(still, loop.B)).item())
 
 
 def _slowest(loop: Loop) -> float:
@@ -378,7 +387,7 @@ def _is_crossing(loop: Loop, found: CriticalGain) -> bool:
     if w <= loop.rest_radius and loop.at_rest(loop.poles).any():
         return False  # an integrator: L(0) is infinite, so no gain brings a pole there
     if w <= loop.rest_radius or w >= nyquist * (1 - 1e-9):
-        return bool(abs(1 + found.gain * loop.at(np.array([w]))[0]) < 1e-4)
+        return bool(abs(1 + found.gain * (loop.at(np.array([w]))[0] if w else _still(loop))) < 1e-4)
     steps = 10.0 ** np.arange(-10.0, -2.0)
     before, after = (np.sin(np.angle(loop.at(w * (1 + sign * steps)))) for sign in (-1, 1))
     return bool(((before * after < 0) & (np.minimum(abs(before), abs(after)) > NOISE)).any())

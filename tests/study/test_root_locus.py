@@ -8,11 +8,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from plants import cantilever, chain, plant
+from scenes import TROLLEY
 from scipy.signal import tf2ss
 
 import flexctrl as fc
 from flexctrl.cranes import bridge_crane
 from flexctrl.errors import StructureError
+from flexctrl.scene import load_scene
 from flexctrl.study.frequency import margins
 from flexctrl.study.loop import open_loop
 from flexctrl.study.root_locus import critical_gains, root_locus
@@ -111,6 +113,17 @@ def test_what_rounding_leaves_of_a_zero_at_rest_is_no_critical_gain(rest):
     assert root_locus(loop).critical == ()
     assert root_locus(loop).gains[-1] < 1e6
     assert abs(loop.zeros).min() < 1e-12
+
+
+def test_what_rounding_leaves_of_free_motion_hides_no_critical_gain_at_rest(tmp_path):
+    """The sway of a load does not see that its trolley is free: L(0) = 1/(m ℓ ω²), ω² = g/ℓ (1 + m/M)."""
+    path = tmp_path / "trolley.toml"
+    path.write_text(TROLLEY, encoding="utf-8")
+    linear = load_scene(path).linear
+    found = critical_gains(open_loop(linear, -1.0, "push", "sway"))
+    at_rest = [c.gain for c in found if c.omega == 0.0]
+    assert at_rest == pytest.approx([5.0 * 9.81 * (1 + 5.0 / 20.0)], rel=1e-4)
+    critical_gains(open_loop(linear, 1.0, "push", "sway"))
 
 
 def test_a_static_gain_turned_about_is_critical_at_rest():
