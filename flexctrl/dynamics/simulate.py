@@ -228,7 +228,7 @@ def _begun(
             "rotary inertia (rhoJ, rhoI) or mass"
         ) from None
     watch.begin(point)
-    books = Books(plan.feed, point.state, plan.method.order, plan.tolerance)
+    books = Books(plan.feed, point.state, plan.method, plan.tolerance)
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), notes=notes)
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
         journey.notes += (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
@@ -261,7 +261,7 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     stepper.recall(start.memory)
     stepper.counts.take(start.counts)
     watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span
-    books = Books(plan.feed, start.point.state, plan.method.order, plan.tolerance)
+    books = Books(plan.feed, start.point.state, plan.method, plan.tolerance)
     books.sums, books.first = replace(start.sums), start.first
     stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed)
     rows.count = start.rows

@@ -55,7 +55,7 @@ def unbegun(
     else:
         state = start.state if isinstance(start, Rest) else start or model.rest
         point = Point(state.with_(t=0.0), np.zeros(model.n), Supply(plan.feed.base, none, none))
-    books = Books(plan.feed, point.state, plan.method.order, plan.tolerance)
+    books = Books(plan.feed, point.state, plan.method, plan.tolerance)
     mark = replace(start.mark) if isinstance(start, Checkpoint) else Mark(0.0)
     journey = Journey(plan, stepper, point, Stops(0.0, ()), books, watch, rows, track, mark)
     journey.status = Status.INTERRUPTED

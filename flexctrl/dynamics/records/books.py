@@ -14,7 +14,7 @@ from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
-from flexctrl.dynamics.steps import Point
+from flexctrl.dynamics.steps import Integrator, Point
 from flexctrl.dynamics.swift.settling import dragged, quasistatic
 from flexctrl.dynamics.swift.stiff_lines import noise, stiffest
 from flexctrl.model.state import State
@@ -76,8 +76,8 @@ class Sums:
 class Books:
     """What a run has turned over, drawn up every few steps."""
 
-    def __init__(self, feed: Feed, state: State, order: int, tolerance: Tolerance) -> None:
-        self.feed, self.model, self.order = feed, feed.model, order
+    def __init__(self, feed: Feed, state: State, method: Integrator, tolerance: Tolerance) -> None:
+        self.feed, self.model, self.order = feed, feed.model, method.order
         self.first = state.q
         self.lawful = self.model.large
         self.reach = yardsticks(self.model)
@@ -85,6 +85,7 @@ class Books:
         probe = np.linspace(1.0, 2.0, self.model.n)
         changing = bool(self.model.switches.names or self.model.kinks.names)  # what is loose now may damp later
         self.dissipates = changing or self.model.energy(state.with_(v=probe))[2] != 0.0
+        self.loses = self.dissipates or not method.symmetric  # steps that lead back in time take nothing for good
         kinetic, stored, power = self.model.energy(state)
         self.sums = Sums(
             kinetic + stored, kinetic, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n)
@@ -193,10 +194,11 @@ class Books:
         """What the books say against a motion that has reached its end; empty if they can stand behind it.
 
         They have missed a large share of what was turned over, and the method's own damping is not why: that takes
-        energy and gives none back, so that the largest gap is the last.
+        energy and gives none back, so that the largest gap is the last. A method without damping has no such excuse,
+        unless the machine dissipates and the books may have mistaken how much.
         """
         s = self.sums
-        damped = s.made < 0.0 and -s.made >= _MOSTLY * s.gap
+        damped = self.loses and s.made < 0.0 and -s.made >= _MOSTLY * s.gap
         if not self._doubtful(_UNRESOLVED) or damped:
             return ""
         return f"the energy books missed {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
