@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scenes import EXAMPLES, TROLLEY
 
 import flexctrl
@@ -125,6 +126,33 @@ def test_the_table_tells_the_mass_that_is_in_the_model(call, tmp_path):
         sideways = np.array([name.endswith("_u") for name in model.coordinates], dtype=float)
         moving = sideways @ model.mass() @ sideways
         assert sum(e["mass"] for e in json.loads(data)["elements"]) == pytest.approx(moving)
+
+
+def test_labels_are_in_the_units_that_the_scene_names(call, tmp_path, monkeypatch):
+    """The numbers are as they stand in the file."""
+    path = tmp_path / "named.toml"
+    path.write_text(TROLLEY + '\n[units]\nlength = "mm"\nmass = "t"\n', encoding="utf-8")
+    said: list[str] = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: said.extend(_labels(figure)))
+    plain_text, out = (call("table", p, "--out", tmp_path)[1] for p in (_trolley(tmp_path), path))
+    assert "length (m)  mass (kg)" in plain_text
+    assert "length (mm)  mass (t)" in out
+    assert [line.split() for line in out.splitlines() if line.startswith("rope ")] == [
+        line.split() for line in plain_text.splitlines() if line.startswith("rope ")
+    ]
+    assert said[-2:] == ["x (mm)", "z (mm)"]
+    call("run", path, "--out", tmp_path)
+    assert {"travel (mm)", "sway (rad)", "torque (N mm)", "push (N)"} <= set(said)
+
+
+def _trolley(folder):
+    path = folder / "trolley.toml"
+    path.write_text(TROLLEY, encoding="utf-8")
+    return path
+
+
+def _labels(figure):
+    return [label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())]
 
 
 def test_bode_gives_margins_and_poles_of_both(told):

@@ -218,7 +218,7 @@ RUNS: dict[str, Call] = {
     "Scene": (
         fc.Scene,
         {"structure": PENDULUM, "effects": EFFECTS, "controller": SAMPLED, "loads": {"push": 1.0}}
-        | {"simulation": fc.Simulation(1.0), "hold": {"motor_source": 0.0}},
+        | {"simulation": fc.Simulation(1.0), "hold": {"motor_source": 0.0}, "units": fc.Units()},
     ),
     "load_scene": (fc.load_scene, {"path": "crane.toml"}),
 }

@@ -110,7 +110,7 @@ def interrupted(run: Run, twin: Run | None) -> bool:
 
 def draw(request: Request, scene: Scene, run: Run, twin: Run | None) -> None:
     """Write the pictures of a run: its curves, and the machine at the end."""
-    unit = units(scene.structure)
+    unit = units(scene.structure, scene.units)
     for name, signals in (("outputs.png", run.outputs), ("inputs.png", run.inputs)):
         if not signals:
             continue

@@ -29,7 +29,10 @@ def answer(request: Request) -> Answer:
     table = machine.join_table
     light = _light(scene)
     elements = [_element(machine, part) | ({"mass": 0.0} if part in light else {}) for part in machine.elements]
-    left_out = [f"mass of rope {p.name}, {p.mass:.5g} kg, is left out: no effect rope_mass gives it any" for p in light]
+    left_out = [
+        f"mass of rope {p.name}, {p.mass:.5g} {scene.units.mass}, is left out: no effect rope_mass gives it any"
+        for p in light
+    ]
     data = plain(
         {
             "scene": scene.name,
@@ -53,10 +56,12 @@ def answer(request: Request) -> Answer:
     columns |= {name: [row[i] for row in table.rows] for i, name in enumerate(IDENTIFIERS)}
     write_csv(request.out, "join_table.csv", columns)
     write_json(request.out, "table.json", data)
-    write_picture(
-        request.out, "machine.png", lambda f: draw_machine(add_machine_axes(f, machine), machine), size=(9.0, 6.5)
-    )
-    heads = ("element", "kind", "nodes", "length (m)", "mass (kg)")
+
+    def draw(figure: Any) -> None:
+        draw_machine(add_machine_axes(figure, machine), machine, length=scene.units.length)
+
+    write_picture(request.out, "machine.png", draw, size=(9.0, 6.5))
+    heads = ("element", "kind", "nodes", f"length ({scene.units.length})", f"mass ({scene.units.mass})")
     parts = grid(heads, [tuple(row.values()) for row in elements], left=2)
     effects = "" if table.free == scene.model.n else f" in the join table, {scene.model.n} under the scene's effects"
     text = "\n\n".join([f"{scene.name}: {table.free} degrees of freedom{effects}", str(table), parts, str(audit)])

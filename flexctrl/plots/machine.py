@@ -147,6 +147,7 @@ def draw_machine(
     color: str | Callable[[Part], str] = INK,
     width: float = 2.4,
     plane: tuple[int, int] | None = None,
+    length: str = "m",
 ) -> Axes:
     """Draw a machine.
 
@@ -168,6 +169,8 @@ def draw_machine(
         Of beams [points].
     plane : (int, int), optional
         Axes shown in a plane picture; default: see `best_plane`.
+    length : str
+        Unit of its places, for the axes.
 
     Returns
     -------
@@ -189,7 +192,7 @@ def draw_machine(
         _draw_symbols(pen, structure, shown)
     if numbers:
         _draw_numbers(pen, structure, shown)
-    _frame(ax, structure, plane)
+    _frame(ax, structure, plane, length)
     return ax
 
 
@@ -268,16 +271,16 @@ def _draw_numbers(pen: Pen, structure: Structure, pose: Pose) -> None:
         pen.write(pose.x[group[0]], label, (-7.0, -5.0), color="#6b7280", fontsize=8, ha="right", va="top")
 
 
-def _frame(ax: Any, structure: Structure, plane: tuple[int, int] | None) -> None:
+def _frame(ax: Any, structure: Structure, plane: tuple[int, int] | None, length: str) -> None:
     if plane is not None:
-        ax.set_xlabel(f"{_NAMES[plane[0]]} (m)")
-        ax.set_ylabel(f"{_NAMES[plane[1]]} (m)")
+        ax.set_xlabel(f"{_NAMES[plane[0]]} ({length})")
+        ax.set_ylabel(f"{_NAMES[plane[1]]} ({length})")
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.12)
         for side in ("top", "right"):
             ax.spines[side].set_visible(False)
         return
-    ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    ax.set(xlabel=f"x ({length})", ylabel=f"y ({length})", zlabel=f"z ({length})")
     limits = np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()])
     narrow = np.diff(limits, axis=1)[:, 0] < 0.3 * structure.size
     middle = limits.mean(axis=1)

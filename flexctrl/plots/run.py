@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flexctrl.dynamics.run import Run
+from flexctrl.linear.matfile import SI, Units
 from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
 from flexctrl.structure.inputs import FollowerForce, FollowerTorque, Force, Input, MotorTorque, Torque, WindSpeed
 from flexctrl.structure.outputs import (
@@ -27,35 +29,38 @@ from flexctrl.structure.structure import Structure
 from flexctrl.study.compare import Comparison
 
 _UNITS: dict[type, str] = {
-    Position: "m",
-    Velocity: "m/s",
-    Rotation: "rad",
-    AngularVelocity: "rad/s",
-    DriveAngle: "rad",
-    DriveSpeed: "rad/s",
-    SwayAngle: "rad",
-    Tension: "N",
-    Force: "N",
-    FollowerForce: "N",
-    Torque: "N m",
-    FollowerTorque: "N m",
-    MotorTorque: "N m",
-    WindSpeed: "m/s",
+    Position: "{length}",
+    Velocity: "{length}/{time}",
+    Rotation: "{angle}",
+    AngularVelocity: "{angle}/{time}",
+    DriveAngle: "{angle}",
+    DriveSpeed: "{angle}/{time}",
+    SwayAngle: "{angle}",
+    Tension: "{force}",
+    Force: "{force}",
+    FollowerForce: "{force}",
+    Torque: "{force} {length}",
+    FollowerTorque: "{force} {length}",
+    MotorTorque: "{force} {length}",
+    WindSpeed: "{length}/{time}",
 }
 
 
-def units(structure: Structure) -> dict[str, str]:
+def units(structure: Structure, written_in: Units = SI) -> dict[str, str]:
     """Return the unit of every signal of a machine.
 
     Parameters
     ----------
     structure : Structure
+    written_in : Units
+        Of the machine's numbers.
 
     Returns
     -------
     dict of str to str
     """
-    return {signal.name: _unit(signal) for signal in (*structure.outputs, *structure.inputs)}
+    names = asdict(written_in)
+    return {signal.name: _unit(signal).format(**names) for signal in (*structure.outputs, *structure.inputs)}
 
 
 def _unit(signal: Input | Output) -> str:

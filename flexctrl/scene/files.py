@@ -16,6 +16,7 @@ from flexctrl.effects.damping import ModalDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.errors import FlexctrlError, SceneError, check_kind
+from flexctrl.linear.matfile import Units
 from flexctrl.model.assemble import assemble
 from flexctrl.model.holding import check_free
 from flexctrl.scene import laws, parts, physics
@@ -38,7 +39,8 @@ from flexctrl.scene.reading import (
 from flexctrl.scene.scene import Channel, Scene, Simulation, Start
 
 _PLAIN = ("name", "notes", "machine", "effects", "moves", "controllers", "hardware", "loads", "equilibrium", "loop")
-_KEYS = (*_PLAIN, *parts.TABLES, "simulation")
+_KEYS = (*_PLAIN, *parts.TABLES, "simulation", "units")
+_UNITS = Kind(Units, dict.fromkeys(("length", "mass", "force"), text))
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -126,6 +128,7 @@ def scene_from(content: Mapping[str, Any], place: Place, name: str) -> Scene:
     moves = laws.moves(content.get("moves", {}), place.at("moves"))
     channel = Kind(Channel, {"input": driven, "output": known("output", outputs)})
     notes = several(text)(content.get("notes", []), place.at("notes"))
+    units = _UNITS.read(content.get("units", {}), place.at("units"))
     scene = checked(
         lambda: Scene(
             structure=structure,
@@ -137,6 +140,7 @@ def scene_from(content: Mapping[str, Any], place: Place, name: str) -> Scene:
             rest_inputs=rest.get("inputs", {}),
             channel=channel.read(content.get("loop", {}), place.at("loop")),
             notes=notes,
+            units=units,
         ),
         place,
     )

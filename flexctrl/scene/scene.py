@@ -22,6 +22,7 @@ from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import SceneError, StructureError, check_kind, did_you_mean, shortened
+from flexctrl.linear.matfile import SI, Units
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
 from flexctrl.model.braked import rest_held
@@ -135,6 +136,8 @@ class Scene:
     name : str
     notes : tuple of str
         Assumptions and sources, shown with the results.
+    units : Units
+        What its numbers are in, for labels; nothing is converted, and times are seconds.
 
     Raises
     ------
@@ -152,12 +155,16 @@ class Scene:
     channel: Channel = Channel()
     name: str = ""
     notes: tuple[str, ...] = ()
+    units: Units = SI
 
     def __post_init__(self) -> None:
         if not isinstance(self.structure, Structure):
             raise SceneError(f"Scene: structure = {shortened(self.structure)}; expected a Structure")
         if not isinstance(self.simulation, Simulation | None):
             raise SceneError(f"Scene: simulation = {shortened(self.simulation)}; expected a Simulation(until=…)")
+        check_kind(self.units, Units, "Scene: units", "Units, as Units('mm', 't', 's', 'N')", SceneError)
+        if self.units.time != "s":
+            raise SceneError(f"Scene: units: time = {self.units.time!r}; expected 's', as times and Hz are told in it")
         object.__setattr__(self, "effects", tuple(listed(self.effects, "Scene: effects")))
         check_kind(self.loads, Mapping, "Scene: loads", "a mapping of inputs to values", SceneError)
         object.__setattr__(self, "name", self.name or self.structure.name)

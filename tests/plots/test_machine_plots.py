@@ -118,6 +118,8 @@ def test_every_kind_of_signal_is_drawn_with_its_unit():
     assert {type(signal) for signal in both} == kinds(Output) | kinds(Input)
     machine = fc.Structure([BAR, rope], [fc.Pin(end, rope.start)], [motor], inputs=inputs, outputs=outputs)
     assert units(machine) == {signal.name: unit for signal, unit in both.items()}
+    said = {signal.name: unit.replace("m", "mm").replace("N", "mN") for signal, unit in both.items()}
+    assert units(machine, fc.Units("mm", "kg", "s", "mN")) == said
 
 
 def test_drives_are_named():
