@@ -14,7 +14,7 @@ from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
-__all__ = ["Corners", "comes_through", "corners_of", "crossed", "passes", "value", "within"]
+__all__ = ["Corners", "beyond", "comes_through", "corners_of", "crossed", "passes", "value", "within"]
 
 
 @dataclass
@@ -28,6 +28,10 @@ class Corners:
     ends : Wholes
         Slots of the nodes at the ends of each line.
     drives : Wholes
+    straight : int
+        How many of the lines, the first ones, are measured along their directions at rest, in small motion.
+    ways : Reals
+        These directions (3 each).
     lengths, sums : Reals
         Where lines have corners; weights of driven coordinates and source angles, and where their sums have (3 each).
     travels : Wholes
@@ -56,8 +60,10 @@ class Corners:
     turns: int
     rails: int
     sheaves: int
+    straight: int
     ends: Wholes
     drives: Wholes
+    ways: Reals
     lengths: Reals
     sums: Reals
     travels: Wholes
@@ -79,8 +85,16 @@ def corners_of(F: Flattened) -> Corners:
     kinks = F.model.kinks.met
     (ends, lengths), (drives, sums), (travels, spans) = kinks.lines, kinks.shafts, kinks.rails
     sides = np.zeros(len(kinks.names))
-    counts = len(lengths), len(drives), len(travels), kinks.sheaves
-    places = NODE_SLOT * ends.ravel(), drives, lengths, sums.ravel(), NODE_SLOT * travels, spans.ravel()
+    counts = len(lengths), len(drives), len(travels), kinks.sheaves, len(kinks.ways)
+    places = (
+        NODE_SLOT * ends.ravel(),
+        drives,
+        kinks.ways.ravel(),
+        lengths,
+        sums.ravel(),
+        NODE_SLOT * travels,
+        spans.ravel(),
+    )
     last = np.array([bool(end) for end in kinks.ends], dtype=np.int64)
     step, change = np.zeros((2, F.flat.padded))
     turning = int(bool(kinks.names) and not weightless(F.model).size)
@@ -123,10 +137,15 @@ def stretch(c: Corners, f: Flat, k: int) -> float:
     """Return how far a line is beyond its corner."""
     start = f.z[c.ends[2 * k] :]
     end = f.z[c.ends[2 * k + 1] :]
-    square = 0.0
-    for j in range(3):
-        square += (end[j] - start[j]) * (end[j] - start[j])
-    return math.sqrt(square) - c.lengths[k]
+    return beyond(c, k, end[0] - start[0], end[1] - start[1], end[2] - start[2])
+
+
+def beyond(c: Corners, k: int, x: float, y: float, z: float) -> float:
+    """Return how far a line along an arm is beyond its corner."""
+    if k < c.straight:
+        way = c.ways[3 * k :]
+        return way[0] * x + way[1] * y + way[2] * z - c.lengths[k]
+    return math.sqrt(x * x + y * y + z * z) - c.lengths[k]
 
 
 def through(c: Corners, f: Flat, k: int) -> bool:

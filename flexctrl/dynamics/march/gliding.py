@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from flexctrl.dynamics.march.clock import later
-from flexctrl.dynamics.march.corners import within
+from flexctrl.dynamics.march.corners import beyond, within
 from flexctrl.dynamics.march.record import CORNER, DONE, WANTS_TANGENT, March
 from flexctrl.kernels.eights import eight, larger, put, total
 from flexctrl.kernels.native import Reals, seldom
@@ -60,10 +58,8 @@ def sees_corner(m: March) -> bool:
     c = m.corners
     arms = m.leap.sight[m.gauges.rows + m.leap.size - 1 - m.leap.modes :]
     for k in range(c.lines):
-        square = 0.0
-        for j in range(3):
-            square += arms[3 * k + j] * arms[3 * k + j]
-        if not within(c, k, math.sqrt(square) - c.lengths[k]):
+        arm = arms[3 * k :]
+        if not within(c, k, beyond(c, k, arm[0], arm[1], arm[2])):
             return True
     return False
 

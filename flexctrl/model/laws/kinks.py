@@ -172,6 +172,18 @@ class Kinks:
         return np.array(ends, dtype=int).reshape(-1, 2), np.array([line.length for line in self._lines])
 
     @cached_property
+    def ways(self) -> np.ndarray:
+        """Directions at rest of the lines that small motion stretches by what is along them, (lines, 3); large: none.
+
+        Their tension is as linear. The way to the sheave of a winch, which ends runs, is looked at as it is.
+        """
+        if self.model.large:
+            return np.zeros((0, 3))
+        first, last = self.lines[0][: len(self._lines) - self.sheaves].T
+        arms = self.model.rest.x[last] - self.model.rest.x[first]
+        return arms / np.maximum(np.linalg.norm(arms, axis=1), _TINY)[:, None]
+
+    @cached_property
     def sheaves(self) -> int:
         """How many of the lines, the last ones, lead to the sheave of a winch."""
         return sum(1 for line in self._lines if line.stop)
@@ -215,11 +227,17 @@ class Kinks:
         """
         motion, (ends, lengths), (drives, rows) = self.model.motion, self.lines, self.shafts
         arms = state.x[ends[:, 1]] - state.x[ends[:, 0]]
-        strains = self._through(np.sqrt(np.einsum("ij,ij->i", arms, arms)), arms, before) - lengths
+        strains = self._through(self._distances(arms), arms, before) - lengths
         own = np.append(state.q, 0.0)[motion.sources[drives]]
         turned = rows[:, 0] * state.driven[drives] + rows[:, 1] * own - rows[:, 2]
         travelling, ends = self.rails
         return np.concatenate([strains, turned, ends[:, 0] * state.x[travelling, 0] + ends[:, 1]])
+
+    def _distances(self, arms: np.ndarray) -> np.ndarray:
+        """How far the ends of lines are apart: in small motion, along their directions at rest."""
+        found, ways = np.sqrt(np.einsum("ij,ij->i", arms, arms)), self.ways
+        found[: len(ways)] = np.einsum("ij,ij->i", arms[: len(ways)], ways)
+        return np.asarray(found)
 
     def sheaved(self, state: State) -> np.ndarray:
         """Return the arms from sheaves to what hangs on them, shape (sheaves, 3)."""
