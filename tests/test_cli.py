@@ -262,10 +262,11 @@ def test_planar_machines_are_drawn(call, tmp_path, text, command):
 
 
 def test_notes_stand_below_a_run_and_in_its_data(call, scene, told):
-    _, text, _ = call("run", scene)
-    notes = told("run")["notes"]
-    assert notes[0] == "made up"
-    assert "\n".join(f"note: {note}" for note in notes) in text
+    for command in ("run", "compare"):
+        _, text, _ = call(command, scene)
+        notes = told(command)["notes"]
+        assert notes[0] == "made up"
+        assert "\n".join(f"note: {note}" for note in notes) in text
 
 
 def test_written_curves_are_the_run(call, scene, tmp_path):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from flexctrl.cli.answer import Answer, plain, write_json
+from flexctrl.cli.loops import noted
 from flexctrl.cli.program import Request
-from flexctrl.cli.run import draw, interrupted, problem, run_both, shown, told
+from flexctrl.cli.run import beside, draw, interrupted, problem, run_both, shown, told
 from flexctrl.dynamics.run import Status
 from flexctrl.errors import FlexctrlError
 from flexctrl.scene import Scene, load_scene
@@ -30,13 +31,15 @@ def answer(request: Request) -> Answer:
     for name, known in comparison.known.items():
         signals[name]["rms_difference_known"] = known
     statuses = {"status": run.status.value, "rigid_status": twin.status.value}
-    data = plain({"scene": scene.name, **statuses, "signals": signals})
+    notes = [*scene.notes, *run.report.notes, *beside(run, twin)]
+    data = plain({"scene": scene.name, **statuses, "signals": signals, "notes": notes})
     write_json(request.out, "compare.json", data)
     if request.out is not None:
         comparison.save_csv(request.out / "compare.csv")
     draw(request, scene, run, twin)
     ended = stopped or interrupted(run, twin)
-    return Answer(f"{scene.name}: flexible against rigid\n\n{comparison}", data, problem(run, twin), ended)
+    text = "\n".join([f"{scene.name}: flexible against rigid\n\n{comparison}", *noted(notes)])
+    return Answer(text, data, problem(run, twin), ended)
 
 
 def _known(scene: Scene, found: Comparison) -> tuple[Comparison, bool]:

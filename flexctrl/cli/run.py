@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
+from flexctrl.cli.loops import noted
 from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
 from flexctrl.dynamics.run import Run, Status
@@ -33,9 +34,14 @@ def answer(request: Request) -> Answer:
     if twin:
         write_csv(request.out, "rigid.csv", curves(twin))
     draw(request, scene, run, twin)
-    beside = [f"rigid twin: {note}" for note in twin.report.notes if note not in notes] if twin else []
-    text = "\n".join([_text(scene, run, twin), "", *(f"note: {note}" for note in (*notes, *beside))]).rstrip()
+    text = "\n".join([_text(scene, run, twin), *noted([*notes, *beside(run, twin)])])
     return Answer(text, data, problem(run, twin), interrupted(run, twin))
+
+
+def beside(run: Run, twin: Run | None) -> list[str]:
+    """Return the notes of the rigid twin's run that are not those of the machine's."""
+    notes = twin.report.notes if twin else ()
+    return [f"rigid twin: {note}" for note in notes if note not in run.report.notes]
 
 
 def run_both(scene: Scene, twin: bool) -> tuple[Run, Run | None]:
@@ -160,4 +166,4 @@ def _row(name: str, runs: list[Run]) -> list[float]:
     return [beyond(rounding, value) for number in zip(*each, strict=True) for value in number]
 
 
-__all__ = ["answer", "curves", "draw", "interrupted", "problem", "run_both", "shown", "told"]
+__all__ = ["answer", "beside", "curves", "draw", "interrupted", "problem", "run_both", "shown", "told"]
