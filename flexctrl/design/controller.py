@@ -348,6 +348,9 @@ def _check_sample_time(candidate: Any) -> None:
 
 
 def _from_object(candidate: Any) -> Controller:
+    if isinstance(candidate, type):
+        name = candidate.__name__
+        raise ControllerError(f"{name} is a class, no controller; make one, as {name}(…), and give that")
     _check_sample_time(candidate)
     if all(hasattr(candidate, name) for name in _PARTS):  # what isinstance asks, ten times quicker
         return cast(Controller, candidate)

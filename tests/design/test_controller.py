@@ -93,6 +93,11 @@ def test_several_channels_without_slicot_ask_for_a_state_space(monkeypatch):
         as_controller(transfer)
 
 
+def test_a_class_is_told_to_be_made_first():
+    with pytest.raises(ControllerError, match=r"Integrating is a class.*make one, as Integrating\(…\)"):
+        as_controller(Integrating)
+
+
 def test_unknown_names_are_answered_with_the_nearest():
     with pytest.raises(ControllerError, match=r"reads 'angle'.*did you mean 'angles'.*Commanded"):
         as_controller(system(), ["torque"], ["angles", "rate"])
