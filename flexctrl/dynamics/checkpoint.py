@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, is_zipfile
 
 import numpy as np
 
@@ -136,6 +136,9 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     """
     check_path(path, "load_checkpoint")
     try:
+        with Path(path).open("rb") as opened:
+            if not is_zipfile(opened):
+                raise ValueError("it is no archive of numpy's (.npz), or only part of one")
         with np.load(Path(path), allow_pickle=False) as file:
             content = json.loads(file["tree"].tobytes().decode())
             if content["format"] != _FORMAT:
