@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from itertools import permutations
 
@@ -41,6 +42,15 @@ def test_all_events_at_the_end_are_told(method, backend):
     assert {e.t for e in run.events[1:]} == {run.t[-1]}
     assert run.report.message == f"stop and halt at t = {run.t[-1]:.6g} s"
     assert run["z"][-1] == pytest.approx(5.0, abs=1e-8)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("backend", ["compiled", "plain"])
+def test_what_is_told_can_be_written_as_json(method, backend):
+    run = fallen([EARLY, STOP], method, backend)
+    told = [(e.name, e.t, e.rising, dict(e.signals)) for e in run.events]
+    assert json.loads(json.dumps(told)) == [list(item) for item in told]
+    assert all(type(e.t) is float and e.rising is False for e in run.events)
 
 
 def test_their_order_is_that_of_the_list():

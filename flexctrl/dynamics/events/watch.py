@@ -237,7 +237,7 @@ class Watch:
     def named(self, crossing: Crossing, outputs: np.ndarray, u: np.ndarray) -> Occurrence:
         """Return what is told of a crossing, where outputs are known."""
         named = (*(e.name for e in self.events), *self.names, *self.corner_names)
-        return Occurrence(named[crossing.gauge], crossing.t, crossing.rising, self._signals(outputs, u))
+        return Occurrence(named[crossing.gauge], float(crossing.t), bool(crossing.rising), self._signals(outputs, u))
 
     def corner(self, which: int, t: float, rising: bool) -> Crossing:
         """Return that a corner is met."""
