@@ -8,7 +8,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from flexctrl.effects.effect import Inner
+from flexctrl.effects.effect import Effect, Inner
 from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.errors import StructureError
 from flexctrl.structure.beams import Beam
@@ -108,6 +108,32 @@ class ComponentModes(BeamFlexibility):
         bool
         """
         return self.count + self.along > 0 and isinstance(part, Beam) and self.bends(part)
+
+
+def elements_alone(effects: Sequence[Effect]) -> list[Effect]:
+    """Return effects with plain elements in place of component modes: the same beams bend.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        None that stands for several.
+
+    Returns
+    -------
+    list of Effect
+        Those given, if there are no component modes among them.
+    """
+    bending = [e for e in effects if isinstance(e, BeamFlexibility)]
+    if not any(isinstance(e, ComponentModes) for e in bending):
+        return list(effects)
+    named = () if any(not e.of for e in bending) else tuple(dict.fromkeys(name for e in bending for name in e.of))
+    found: list[Effect] = []
+    for effect in effects:
+        if effect is bending[0]:
+            found.append(BeamFlexibility(named))
+        elif not isinstance(effect, BeamFlexibility):
+            found.append(effect)
+    return found
 
 
 def _free(structure: Structure, beam: Beam) -> str:

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from flexctrl.design.controller import Controller
 from flexctrl.design.hardware import Sampled
 from flexctrl.design.wrapping import Wrapper
+from flexctrl.effects.component_modes import ComponentModes, elements_alone
 from flexctrl.effects.damping import RayleighDamping
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Deforming
@@ -77,10 +78,10 @@ class Omission:
 def omissions(scene: Subject) -> tuple[Omission, ...]:
     """Return everything that can be left out of a scene, each once.
 
-    Effects; flexibility part by part; stretch, torsion and bending of the beams (made a thousand times stiffer),
-    and their shear and rotary inertia where they have them; large rotation (small motion about the loaded
-    equilibrium instead) and geometric stiffness; each kind of damping, of effects and of parts; the hardware round
-    the controller.
+    Effects; flexibility part by part, and component modes, without which the elements bend by their cubics alone;
+    stretch, torsion and bending of the beams (made a thousand times stiffer), and their shear and rotary inertia where
+    they have them; large rotation (small motion about the loaded equilibrium instead) and geometric stiffness; each
+    kind of damping, of effects and of parts; the hardware round the controller.
 
     Parameters
     ----------
@@ -91,12 +92,16 @@ def omissions(scene: Subject) -> tuple[Omission, ...]:
     -------
     tuple of Omission
     """
-    found = [o for e in scene.effects for part in e.parts() for o in _of_effect(part, scene.structure)]
+    effects = _flat(scene)
+    found: dict[str, Omission] = {}
+    for effect in effects:
+        for omission in _of_effect(effect, effects, scene.structure):
+            found.setdefault(omission.name, omission)
     parts = (*scene.structure.elements, *scene.structure.drives)
     for name, kinds in _DASHPOTS.items():
         if any(_is_damped(p, kinds) for p in parts):
-            found.append(Omission(name, partial(_undamped, kinds)))
-    return (*(_after_what_needs_it(o, scene) for o in found), *_of_controller(scene.law))
+            found[name] = Omission(name, partial(_undamped, kinds))
+    return (*(_after_what_needs_it(o, scene) for o in found.values()), *_of_controller(scene.law))
 
 
 def _after_what_needs_it(omission: Omission, scene: Subject) -> Omission:
@@ -114,9 +119,9 @@ def _bears(effect: Effect, others: Sequence[Effect]) -> bool:
     return True
 
 
-def _of_effect(effect: Effect, structure: Structure) -> list[Omission]:
+def _of_effect(effect: Effect, effects: Sequence[Effect], structure: Structure) -> list[Omission]:
     if isinstance(effect, Deforming):
-        return _of_deforming(effect, structure)
+        return _of_deforming(effect, effects, structure)
     if isinstance(effect, RayleighDamping):
         shares = {"mass_damping": "alpha", "stiffness_damping": "beta"}
         return [
@@ -128,34 +133,49 @@ def _of_effect(effect: Effect, structure: Structure) -> list[Omission]:
     return [Omission(snake(kind), partial(_without_effect, kind))]
 
 
-def _of_deforming(effect: Deforming, structure: Structure) -> list[Omission]:
-    """Part by part where there are several; ways in which beams give, and rotary inertia, also by themselves."""
-    parts = [p for p in (*structure.elements, *structure.drives) if effect.bends(p)]
-    kind = type(effect)
+def _of_deforming(effect: Deforming, effects: Sequence[Effect], structure: Structure) -> list[Omission]:
+    """Part by part where there are several; ways in which beams give, and rotary inertia, also by themselves.
+
+    Beams in component modes bend as others do, and are rigid with them; modes may go by themselves.
+    """
+    kind = BeamFlexibility if isinstance(effect, BeamFlexibility) else type(effect)
+    parts = _deforming(kind, effects, structure)
     if not parts:
         return []
-    found = [Omission(snake(kind), partial(_without_effect, kind))]
+    found = [Omission(snake(kind), partial(_stiffened, kind, parts))]
     if len(parts) > 1:
-        found = [Omission(f"{snake(kind)}_{p.name}", partial(_stiffened_part, kind, p.name)) for p in parts]
+        found = [Omission(f"{snake(kind)}_{name}", partial(_stiffened, kind, [name])) for name in parts]
     if isinstance(effect, BeamFlexibility):
+        if isinstance(effect, ComponentModes) and any(effect.modes(p) for p in structure.elements):
+            found.append(Omission("component_modes", _of_elements_alone))
         sections = [p.section for p in structure.elements if isinstance(p, Beam)]
         ways = [name for name, without in WAYS.items() if any(without(s) is not s for s in sections)]
         found += [Omission(name, partial(_with_sections, name), spares=False) for name in ways]
     return found
 
 
-def _stiffened_part(kind: type[Deforming], name: str, scene: Subject) -> Subject:
-    """One part fewer that deforms; the effect goes with the last."""
-    effect = next((e for e in _flat(scene) if type(e) is kind), None)
-    if effect is None:
-        return scene
-    parts = [p.name for p in (*scene.structure.elements, *scene.structure.drives) if effect.bends(p)]
-    if name not in parts:
-        return scene
-    if parts == [name]:
-        return _without_effect(kind, scene)
-    fewer = replace(effect, of=tuple(part for part in parts if part != name))
-    return _with_effects(scene, [fewer if type(e) is kind else e for e in _flat(scene)])
+def _deforming(kind: type[Deforming], effects: Sequence[Effect], structure: Structure) -> list[str]:
+    """Names of the parts that effects of a kind let deform."""
+    acting = [e for e in effects if isinstance(e, kind)]
+    return [p.name for p in (*structure.elements, *structure.drives) if any(e.bends(p) for e in acting)]
+
+
+def _stiffened(kind: type[Deforming], names: Sequence[str], scene: Subject) -> Subject:
+    """Some parts fewer that deform; an effect goes with its last."""
+    effects: list[Effect] = []
+    for effect in _flat(scene):
+        bending = _deforming(kind, [effect], scene.structure)
+        left = tuple(part for part in bending if part not in names)
+        if isinstance(effect, kind) and len(left) < len(bending):
+            effects += [replace(effect, of=left)] if left else []
+        else:
+            effects.append(effect)
+    return _with_effects(scene, effects)
+
+
+def _of_elements_alone(scene: Subject) -> Subject:
+    """Beams in component modes bend by the cubics of their elements alone."""
+    return _with_effects(scene, elements_alone(_flat(scene)))
 
 
 def _with_sections(name: str, scene: Subject) -> Subject:

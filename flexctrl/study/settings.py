@@ -12,7 +12,7 @@ from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
-from flexctrl.effects.component_modes import ComponentModes
+from flexctrl.effects.component_modes import ComponentModes, elements_alone
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, Deforming, ShaftElasticity
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
@@ -44,18 +44,23 @@ def _shafts(effects: Sequence[Effect]) -> list[Effect]:
 
 
 def _modes(effects: Sequence[Effect], structure: Structure, count: int = _MODES) -> list[Effect]:
-    """Modes where they save elements; on every beam if they do nowhere."""
+    """Modes where they save elements, or the scene has some; on every beam if they do nowhere."""
     beams, coarse = ([p for p in s.elements if isinstance(p, Beam)] for s in (structure, _coarse(structure)))
-    fewer = {b.name for b, c in zip(beams, coarse, strict=True) if c.elements < b.elements}
+    own = [e for e in effects if isinstance(e, ComponentModes)]
+    along = max((e.along for e in own), default=0)
+    fewer = {
+        b.name for b, c in zip(beams, coarse, strict=True) if c.elements < b.elements or any(e.modes(b) for e in own)
+    }
     found: list[Effect] = []
-    for effect in effects:
-        if type(effect) is not BeamFlexibility:
+    for effect in elements_alone(effects):
+        if not isinstance(effect, BeamFlexibility):
             found.append(effect)
             continue
         named = effect.of or tuple(b.name for b in beams)
         modal = tuple(name for name in named if name in fewer)
         plain = tuple(name for name in named if name not in fewer) if modal else ()
-        found += [ComponentModes(count, modal or effect.of), *([BeamFlexibility(plain)] if plain else [])]
+        modes = ComponentModes(count, modal or effect.of, along)
+        found += [modes, *([BeamFlexibility(plain)] if plain else [])]
     return found
 
 

@@ -228,3 +228,21 @@ def test_a_scene_whose_ropes_have_mass_has_component_modes_too():
     amplitudes = [name for name in own.coordinates if "_y" in name or "_z" in name]
     assert len(own.coordinates) - len(amplitudes) == 6 + 3 * 3
     assert len(amplitudes) == 2 * 2 * next(e.count for e in own.effects if isinstance(e, fc.ComponentModes))
+
+
+def test_a_scene_in_component_modes_keeps_its_rung():
+    """The rung's modes take the place of the scene's own, and the same beams bend."""
+    section = fc.Section(EA=2e8, EI_y=4e5, EI_z=3e5, GJ=2e5, rhoA=4.0, rhoJ=0.05)
+    boom = fc.Beam("boom", (0, 0, 0), (4, 0, 0), section, 1)
+    mast = fc.Beam("mast", (0, 0, 0), (0, 0, 3), section, 1)
+    joints = [fc.Support(boom.start), fc.Weld(boom.start, mast.start)]
+    structure = fc.Structure([boom, mast], joints, outputs=[fc.Position("z", boom.end, "z")])
+    plain = [fc.Gravity(), fc.LargeRotation()]
+    for own in ([fc.Flexible(), fc.ComponentModes(2, ["boom"], 1)], [fc.ComponentModes(2, ["boom"], 1)]):
+        scene = fc.Scene(structure, [*plain, *own], simulation=fc.Simulation(0.1, fc.GeneralizedAlpha(1e-3)))
+        rung = dict(rungs(scene))["component modes"].of(scene)
+        modes = next(e for e in rung.effects if isinstance(e, fc.ComponentModes))
+        assert (modes.of, modes.along) == (("boom",), 1)
+        bending = [{b.name for b in (boom, mast) if any(e.bends(b) for e in s.model.effects)} for s in (scene, rung)]
+        assert bending[0] == bending[1]
+        assert rung.model.n == scene.model.n + 2 * (modes.count - 2)

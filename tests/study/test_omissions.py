@@ -129,3 +129,40 @@ def test_a_coupled_section_is_stiffened_in_the_way_that_goes():
     assert np.abs(left[4:, :]).max() < 2e-3 * np.abs(given[3:, 3:]).max()
     assert left[3, 3] == pytest.approx(1.0 / law[3, 3], rel=1e-3)  # and no longer its compliance with bending free
     assert np.allclose(left[:3, :3], given[:3, :3])
+
+
+def modal(*effects: fc.Effect) -> fc.Scene:
+    """Two cantilevers, each under a load at its tip."""
+    section = fc.Section(1e9, 1e7, 1e7, 1e7, 80.0, 1.6)
+    beams = [fc.Beam(name, (0, y, 0), (2, y, 0), section, elements=2) for name, y in (("boom", 0.0), ("mast", 1.0))]
+    pushes = [fc.Force(f"push_{b.name}", b.end, "z") for b in beams]
+    tips = [fc.Position(b.name, b.end, "z") for b in beams]
+    structure = fc.Structure(beams, [fc.Support(b.start) for b in beams], inputs=pushes, outputs=tips)
+    return fc.Scene(structure, effects, simulation=fc.Simulation(until=0.01))
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [fc.Flexible(), fc.ComponentModes(2, ["boom"])],
+        [fc.ComponentModes(2, ["boom"]), fc.Flexible()],
+        [fc.BeamFlexibility(["mast"]), fc.ComponentModes(2, ["boom"])],
+        [fc.ComponentModes(2)],
+    ],
+)
+def test_a_beam_in_component_modes_is_rigid_like_any_other(effects):
+    """Each line stands once. A beam that is left out has no freedoms; without the modes the same beams bend."""
+    scene = modal(*effects)
+    items = {o.name: o for o in omissions(scene)}
+    ways = ["beam_stretch", "beam_torsion", "beam_bending"]
+    lines = ["beam_flexibility_boom", "beam_flexibility_mast", "component_modes", *ways]
+    assert sorted(o.name for o in omissions(scene)) == sorted(lines)
+    alone = modal(fc.BeamFlexibility())
+    without = items["component_modes"].without(scene)
+    assert without.model.coordinates == alone.model.coordinates
+    assert np.allclose(without.linear.K.toarray(), alone.linear.K.toarray(), rtol=1e-12)
+    assert not items["component_modes"].is_in(without)
+    for name, other in (("boom", "mast"), ("mast", "boom")):
+        stiff = items[f"beam_flexibility_{name}"].without(scene)
+        assert {c.split("_")[0] for c in stiff.model.coordinates} == {other}
+        assert items[f"beam_flexibility_{other}"].without(stiff).model.n == 0
