@@ -15,9 +15,9 @@ from flexctrl.linear.response import FrequencyResponse
 from flexctrl.plots.frequency import plot_bode
 from flexctrl.plots.loops import mark_margins
 from flexctrl.scene import load_scene
+from flexctrl.study.branches import in_s
 from flexctrl.study.frequency import Margins, loop_grid, margins
 from flexctrl.study.loop import Loop
-from flexctrl.study.root_locus import in_s
 
 
 def answer(request: Request) -> Answer:

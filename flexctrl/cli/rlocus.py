@@ -13,12 +13,13 @@ from flexctrl.cli.loops import Cut, cut_of, noted
 from flexctrl.cli.program import Request
 from flexctrl.plots.root_locus import draw_root_locus
 from flexctrl.scene import load_scene
+from flexctrl.study.branches import in_s, sided
 from flexctrl.study.frequency import margins
 from flexctrl.study.loop import Loop
-from flexctrl.study.root_locus import CriticalGain, RootLocus, critical_gains, in_s, root_locus
+from flexctrl.study.root_locus import CriticalGain, RootLocus, critical_gains, root_locus
 
 _LEAST_GAIN = 1e-9
-_LEAST_SHOWN, _SHOWN, _BEYOND, _COUNT = 1e-3, 30.0, 1.5, 400
+_LEAST_SHOWN, _SHOWN, _BEYOND, _COUNT = 1e-3, 30.0, 1.5, 150
 """Gains drawn of a controller, whose own gain is 1, and how far beyond the one at which stability is lost."""
 
 
@@ -91,7 +92,7 @@ def _write(
     critical: Mapping[str, tuple[CriticalGain, ...]],
 ) -> None:
     for name, locus in loci.items():
-        columns, branches = {"gain": locus.gains}, in_s(locus.loci, loops[name].dt)
+        columns, branches = {"gain": locus.gains}, sided(locus.loci, loops[name].dt)
         for k in range(branches.shape[1]):
             columns |= {f"re_{k + 1}": branches[:, k].real, f"im_{k + 1}": branches[:, k].imag}
         write_csv(request.out, f"rlocus_{name}.csv", columns)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +13,7 @@ from matplotlib.patches import Rectangle
 from flexctrl.errors import check_kind
 from flexctrl.plots.style import CYCLE, INK, axes_of, by_label, new_figure, tidy
 from flexctrl.structure.freedoms import check_finite, listed
+from flexctrl.study.branches import on_edge
 from flexctrl.study.root_locus import CriticalGain, RootLocus
 from flexctrl.study.zeros import Zeros
 
@@ -24,6 +26,8 @@ _NARROW = 0.01
 _BLOT = 0.1
 """Share of a picture's width and height in which what there is cannot be told apart."""
 
+_VIEWS = 3
+
 
 def plot_root_locus(
     loci: Mapping[str, RootLocus] | RootLocus,
@@ -34,7 +38,7 @@ def plot_root_locus(
 ) -> Axes:
     """Draw root loci of several models: open-loop poles ×, zeros ○, branches between.
 
-    Loci of sampled loops are drawn as s = ln(z)/dt.
+    Loci of sampled loops are drawn as s = ln(z)/dt; a negative real z is drawn at both ±iπ/dt.
 
     Parameters
     ----------
@@ -45,7 +49,7 @@ def plot_root_locus(
     critical : sequence of CriticalGain, optional
         Marked on the imaginary axis; those that end stability with their gains.
     top : float, optional
-        Largest imaginary part shown, rad/s; default: as high as there are poles that move.
+        Largest imaginary part shown, rad/s; default: as high as there are poles that move, and stability ends.
 
     Returns
     -------
@@ -62,10 +66,13 @@ def plot_root_locus(
         color = CYCLE[number % len(CYCLE)]
         ax.plot(locus.loci.real, locus.loci.imag, color=color, linewidth=1.3, zorder=2 + 0.1 * number)
         ax.plot([], [], color=color, linewidth=1.3, label=label)
-        poles, zeros = np.asarray(locus.poles), np.asarray(locus.zeros)
+        other = _other_side(locus.loci, locus.dt)
+        ax.plot(other.real, other.imag, color=color, linewidth=1.3, zorder=2 + 0.1 * number)
+        poles, zeros = (np.append(p, _other_side(p[None], locus.dt)) for p in (locus.poles, locus.zeros))
         ax.plot(poles.real, poles.imag, "x", color=color, markersize=7, markeredgewidth=1.6, zorder=4)
         ax.plot(zeros.real, zeros.imag, "o", color=color, markerfacecolor="white", markersize=6, zorder=3)
-    width, height = _window(shown, _top(shown) if top is None else top)
+    end = _end(critical)
+    width, height = _window(shown, max(_top(shown), end) if top is None else top, end)
     ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1)
     plane = ", of s = ln(z)/T" if any(locus.dt for locus in several.values()) else ""
     tidy(ax).set(xlabel=f"real part{plane} (1/s)", ylabel=f"imaginary part{plane} (rad/s)")
@@ -86,6 +93,8 @@ def draw_root_locus(
 ) -> None:
     """Draw root loci in a figure, and beside them what is slow, where that would be a blot at the origin.
 
+    The first view reaches to where stability ends; there are three views at most.
+
     Parameters
     ----------
     figure : matplotlib.figure.Figure
@@ -95,25 +104,38 @@ def draw_root_locus(
         See :func:`plot_root_locus`.
     """
     figure.set_layout_engine("constrained")
-    near = close_up(loci)
-    axes = np.ravel(figure.subplots(1, 2 if near else 1, squeeze=False))
-    plot_root_locus(loci, axes[0], critical=critical)
+    tops = _views(loci, _end(critical))
+    axes = np.ravel(figure.subplots(1, len(tops), squeeze=False))
+    figure.set_size_inches(*(figure.get_size_inches() * (0.3 + 0.7 * len(tops), 1.0)))
     figure.suptitle(title, fontsize=11)
-    if near is None:
-        return
-    figure.set_size_inches(*(figure.get_size_inches() * (1.7, 1.0)))
-    close = plot_root_locus(loci, axes[1], critical=critical, top=near)
-    close.set_title("near the origin", fontsize=10)
-    (left, right), (low, high) = close.get_xlim(), close.get_ylim()
-    axes[0].add_patch(Rectangle((left, low), right - left, high - low, fill=False, color=INK, linewidth=0.8, zorder=6))
+    for ax, top in zip(axes, tops, strict=True):
+        plot_root_locus(loci, ax, critical=critical, top=top)
+    for ax, close in pairwise(axes):
+        close.set_title("near the origin" if ax is axes[0] else "nearer", fontsize=10)
+        (left, right), (low, high) = close.get_xlim(), close.get_ylim()
+        ax.add_patch(Rectangle((left, low), right - left, high - low, fill=False, color=INK, linewidth=0.8, zorder=6))
 
 
-def close_up(loci: Mapping[str, RootLocus]) -> float | None:
-    """Return how high to look for what is a blot at the origin of the whole picture; None if nothing is.
+def _views(loci: Mapping[str, RootLocus], end: float) -> list[float | None]:
+    """How high to look: over everything, near the origin, nearer."""
+    views: list[float | None] = [None]
+    near = close_up(loci, end=end)
+    while near is not None and len(views) < _VIEWS:
+        views.append(near)
+        near = close_up(loci, near)
+    return views
+
+
+def close_up(loci: Mapping[str, RootLocus], top: float | None = None, end: float = 0.0) -> float | None:
+    """Return how high to look for what is a blot at the origin of a picture; None if nothing is.
 
     Parameters
     ----------
     loci : mapping of str to RootLocus
+    top : float, optional
+        Largest imaginary part of the picture, rad/s; default: the whole.
+    end : float
+        Imaginary part that the whole must reach, rad/s.
 
     Returns
     -------
@@ -121,7 +143,7 @@ def close_up(loci: Mapping[str, RootLocus]) -> float | None:
         Largest imaginary part to show [rad/s].
     """
     shown = {label: locus.in_s() for label, locus in loci.items()}
-    width, height = _window(shown, _top(shown))
+    width, height = _window(shown, max(_top(shown), end) if top is None else top, end)
     points = np.concatenate([np.concatenate(_uncancelled(locus)) for locus in shown.values()])
     rest = max(locus.loop.rest_radius / (locus.loop.dt or 1.0) for locus in loci.values())
     share = np.maximum(abs(points.real) / (width[1] - width[0]), abs(points.imag) / (2.0 * height))
@@ -189,12 +211,36 @@ def _uncancelled(locus: RootLocus) -> tuple[np.ndarray, np.ndarray]:
     return poles[moving], zeros[gaps.min(axis=0, initial=np.inf) > _CANCELLED * np.abs(zeros)]
 
 
-def _window(loci: Mapping[str, RootLocus], top: float) -> tuple[tuple[float, float], float]:
+def _end(critical: Sequence[CriticalGain]) -> float:
+    """As high as the first end of stability is well inside."""
+    return 1.2 * next((c.omega for c in sorted(critical, key=lambda c: c.gain) if c.unstable_above), 0.0)
+
+
+def _other_side(points: np.ndarray, dt: float) -> np.ndarray:
+    """Where negative real z are too: at the other one of ±iπ/dt; nowhere where z is not.
+
+    Parameters
+    ----------
+    points : numpy.ndarray of complex, shape (N, n)
+        In s; each column a branch.
+    dt : float
+
+    Returns
+    -------
+    numpy.ndarray of complex, shape (N, m)
+        The columns that have such points.
+    """
+    edge = on_edge(points, dt)
+    other = np.where(edge, points.conj(), np.nan)
+    return np.asarray(other[:, edge.any(axis=0)])
+
+
+def _window(loci: Mapping[str, RootLocus], top: float, end: float = 0.0) -> tuple[tuple[float, float], float]:
     """Limits that show the poles and zeros and most of the branches between them."""
     fixed = np.concatenate([np.concatenate([locus.poles, locus.zeros]) for locus in loci.values()])
     moving = np.concatenate([locus.loci.ravel() for locus in loci.values()])
     moving = moving[np.isfinite(moving)]
-    height = min(top, 1.12 * float(abs(fixed.imag).max(initial=0.0)))
+    height = min(top, max(1.12 * float(abs(fixed.imag).max(initial=0.0)), end))
     height = height or 1.2 * float(np.quantile(abs(moving.imag), 0.9)) or 1.0
     near = moving[(abs(moving.imag) <= height) & (abs(moving.real) <= 3 * height)].real
     anchors = fixed.real[(abs(fixed.imag) <= height) & (abs(fixed.real) <= height)]

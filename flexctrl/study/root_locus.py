@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq, linear_sum_assignment
+from scipy.optimize import brentq
 
 from flexctrl.errors import LinearizationError, StructureError
+from flexctrl.study.branches import TREMBLE, followed, in_s, sided
 from flexctrl.study.frequency import NOISE, Crossing, loop_grid, phase_crossings
 from flexctrl.study.loop import Loop, check_loop
 
@@ -18,15 +19,10 @@ if TYPE_CHECKING:
     import control
     from matplotlib.figure import Figure
 
-__all__ = ["CriticalGain", "RootLocus", "critical_gains", "in_s", "root_locus"]
+__all__ = ["CriticalGain", "RootLocus", "critical_gains", "root_locus"]
 
-MOST_GAINS = 400
 DECADES = 1e12
 START = 50
-TURN = 0.15
-SHORT = 0.01
-CLOSEST = 1e-4
-TREMBLE = 1e-10
 SAME = 1e-6
 
 
@@ -81,7 +77,10 @@ class RootLocus:
         return critical_gains(self.loop, self)
 
     def in_s(self) -> RootLocus:
-        """The same with every z as s = ln(z)/dt, for drawing; branches are cut where they pass z = −1.
+        """The same with every z as s = ln(z)/dt, for drawing; branches are cut where they pass z = 0.
+
+        A branch along the negative real axis of z is at the one of ±iπ/dt that it comes from. What is at z = 0
+        but for rounding (deadbeat) is at −23/dt: as fast as can be told.
 
         Returns
         -------
@@ -89,7 +88,8 @@ class RootLocus:
         """
         if not self.dt:
             return self
-        poles, zeros, loci = (in_s(points, self.dt) for points in (self.poles, self.zeros, self.loci))
+        poles, zeros = in_s(self.poles, self.dt), in_s(self.zeros, self.dt)
+        loci = sided(self.loci, self.dt)
         jumps = np.abs(np.diff(loci.imag, axis=0, prepend=loci.imag[:1])) > 0.5 * np.pi / self.dt
         return replace(self, poles=poles, zeros=zeros, loci=np.where(jumps, np.nan, loci))
 
@@ -119,30 +119,13 @@ class RootLocus:
         return locus_figure(self, top)
 
 
-def in_s(z: np.ndarray, dt: float) -> np.ndarray:
-    """Poles or zeros of a sampled loop where they would be in the s-plane.
-
-    Parameters
-    ----------
-    z : array_like of complex
-    dt : float
-        Sampling time, s; with 0 the points are s already.
-
-    Returns
-    -------
-    numpy.ndarray of complex
-        ln(z)/dt.
-    """
-    points = np.asarray(z, complex)
-    return np.log(np.where(points == 0, 1e-300, points)) / dt if dt else points
-
-
 def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) -> RootLocus:
     """Closed-loop poles eig(A − k B (1 + kD)⁻¹ C) over the gain, one column a branch.
 
     The states are in scaled modal form, so eigenvalues stay right where polynomial coefficients overflow
     their digits (from about 60 states). Consecutive gains are matched by the cheapest assignment to linearly
-    extrapolated branches; gains are inserted until the assignment is unambiguous and the branches smooth.
+    extrapolated branches; gains are inserted until the assignment is unambiguous and the branches smooth, and
+    where two branches meet on the real axis.
 
     Parameters
     ----------
@@ -162,7 +145,7 @@ def root_locus(loop: Loop, gains: Sequence[float] | np.ndarray | None = None) ->
     """
     check_loop(loop, "root_locus")
     wanted = _gain_range(loop) if gains is None else _checked(gains)
-    used, loci = _followed(loop.closed_poles, np.concatenate([[0.0], wanted[wanted > 0]]))
+    used, loci = followed(loop, np.concatenate([[0.0], wanted[wanted > 0]]))
     return RootLocus(used, loci, loop.poles, loop.zeros, loop)
 
 
@@ -289,62 +272,6 @@ def _gain_range(loop: Loop) -> np.ndarray:
     last = [c.gain for c in turned if _is_crossing(loop, c)]
     most = max(10.0 / np.quantile(size, 0.25), 2.0 * max([1.0, *last]))
     return np.geomspace(max(least, most / DECADES), most, START)
-
-
-def _followed(poles_at: Callable[[float], np.ndarray], gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Branches over the gains, with gains inserted where a step is ambiguous or bends too much."""
-    used, rows = [gains[0]], [poles_at(gains[0])]
-    ahead = list(gains[:0:-1])
-    known: dict[float, np.ndarray] = {}
-    while ahead:
-        gain = ahead[-1]
-        if gain not in known:
-            known[gain] = poles_at(gain)
-        row = _matched(used, rows, gain, known[gain])
-        between = float(np.sqrt(used[-1] * gain)) or 0.1 * gain
-        fine = gain <= used[-1] * (1 + CLOSEST) or gain < 1e-6 * gains[1] or len(used) + len(ahead) >= MOST_GAINS
-        if fine or not (_ambiguous(used, rows, gain, row) or _bent(rows, row)):
-            used.append(ahead.pop())
-            rows.append(row)
-        else:
-            ahead.append(between)
-    return np.array(used), np.array(rows)
-
-
-def _predicted(used: list[float], rows: list[np.ndarray], gain: float) -> np.ndarray:
-    if len(used) < 2:
-        return rows[-1]
-    step = (gain - used[-1]) / (used[-1] - used[-2])
-    return np.asarray(rows[-1] + min(step, 3.0) * (rows[-1] - rows[-2]))
-
-
-def _matched(used: list[float], rows: list[np.ndarray], gain: float, poles: np.ndarray) -> np.ndarray:
-    cost = abs(_predicted(used, rows, gain)[:, None] - poles)
-    return np.asarray(poles[linear_sum_assignment(cost)[1]])
-
-
-def _ambiguous(used: list[float], rows: list[np.ndarray], gain: float, row: np.ndarray) -> bool:
-    """Whether a branch lies farther from its prediction than a third of the way to its neighbour."""
-    miss = abs(_predicted(used, rows, gain) - row)
-    apart = abs(row[:, None] - row)
-    np.fill_diagonal(apart, np.inf)
-    visible = miss > np.maximum(1e-3 * abs(row), _rounding(row))
-    return bool((visible & (miss > 0.3 * apart.min(axis=1, initial=np.inf))).any())
-
-
-def _bent(rows: list[np.ndarray], row: np.ndarray) -> bool:
-    """Whether a branch turns by more than 20 degrees in a step long enough to be seen."""
-    if len(rows) < 2:
-        return False
-    before, after = rows[-1] - rows[-2], row - rows[-1]
-    size = np.maximum(SHORT * abs(row), _rounding(row))
-    long = (abs(before) > size) & (abs(after) > size)
-    return bool((abs(np.angle(after[long] / before[long])) > TURN).any())
-
-
-def _rounding(row: np.ndarray) -> float:
-    """What eigenvalues of these sizes tremble by."""
-    return TREMBLE * float(abs(row).max(initial=0.0))
 
 
 def _depth(poles: np.ndarray, dt: float) -> np.ndarray:

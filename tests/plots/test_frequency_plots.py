@@ -134,6 +134,20 @@ def test_what_is_about_as_fast_is_drawn_once():
     assert close_up(slow_and_fast(2.0)) is None
 
 
+@pytest.mark.parametrize("fast", [3.0, 30.0, 1000.0])
+def test_where_stability_ends_is_shown_however_far_above_the_poles(fast):
+    """1 rad/s of swing under two lags at a multiple of that: unstable near the lags' own rate."""
+    plant = ct.ss(ct.tf([1.0, 0.5], [1.0, 0.1, 1.0])) * ct.ss(ct.tf([1.0], [1.0 / fast, 1.0])) ** 2
+    locus = root_locus(open_loop(plant))
+    (end,) = (c for c in locus.critical if c.unstable_above)
+    assert end.omega > 0.8 * fast
+    figure = plt.figure(figsize=(9.0, 6.5))
+    draw_root_locus(figure, {"flexible": locus}, "loop", locus.critical)
+    assert end.omega < 0.9 * figure.axes[0].get_ylim()[1]
+    assert {text.get_text() for text in figure.axes[0].texts} == {f"k = {end.gain:.3g}"}
+    assert any(0.05 < 1.0 / ax.get_ylim()[1] < 0.95 for ax in figure.axes)
+
+
 @pytest.mark.parametrize("unit", [1e-3, 60.0])
 def test_the_view_does_not_depend_on_the_unit_of_time(unit):
     assert close_up(slow_and_fast(300.0, unit)) == pytest.approx(unit * close_up(slow_and_fast(300.0)), rel=1e-3)
