@@ -76,8 +76,8 @@ class Automatic(Effect):
     """Of the effects beside it, a run simulates only those that the scene's answer needs.
 
     It adds no physics of its own. `Scene.settled` draws up the ledger of the scene with all the effects named and
-    keeps the smallest set that holds the answer within the tolerance. ``flexctrl run`` uses it; what is told of the
-    linear machine (modes, Bode, root locus) is of the full set.
+    keeps the smallest set that holds the answer within the tolerance. `Scene.run` and ``flexctrl run`` use it; a model
+    that is given to `Scene.run`, and what is told of the linear machine (modes, Bode, root locus), is of the full set.
 
     Parameters
     ----------

@@ -101,6 +101,12 @@ class Channel:
     output: str = ""
 
 
+class _Field(Enum):
+    """What is not given of a scene that is copied, and may be taken from it."""
+
+    STAYS = "stays"
+
+
 class Plan(ABC):
     """A controller that is designed on the scene it is for, when it is first needed."""
 
@@ -187,9 +193,9 @@ class Scene:
         *,
         structure: Structure | None = None,
         effects: Sequence[Effect] | None = None,
-        controller: Any = None,
+        controller: Any = _Field.STAYS,
         loads: Mapping[str, float | Signal] | None = None,
-        simulation: Simulation | None = None,
+        simulation: Simulation | _Field | None = _Field.STAYS,
         notes: Sequence[str] | None = None,
     ) -> Scene:
         """Return a copy with some fields replaced; what is left out stays, models of the same physics too.
@@ -197,21 +203,18 @@ class Scene:
         Parameters
         ----------
         structure, effects, controller, loads, simulation, notes
-            As for the constructor.
+            As for the constructor; ``controller=None`` and ``simulation=None`` take these away.
 
         Returns
         -------
         Scene
         """
-        given = {
-            "structure": structure,
-            "effects": effects,
-            "controller": controller,
-            "loads": loads,
-            "simulation": simulation,
-            "notes": notes if notes is None else tuple(notes),
-        }
-        found = replace(self, **{name: value for name, value in given.items() if value is not None})
+        told = notes if notes is None else tuple(notes)
+        given = {"structure": structure, "effects": effects, "loads": loads, "notes": told}
+        taken = {"controller": controller, "simulation": simulation}
+        changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        changes |= {name: value for name, value in taken.items() if value is not _Field.STAYS}
+        found = replace(self, **changes)
         if structure is not None:
             found = found._on_mesh_of(self.structure)
         if structure is None and effects is None:
@@ -328,7 +331,7 @@ class Scene:
         Parameters
         ----------
         model : Model, optional
-            Left out: `model`; give ``scene.twin`` for the rigid twin.
+            Left out: `model`, that of the `settled` scene under `Automatic`; give ``scene.twin`` for the rigid twin.
         progress : callable, optional
             Called with the fraction done.
 
@@ -341,6 +344,8 @@ class Scene:
         SceneError
             If the scene does not say how long to run.
         """
+        if model is None and self.settled is not self:
+            return self.settled.run(progress=progress)
         plan, chosen = self._simulation, model or self.model
         return simulate(
             chosen,

@@ -10,7 +10,7 @@ from flexctrl.effects.automatic import Within
 from flexctrl.study.answers import change_between
 from flexctrl.study.ledger import Entry, Ledger
 from flexctrl.study.omissions import Omission, omissions
-from flexctrl.study.smallest_set import DEARER, Choice, smallest
+from flexctrl.study.smallest_set import Choice, all_kept, smallest
 from flexctrl.study.subject import Subject, prepared
 from flexctrl.study.trials import LONG, Bench, Refused, Trial
 
@@ -101,7 +101,7 @@ class _Auditor:
             gain = self._gain(choice.trial)
             if gain * (1.0 + self._noise) >= 1.0:
                 return choice, gain
-        return Choice([], self.full, self.full, {o.name: DEARER for o in choice.gone}), 1.0
+        return all_kept(self.bench, self.items, choice), 1.0
 
     def _before(self, omission: Omission) -> list[Omission]:
         return [o for o in self.items if o.name in omission.first]

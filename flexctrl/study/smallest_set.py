@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from flexctrl.study.omissions import Omission
 from flexctrl.study.trials import Bench, Refused, Trial
 
-__all__ = ["Choice", "smallest"]
+__all__ = ["Choice", "all_kept", "smallest"]
 
 DEARER, SAVES_NOTHING = "dearer without it", "as much to compute without it"
 _CHEAPER = 0.95
@@ -62,6 +62,26 @@ def smallest(bench: Bench, items: Sequence[Omission], exact: bool) -> Choice:
     return _Search(bench, items, exact).found()
 
 
+def all_kept(bench: Bench, items: Sequence[Omission], choice: Choice) -> Choice:
+    """Return the full set in the place of one that is no faster, with why there stays what the answer could do without.
+
+    Parameters
+    ----------
+    bench : Bench
+    items : sequence of Omission
+    choice : Choice
+        The set that is no faster.
+
+    Returns
+    -------
+    Choice
+    """
+    search = _Search(bench, items, exact=False)
+    known = choice.stays | dict.fromkeys(choice.names, DEARER)
+    alone = {o.name: DEARER if o.spares else SAVES_NOTHING for o in items if search.bears(o)}
+    return Choice([], bench.full, bench.full, alone | known)
+
+
 class _Search:
     def __init__(self, bench: Bench, items: Sequence[Omission], exact: bool) -> None:
         self.bench, self.items, self.exact = bench, items, exact
@@ -97,6 +117,10 @@ class _Search:
     def _excess(self, omission: Omission) -> float:
         trial = self.bench.without(self._bundle(omission, ()))
         return float("inf") if isinstance(trial, Refused) else self.bench.excess(trial)
+
+    def bears(self, omission: Omission) -> bool:
+        """Whether the full answer can do without one thing alone."""
+        return self._excess(omission) <= 1.0
 
     def _saves(self, omission: Omission) -> bool:
         """Whether there is less to compute without it alone."""

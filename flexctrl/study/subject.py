@@ -8,6 +8,7 @@ from typing import Any, Protocol, TypeVar
 
 from flexctrl.design.controller import Controller
 from flexctrl.dynamics.run import Run
+from flexctrl.effects.automatic import Automatic
 from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError, shortened
 from flexctrl.linear.model import LinearModel
@@ -88,6 +89,9 @@ def prepared(scene: Subject, tolerance: float, study: str) -> Subject:
     plan = planned(scene, study)
     check_outputs(scene.structure, study)
     every = plan.every or plan.until / _ROWS
+    effects = [e for e in scene.effects if not isinstance(e, Automatic)]  # studies are of all that are named
+    if len(effects) < len(scene.effects):
+        scene = scene.with_(effects=effects)
     return scene.with_(controller=scene.law, simulation=replace(plan, every=every, rigid_twin=False))
 
 

@@ -3,6 +3,7 @@
 import tomllib
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scenes import TROLLEY
 
 import flexctrl as fc
+import flexctrl.scene.scene as scene_module
+import flexctrl.study.bookkeeping as bookkeeping
 import flexctrl.study.trials as trials_module
 from flexctrl.errors import StructureError
 from flexctrl.scene.files import scene_from
@@ -17,6 +20,7 @@ from flexctrl.scene.reading import Place
 from flexctrl.study.answers import Answer, answer_of, change_between, outputs_apart
 from flexctrl.study.ledger import Size
 from flexctrl.study.omissions import omissions
+from flexctrl.study.subject import prepared
 
 
 def trolley(text=TROLLEY, until=0.1, **changes) -> fc.Scene:
@@ -282,6 +286,51 @@ def test_what_saves_nothing_stays():
     entry = fc.ledger(scene, 0.02)["beam_torsion"]
     assert entry.change.outputs_worst < 1e-6
     assert entry.keep
+
+
+def deflected() -> fc.Scene:
+    """A cantilever that a small force pushes down."""
+    beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), fc.Section.tube(fc.STEEL, 0.03, 0.002))
+    push, tip = fc.Force("push", beam.end, "z"), fc.Position("tip", beam.end, "z")
+    structure = fc.Structure([beam], [fc.Support(beam.start)], inputs=[push], outputs=[tip])
+    simulation = fc.Simulation(until=0.02, method=fc.GeneralizedAlpha(1e-3))
+    effects = [fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(1e-3, 1e-9)]
+    return fc.Scene(structure, effects, loads={"push": 10.0}, simulation=simulation)
+
+
+def test_what_changes_nothing_has_its_reason_where_the_full_set_is_handed_out(monkeypatch):
+    """No smaller set is as fast by the clock: each line is over what is borne, or says why the effect stays."""
+    monkeypatch.setattr(bookkeeping._Auditor, "_gain", lambda self, trial: 1.0 if trial is self.full else 0.0)
+    found = fc.ledger(deflected(), fc.Within(outputs=0.02))
+    assert all(e.keep for e in found.entries)
+    assert found["beam_torsion"].stays == "as much to compute without it"
+    assert found["mass_damping"].stays == "dearer without it"
+    assert not found["beam_bending"].stays
+    for e in found.entries:
+        assert e.change is None or e.change.outputs_worst > 0.02 or e.stays, e.name
+
+
+def test_a_run_has_the_effects_that_the_answer_needs(monkeypatch):
+    """Those of the smallest set; a model that is given is run as it is, and a study is of all that are named."""
+    scene = deflected()
+    small = scene.with_(effects=[fc.LargeRotation()])
+    drawn = SimpleNamespace(scene=small, summary="left out: much", notes=())
+    monkeypatch.setattr(scene_module, "ledger", lambda full, tolerance: drawn)
+    chosen = scene.with_(effects=[*scene.effects, fc.Automatic(0.01)])
+    assert chosen.run().report.dofs == small.model.n == 0 < scene.model.n
+    assert chosen.run(chosen.model).report.dofs == scene.model.n
+    assert chosen.run(chosen.twin).report.dofs == 0
+    assert prepared(chosen, 0.01, "ledger").effects == scene.effects
+
+
+def test_a_scene_gives_away_its_controller_and_its_simulation():
+    scene = trolley()
+    assert scene.with_(controller=None).law is None
+    assert scene.with_(simulation=None).simulation is None
+    kept = scene.with_(loads={})
+    assert kept.controller is scene.controller
+    assert kept.simulation is scene.simulation
+    assert np.abs(scene.with_(controller=None).run()["torque"]).max() == 0.0 < np.abs(scene.run()["torque"]).max()
 
 
 def test_a_pole_that_moves_far_is_named():
