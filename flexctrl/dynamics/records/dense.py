@@ -62,13 +62,17 @@ class Hermite:
 
     def at(self, t: float) -> State:
         """Return the state at a time of the step."""
+        place, rate, turning = self.course(t)
+        return self.local.place(self.start, place, rate[: len(turning)] + turning, t)
+
+    def course(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the coordinates at a time of the step, their rates, and about what is to be added to those."""
         h = self.end.t - self.start.t
         s = (t - self.start.t) / h
         xi, first, last, turning = self._ends
         bend, twist = 3.0 * xi - 2.0 * first - last, first + last - 2.0 * xi
         place = s * (first + s * (bend + s * twist))
-        rate = (first + s * (2.0 * bend + s * 3.0 * twist))[: len(turning)] / h
-        return self.local.place(self.start, place, rate + s * s * turning, t)
+        return place, (first + s * (2.0 * bend + s * 3.0 * twist)) / h, s * s * turning
 
     def secant(self) -> State:
         """Return the middle of the step with its mean rates, which noise in the rates at its ends does not touch."""
