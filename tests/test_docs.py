@@ -9,6 +9,7 @@ import io
 import pkgutil
 import re
 import runpy
+import string
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +34,21 @@ def _printed_by(path: Path) -> str:
     with contextlib.redirect_stdout(printed):
         runpy.run_path(str(path))
     return printed.getvalue()
+
+
+def _pieces(template: str) -> list[str]:
+    """What stands between the numbers of a page that a script makes."""
+    return [text for text, *_ in string.Formatter().parse(template) if text.strip()]
+
+
+@pytest.mark.parametrize(
+    ("script", "name", "page"), [("effects", "PAGE", "benchmarks/effects.md"), ("race_page", "_LOOP", "benchmarks.md")]
+)
+def test_a_page_says_what_its_script_writes(script: str, name: str, page: str) -> None:
+    written = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    template = runpy.run_path(str(ROOT / "tests" / "benchmarks" / f"{script}.py"))[name]
+    assert "continuous" in template
+    assert [text for text in _pieces(template) if text not in written] == []
 
 
 @pytest.mark.parametrize("name", [m for m in MODULES if not m.endswith("__main__")])

@@ -86,7 +86,9 @@ def raw_place(model: Model, name: str) -> int:
         elastic = assemble(structure, [Flexible()])
         if name in elastic.coordinates:
             return int(np.flatnonzero(elastic.motion.cells == elastic.coordinate(name))[0])
-    hint = did_you_mean(name, model.coordinates)
+    known = [*dict.fromkeys([*motors, *elastic.coordinates])]  # not what effects add: a lag's torque, a bristle's bend
+    own = [other for other in known if other.startswith(f"{name}_")]  # those of a part or drive of that name
+    hint = did_you_mean("", own) if own else did_you_mean(name, known)
     raise StructureError(f"hold: the machine has no free coordinate {name!r}{hint}")
 
 

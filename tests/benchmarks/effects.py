@@ -38,6 +38,10 @@ come to rest takes one: so damping saves time. Steps in which dry friction stick
 taken in Python; one in which play closes or opens is taken again until it ends there, and the next one starts anew:
 some hundred microseconds each. That counts instead of the few instructions these laws add. The counts do not show it.
 
+A *continuous* controller together with `MotorLag`, `LuGreFriction`, `CoulombFriction` or `Backlash` takes its steps in
+Python: 70 to 250 times as long a step as without that effect. A sampled law is some 140 times quicker there with lag or
+bristles, and about ten to twenty times with dry friction or play, whose corners cost it time as well.
+
 Made with {versions}.
 """
 

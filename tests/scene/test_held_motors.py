@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.errors import SceneError
 from flexctrl.structure.refine import coarsen, refine
 
 WIND = fc.Wind({"load": 1.0}, speed=(10.0, 0.0, 0.0))
@@ -161,3 +163,12 @@ def test_a_held_node_that_a_coarser_mesh_has_not_is_told():
         fc.errors.StructureError, match=r"hold 'beam.2.w': beam 'beam' has no node there with 1 elements"
     ):
         scene.with_(structure=coarsen(scene.structure.with_(outputs=[])))
+
+
+def test_a_drive_that_is_named_itself_is_told_its_motors_angle():
+    """Not what an effect adds under a name that is nearer: the torque of a lag is nothing to hold."""
+    scene = replace(cart(fc.MotorLag({"travel": 0.05})), hold={"travel": 0.0})
+    with pytest.raises(SceneError, match=r"no free coordinate 'travel'; did you mean 'travel_source'\?"):
+        _ = scene.rest
+    with pytest.raises(SceneError, match=r"no free coordinate 'cart'; did you mean 'cart_0_u'\?"):
+        _ = replace(scene, hold={"cart": 0.0}).rest

@@ -79,7 +79,10 @@ def beyond_layers(
 
 def _told(names: list[str]) -> str:
     few = names if len(names) <= _FEW else [*names[:_FEW], f"{len(names) - _FEW} more"]
-    return f"{', '.join(few)}: set out as fast as drag lets them be, next to massless; no step sees how they come to it"
+    return (
+        f"{', '.join(few)}: these parts are nearly massless in the wind and start at the velocity at which drag "
+        "balances the other forces on them, as the steps do not resolve how they reach it"
+    )
 
 
 @dataclass(frozen=True)
