@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from flexctrl.dynamics.events.ending import ends_before
-from flexctrl.dynamics.events.landing import Missed
+from flexctrl.dynamics.events.landing import Missed, towards
 from flexctrl.dynamics.events.nearing import SHORTEST, SMALLEST
 from flexctrl.dynamics.events.switching import lead
 from flexctrl.dynamics.run import Status
@@ -95,10 +95,9 @@ def _take(journey: Journey, h: float, stop: float) -> None:
         after = journey.stepper.step(journey.point, h)
     except StepError as failure:
         journey.mark.rejected += 1
-        if h < 2e-3 * journey.mark.size:
-            why = f"{failure}; steps up to {journey.mark.size:.3g} s have failed too; take AdaptiveAlpha"
-            raise StepError(failure.worst, why) from failure
-        return _halved(journey, h, stop)
+        if h >= 2e-3 * journey.mark.size:
+            return _halved(journey, h, stop)
+        after = _short_of_its_end(journey, h, failure)
     try:
         journey.accept(after, stop)
     except Missed:
@@ -106,6 +105,17 @@ def _take(journey: Journey, h: float, stop: float) -> None:
         if h < 2e-3 * journey.mark.size:
             raise
         _halved(journey, h, stop)
+
+
+def _short_of_its_end(journey: Journey, h: float, failure: StepError) -> Point:
+    """Take a step a little shorter: its end, and that of all its halves, may be just where a force jumps."""
+    try:
+        if journey.watch.corner_names:
+            return towards(journey, journey.point, h)
+    except StepError:
+        pass
+    why = f"{failure}; steps up to {journey.mark.size:.3g} s have failed too; take AdaptiveAlpha"
+    raise StepError(failure.worst, why) from failure
 
 
 def _halved(journey: Journey, h: float, stop: float) -> None:

@@ -102,3 +102,30 @@ def test_where_the_coarser_run_does_not_follow_the_end_says_so(method, remedy):
     assert run.status is fc.Status.FAILED
     assert "the coarser of the two runs of Richardson no longer follows the motion" in run.report.message
     assert remedy in run.report.message
+
+
+def struck(speed: float, rho: float) -> fc.Run:
+    """A mass that meets a damped spring behind 10 mm of play, on its way to a wall."""
+    ball, wall = fc.PointMass("ball", (0, 0, 0), 1.0), fc.PointMass("wall", (1, 0, 0), 0.01)
+    stop = fc.Spring("stop", ball.node, wall.node, stiffness=1e5, length=1.0, damping=10.0)
+    ground = fc.Spring("ground", wall.node, (2, 0, 0), stiffness=1e8, length=1.0)
+    joints = [fc.Pin(stop.start, ball.node), fc.Pin(stop.end, wall.node), fc.Pin(ground.start, wall.node)]
+    joints += [fc.Support(ground.end, "u v w"), fc.Support(ball.node, "v w"), fc.Support(wall.node, "v w")]
+    machine = fc.Structure(
+        [ball, wall, stop, ground], joints, outputs=[fc.Position("x", ball.node, "x"), fc.Velocity("v", ball.node, "x")]
+    )
+    model = fc.assemble(machine, [fc.LargeRotation(), fc.Backlash({"stop": 0.02})])
+    method = fc.Richardson(fc.GeneralizedAlpha(1e-3, rho=rho))
+    return fc.simulate(model, until=0.03, start=model.rest.with_(v=np.array([speed, 0.0])), method=method, every=1e-3)
+
+
+@pytest.mark.parametrize("speed", [1.25, 1.0, 0.5])
+@pytest.mark.parametrize("rho", [0.9, 1.0])
+def test_a_damped_corner_just_at_the_end_of_a_step_is_passed(speed, rho):
+    """Where the force jumps no step ends, nor do its halves, which end there too."""
+    run, beside = struck(speed, rho), struck(1.0001 * speed, rho)
+    assert run.status is fc.Status.FINISHED
+    assert len(run.t) == 31
+    assert run["v"] == pytest.approx(beside["v"], abs=0.02 * speed)
+    assert run["v"][-1] == pytest.approx(beside["v"][-1], rel=1e-3)
+    assert run.events[0].t == pytest.approx(0.01 / speed, abs=1e-9)

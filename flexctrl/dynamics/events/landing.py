@@ -27,7 +27,7 @@ from flexctrl.dynamics.steps import Point, StepError
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Missed", "landed"]
+__all__ = ["Missed", "landed", "towards"]
 
 _NEAR = 1e-9
 
@@ -97,7 +97,7 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
         if at - t <= SMALLEST * h or bracket.high - bracket.low <= max(LEAD_MOST * h, lead):
             break
         try:
-            after = _towards(journey, before, at - t)
+            after = towards(journey, before, at - t)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
         (first, final), end = (before.firm, after.firm), after.state.t
@@ -123,7 +123,7 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
     return found, replace(crossing, t=when)
 
 
-def _towards(journey: Journey, before: Point, h: float) -> Point:
+def towards(journey: Journey, before: Point, h: float) -> Point:
     """Take a step to a corner, or just short of it: where a force jumps there, no step ends on it."""
     for k in range(TRIES):
         try:
