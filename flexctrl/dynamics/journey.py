@@ -306,7 +306,7 @@ class Journey:
             stepper = stepper.plain
         held = replace(self.point, state=self.under(fresh.u))
         self.point = stepper.renew(held, fresh, step)
-        self.books.jump(held, self.point)
+        self.books.jump(held, self.point, step)
 
     def coming(self, t: float) -> float:
         """Return the length of the step after a stop, which is over."""

@@ -229,6 +229,7 @@ def _begun(
         ) from None
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method, plan.tolerance)
+    books.turn(point, size)
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), notes=notes)
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
         journey.notes += (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)

@@ -16,8 +16,9 @@ class MotorLag(Effect):
     """The torque of a motor follows its command as T τ̇ + τ = M_d, with the electrical time constant T = L/R.
 
     τ is an inner first-order freedom ``<drive>_lag``; a linear model holds it exactly. Limits of torque belong to
-    the hardware round a controller, `Saturated`. Where T is below half a step of a simulation, the torque is late by
-    half a step instead: the error of the speed after a change ΔM of the command is at most ΔM h/(2 J).
+    the hardware round a controller, `Saturated`. Where T is below half a step h of a simulation, what the motor turns
+    gets the impulse of its torque right and is off by about ΔM h T/(2 J) in angle after a change ΔM of the command: as
+    T goes to zero, runs go to those without lag.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.swift.easing import eased_change, eased_rate, unresolved
+from flexctrl.dynamics.swift.fleeting import felt_rates
 from flexctrl.dynamics.swift.massless import Massless, massless
 from flexctrl.dynamics.swift.settling import settled, steadied
 from flexctrl.errors import SingularMatrixError
@@ -67,14 +68,20 @@ def _set_out(
     """Return a state with the rates of what has no mass, the inputs there, and the accelerations of all others."""
     flows = stepper.model.motion.flows
     state, supply = light.pushed(flowing(stepper.model, state, supply.u), supply)
-    force = stepper.model.balance(state, state.v, np.zeros(stepper.model.n)) + stepper.model.loads(state, supply.u)
-    if flows.size:
-        force[flows] = flow_rates(stepper.model, state, supply.u, step)
+    felt, changes = _felt(stepper, state, supply, step) if flows.size else (state, np.zeros(0))
+    force = stepper.model.balance(felt, felt.v, np.zeros(stepper.model.n)) + stepper.model.loads(felt, supply.u)
+    force[flows] = changes
     rate = _mass(stepper, state, supply, step, light)(force)
     if light.all.size:
         state, rate = light.moving(state, rate, supply, step)
         supply = stepper.feed.restart(state, supply)
     return state, supply, rate
+
+
+def _felt(stepper: Stepper, state: State, supply: Supply, step: float) -> tuple[State, np.ndarray]:
+    """Return a state as others feel freedoms of first order from the outset, and how fast the rates of these change."""
+    c, changes = stepper.coefficients, flow_rates(stepper.model, state, supply.u, step)
+    return state.with_(v=felt_rates(stepper.model, state.v, changes, step, c.beta, c.gamma)), changes
 
 
 def renew(stepper: Stepper, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
@@ -95,12 +102,12 @@ def join(stepper: Stepper, point: AlphaPoint, supply: Supply, step: float) -> Al
     makes a lead that throws it.
     """
     c, fresh = stepper.coefficients, _fresh(stepper, point.state, supply, step)
-    state, rate = fresh.state, fresh.rate
+    state, rate = (eased := _eased(stepper, fresh, step)).state, eased.rate
     change = stepper.model.slope(state, state.v, rate, (1.0, 0.0, 0.0), supply.u) @ state.v
     change += stepper.model.slope(state, state.v, rate, (0.0, 1.0, 0.0), supply.u) @ rate
     lead = (c.alpha_m - c.alpha_f) * step * _held(stepper, state, supply, step)(change)
     lead[stepper.model.motion.flows] = 0.0
-    return _eased(stepper, replace(fresh, algorithmic=rate + lead), step)
+    return _eased(stepper, replace(fresh, algorithmic=fresh.rate + lead), step)
 
 
 def _eased(stepper: Stepper, point: AlphaPoint, step: float) -> AlphaPoint:

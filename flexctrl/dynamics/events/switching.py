@@ -73,8 +73,9 @@ def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
     supply = journey.plan.feed.restart(state, at.supply)
     _follow(journey, at.state, state, supply.u)
     journey.point = replace(at, state=state, supply=supply)
-    lead(journey, min(journey.mark.size, journey.mark.cap) if journey.mark.follow else journey.mark.size)
-    journey.books.turn(journey.point)
+    step = min(journey.mark.size, journey.mark.cap) if journey.mark.follow else journey.mark.size
+    lead(journey, step)
+    journey.books.turn(journey.point, step)
     return journey.point
 
 

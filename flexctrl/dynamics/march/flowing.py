@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexctrl.dynamics.swift.easing import felt_rate, unresolved
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 from flexctrl.model.flat.flat import Flat, clear, drive, place, push
 from flexctrl.model.flat.flattened import Flattened
 
-__all__ = ["Flows", "flow_on", "flows_of", "pivot", "released"]
+__all__ = ["Flows", "feel_mean", "flow_on", "flows_of", "pivot", "released"]
 
 _SHARE = 1e-3
 
@@ -35,6 +36,8 @@ class Flows:
         Rate per unit of force; 0 where no rate holds against it.
     rates, changes : Reals
         Their rates, and how fast these change.
+    shares : Reals
+        What others feel of their rates at the outset; less than 1 of what is over within the step.
     mass : float
         What stands for their mass, which they do not have.
     """
@@ -48,6 +51,7 @@ class Flows:
     ease: Reals
     rates: Reals
     changes: Reals
+    shares: Reals
     mass: float
 
 
@@ -57,14 +61,14 @@ def flows_of(F: Flattened) -> Flows:
     still, ease = np.zeros(model.n), np.zeros(inner.size)
     if not inner.size:
         none = np.zeros(0, dtype=int)
-        return Flows(0, none, none, none, ease, ease, ease, 0.0)
+        return Flows(0, none, none, none, ease, ease, ease, ease, 0.0)
     drag = -model.slope(model.rest, still, still, (0.0, 1.0, 0.0), np.zeros(len(model.inputs))).diagonal()[inner]
     np.divide(1.0, drag, out=ease, where=drag > 0.0)
     mass = float(model.mass().diagonal().max()) or 1.0
-    rates, changes = np.zeros((2, inner.size))
+    rates, changes, shares = np.zeros((3, inner.size))
     settles = np.isin(inner, model.motion.settling).astype(np.int64)
     position, cells = F.plan.position[inner], F.plan.places(inner, inner)
-    return Flows(inner.size, position, cells, settles, ease, rates, changes, mass)
+    return Flows(inner.size, position, cells, settles, ease, rates, changes, shares, mass)
 
 
 def flow_on(w: Flows, f: Flat, h: float) -> None:
@@ -82,6 +86,15 @@ def flow_on(w: Flows, f: Flat, h: float) -> None:
         f.v[w.places[k]] = w.rates[k]
     clear(f.padded, f.step)
     place(f)
+
+
+def feel_mean(w: Flows, f: Flat, h: float, beta: float, gamma: float) -> None:
+    """Let all others feel the mean of what settles and is over within the step."""
+    for k in range(w.count):
+        w.shares[k] = 1.0
+        if w.settles[k] == 1 and unresolved(w.rates[k], w.changes[k], h):
+            f.v[w.places[k]] = felt_rate(w.rates[k], w.changes[k], h, beta, gamma)
+            w.shares[k] = f.v[w.places[k]] / w.rates[k]
 
 
 def flow(w: Flows, f: Flat) -> None:

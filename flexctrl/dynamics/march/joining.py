@@ -44,7 +44,7 @@ def start_anew(m: March) -> int:
     copy(f.padded, m.v, f.v)
     copy(f.padded, m.rate, f.rate)
     at_rest_in(m)
-    if m.losing == 1:
+    if m.losing == 1 and m.flows.count == 0:
         energy(f)
         m.power = f.books[2]
     if not firm(m):

@@ -7,11 +7,11 @@ import math
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.books import copy
 from flexctrl.dynamics.march.contacts import bear_more, feel
-from flexctrl.dynamics.march.flowing import flow_on, pivot, released
+from flexctrl.dynamics.march.flowing import feel_mean, flow_on, pivot, released
 from flexctrl.dynamics.march.holding import follows, held, settled_lead
 from flexctrl.dynamics.march.record import DONE, FAILED, SINGULAR, WANTS_MASS, March
 from flexctrl.dynamics.march.step import sloped
-from flexctrl.dynamics.swift.easing import eased_change, eased_rate, unresolved
+from flexctrl.dynamics.swift.easing import eased_change, eased_rate
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import accelerate, clear, drive, energy, load, press_entire, pull, push
@@ -53,6 +53,7 @@ def jump(m: March) -> int:
             return status
     if m.flows.count > 0:
         flow_on(m.flows, f, m.h)
+        feel_mean(m.flows, f, m.h, m.beta, m.gamma)
     if m.attempt == 1 or m.unsure == 1 or m.flows.count > 0 or not small(m):
         status = solved_for(m)
         if status != DONE:
@@ -98,15 +99,45 @@ def run_on(m: March) -> None:
         i = m.flows.places[k]
         m.v[i] = m.flows.rates[k]
         f.rate[i] = m.flows.changes[k]
-        if m.flows.settles[k] == 1 and unresolved(m.v[i], f.rate[i], m.h):
+        if m.flows.shares[k] < 1.0:
             m.v[i] = eased_rate(m.flows.rates[k], m.flows.changes[k], m.h, m.beta, m.gamma)
             f.rate[i] = eased_change(m.flows.rates[k], m.flows.changes[k], m.h, m.beta, m.gamma)
             f.v[i] = m.v[i]
             m.algorithmic[i] = m.rate[i]
     if m.losing == 1:
+        m.power = felt_power(m)
+
+
+@seldom
+def felt_power(m: March) -> float:
+    """Return the power whose mean with the one at the end is dissipated over the step; see `swift.fleeting`."""
+    f = m.flat
+    over = 0
+    for k in range(m.flows.count):
+        if m.flows.shares[k] < 1.0:
+            f.v[m.flows.places[k]] = 0.0
+            over += 1
+    lost = wasted(m)
+    if over > 0:
+        left = lost
+        for k in range(m.flows.count):
+            if m.flows.shares[k] < 1.0:
+                i = m.flows.places[k]
+                f.v[i] = m.flows.rates[k]
+                lost += m.flows.shares[k] * (wasted(m) - left)
+                f.v[i] = 0.0
+        for k in range(m.flows.count):
+            f.v[m.flows.places[k]] = m.v[m.flows.places[k]]
         drive(f)
-        energy(f)
-        m.power = f.books[2]
+    return lost
+
+
+@seldom
+def wasted(m: March) -> float:
+    """Return the power that the motion under way dissipates."""
+    drive(m.flat)
+    energy(m.flat)
+    return m.flat.books[2]
 
 
 def spent(m: March) -> bool:

@@ -174,6 +174,8 @@ class Marcher(Loops):
         m.drawing, m.gained, m.lost, m.entered = 1, sums.work, sums.lost, sums.entered
         m.begun, m.moving, m.turnover, m.gap, m.made = sums.start, sums.moving, sums.turnover, sums.gap, sums.made
         m.closing.open = sums.closure
+        if m.losing and self.model.motion.flows.size:  # which may be over within the step: their state does not tell
+            m.power = sums.power
 
     def worst(self) -> int:
         """Return the degree of freedom with the largest correction in the last iteration."""

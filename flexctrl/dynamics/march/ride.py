@@ -298,4 +298,5 @@ class Ride:
         if not self.jumped:
             held = replace(j.point, state=j.under(self.supply.u))
             j.point = self.stepper.plain.renew(held, self.supply, j.mark.size)
+            j.books.turn(j.point, j.mark.size)
         return True

@@ -15,6 +15,7 @@ from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Integrator, Point
+from flexctrl.dynamics.swift.fleeting import felt_power
 from flexctrl.dynamics.swift.settling import dragged, quasistatic
 from flexctrl.dynamics.swift.stiff_lines import noise, stiffest
 from flexctrl.model.state import State
@@ -104,13 +105,13 @@ class Books:
         if sums.entered < OFTEN or sums.entered % OFTEN == 0:
             self.close(after)
 
-    def jump(self, before: Point, after: Point) -> None:
-        """Note that rates have jumped with the inputs, and with them what is dissipated.
+    def jump(self, before: Point, after: Point, step: float) -> None:
+        """Note that rates have jumped with the inputs before a step, and with them what is dissipated.
 
         Places of what has no mass have jumped too: what the inputs did on the way and springs do not store is lost.
         """
         if self.model.motion.flows.size or dragged(self.model).size:
-            self.turn(after)
+            self.turn(after, step)
         if isinstance(self.model, LinearPlant) or quasistatic(self.model).size:
             (k0, v0, _), (k1, v1, _) = (self.model.energy(point.state) for point in (before, after))
             moved = after.state.q - before.state.q
@@ -119,10 +120,10 @@ class Books:
             self.sums.lost += work - (k1 + v1 - k0 - v0)
             self.sums.moved = np.maximum(self.sums.moved, np.abs(after.state.q - self.first))
 
-    def turn(self, point: Point) -> None:
-        """Note that what is dissipated jumps."""
+    def turn(self, point: Point, step: float) -> None:
+        """Note that what is dissipated jumps before a step."""
         if self.dissipates:
-            self.sums.power = self.model.energy(point.state)[2]
+            self.sums.power = felt_power(self.model, point.state, point.rate, point.supply.u, step)
 
     def _trapezoid(self, before: Point, after: Point) -> None:
         loads = self.model.loads

@@ -2,14 +2,15 @@
 
 What tends to its balance as exp(−λt) begins with the rate λD and its change −λ²D. A step that does not see the time
 1/λ makes nonsense of these. So they are chosen anew: those from which Newmark's formulas, with the change of the rate
-that there is at the end, arrive at the place and the rate that there are at the end.
+that there is at the end, arrive at the place and the rate that there are at the end. What they push feels their mean
+over the step: a motor whose torque is there after a thousandth of it is pushed from the outset.
 """
 
 from __future__ import annotations
 
 import math
 
-__all__ = ["eased_change", "eased_rate", "unresolved"]
+__all__ = ["eased_change", "eased_rate", "felt_rate", "unresolved"]
 
 _SEEN = 2.0
 _FLAT = 0.02
@@ -37,3 +38,13 @@ def eased_rate(rate: float, change: float, h: float, beta: float, gamma: float) 
     left = math.exp(-z)
     way = rate * ((1.0 - left) / z + beta * z * left)
     return way - h * (0.5 - beta) * eased_change(rate, change, h, beta, gamma)
+
+
+def felt_rate(rate: float, change: float, h: float, beta: float, gamma: float) -> float:
+    """Return the rate whose mean with the one that a step ends with is the mean over it.
+
+    Where the end does not depend on how the rate changes (ρ near 0) the step begins and ends with the mean.
+    """
+    if 0.5 + beta - gamma < _FLAT:
+        return eased_rate(rate, change, h, beta, gamma)
+    return eased_rate(rate, change, h, 0.25, 0.5)
