@@ -19,7 +19,7 @@ from flexctrl.study.loop import Loop
 from flexctrl.study.root_locus import CriticalGain, RootLocus, critical_gains, root_locus
 
 _LEAST_GAIN = 1e-9
-_LEAST_SHOWN, _SHOWN, _BEYOND, _COUNT = 1e-3, 30.0, 1.5, 150
+_LEAST_SHOWN, _SHOWN, _BEYOND, _COUNT = 1e-3, 30.0, 1.5, 120
 """Gains drawn of a controller, whose own gain is 1, and how far beyond the one at which stability is lost."""
 
 

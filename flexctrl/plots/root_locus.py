@@ -217,7 +217,7 @@ def _end(critical: Sequence[CriticalGain]) -> float:
 
 
 def _other_side(points: np.ndarray, dt: float) -> np.ndarray:
-    """Where negative real z are too: at the other one of ±iπ/dt; nowhere where z is not.
+    """Mirror images of branches that are somewhere at ±iπ/dt, where each of them is on one side only.
 
     Parameters
     ----------
@@ -228,11 +228,8 @@ def _other_side(points: np.ndarray, dt: float) -> np.ndarray:
     Returns
     -------
     numpy.ndarray of complex, shape (N, m)
-        The columns that have such points.
     """
-    edge = on_edge(points, dt)
-    other = np.where(edge, points.conj(), np.nan)
-    return np.asarray(other[:, edge.any(axis=0)])
+    return np.asarray(points[:, on_edge(points, dt).any(axis=0)].conj())
 
 
 def _window(loci: Mapping[str, RootLocus], top: float, end: float = 0.0) -> tuple[tuple[float, float], float]:

@@ -17,7 +17,7 @@ ROOM = 100
 
 TURN = 0.1
 SHORT = 0.01
-CLOSEST = 1e-4
+CLOSEST = 1e-5
 TREMBLE = 1e-10
 DEADBEAT = 1e-10
 """Where z is 0 but for the rounding of the eigenvalues, which are about 1."""

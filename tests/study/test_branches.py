@@ -33,6 +33,8 @@ LOOPS = {
     "sampled lags": open_loop(ct.sample_system(ct.ss(*tf2ss([1.0], [1, 2, 0])), 0.05)),
     "sampled chain": open_loop(chain(3, beta=0.02), ct.sample_system(ct.tf([5, 1], [0.05, 1]), 0.1), "force", "x1"),
     "negative z": open_loop(ct.sample_system(ct.ss(*tf2ss([1.0], [1, 0.02, 1])), 0.1), ct.tf([2, -1.8], [1, 0.2], 0.1)),
+    "from negative z": open_loop(ct.ss([[-1.1, 0.3], [-0.3, -0.3]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], 1.0)),
+    "along negative z": open_loop(ct.ss(*tf2ss([1.0], np.poly([-0.5, -0.7 + 0.02j, -0.7 - 0.02j]).real), 1.0)),
     "deadbeat": with_deadbeat_poles(),
 }
 every_loop = pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
@@ -45,13 +47,13 @@ def gap(points: np.ndarray, others: np.ndarray) -> float:
 
 @every_loop
 def test_poles_at_every_gain_are_symmetric_about_the_real_axis(loop):
-    """Also as s, where a negative z is at ±iπ/dt."""
+    """Also as s, where a negative z is at ±iπ/dt; but for the gain at which a branch is cut."""
     locus = root_locus(loop, np.geomspace(1e-3, 30.0, 150))
     for row, s in zip(locus.loci, locus.in_s().loci, strict=True):
         assert gap(row.conj(), row) <= 1e-12 * abs(row).max()
         s = s[np.isfinite(s)]
         there = np.concatenate([s, s[abs(s.imag) * loop.dt > 3.14159265].conj()])
-        assert gap(s.conj(), there) <= 1e-9 * abs(s).max()
+        assert len(s) < len(row) or gap(s.conj(), there) <= 1e-9 * abs(s).max()
 
 
 @every_loop
@@ -70,6 +72,15 @@ def test_what_is_drawn_is_symmetric_about_the_real_axis(loop):
     drawn = drawn[(abs(drawn - [0.5, 0.0]) <= 0.5).all(axis=1) & np.isfinite(drawn).all(axis=1)] @ [1.0, 1.0j]
     assert low < 0
     assert gap(np.unique(np.round(drawn, 3)).conj(), drawn) < 0.01
+
+
+def test_a_cut_between_two_sides_takes_no_pole_out_of_the_picture():
+    """A pair that has met at a negative z parts again, where either branch may go to the other's side."""
+    loop = LOOPS["along negative z"]
+    locus = root_locus(loop, np.geomspace(1e-5, 0.1, 150))
+    lines = [line for line in plot_root_locus(locus).lines if line.get_linewidth() == 1.3]
+    drawn = np.concatenate([line.get_xdata() + 1j * np.asarray(line.get_ydata()) for line in lines])
+    assert gap(np.log(locus.loci.ravel()), drawn[np.isfinite(drawn)]) < 1e-9
 
 
 def test_a_deadbeat_pole_stays_at_minus_23_over_the_sampling_time():
