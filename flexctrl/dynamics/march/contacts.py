@@ -16,7 +16,6 @@ from flexctrl.model.flat.flat import Flat, carry, clear
 from flexctrl.model.flat.flattening import Flattened, layout_of
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.laws.kinds import DRIVE_SLOT
-from flexctrl.model.laws.switches import FADING
 from flexctrl.model.state import Dry
 
 __all__ = [
@@ -64,6 +63,8 @@ class Contacts:
         These, with the sign of what they bear.
     speeds, changes, borne : Reals
         Slip speeds, their rates and forces that hold at the start of the step.
+    fading : float
+        How fast what is astray fades [1/s].
     known : int
         Whether these are known.
     watched : int
@@ -88,6 +89,7 @@ class Contacts:
     speeds: Reals
     changes: Reals
     borne: Reals
+    fading: float
     stuck: int = 0
     known: int = 0
     watched: int = 0
@@ -121,6 +123,7 @@ def contacts_of(F: Flattened) -> Contacts:
         speeds=speeds,
         changes=changes,
         borne=borne,
+        fading=switches.fading,
     )
 
 
@@ -153,9 +156,9 @@ def feel(c: Contacts, f: Flat) -> None:
                 row[i] = f.force[i]
 
 
-def firmness(on_rate: float, on_acceleration: float) -> float:
+def firmness(c: Contacts, on_rate: float, on_acceleration: float) -> float:
     """Return the slope of what is astray, for motions that add these times an increment to rates and accelerations."""
-    return on_acceleration + FADING * on_rate + 0.25 * FADING * FADING
+    return on_acceleration + c.fading * on_rate + 0.25 * c.fading * c.fading
 
 
 def astray(c: Contacts, k: int) -> float:
@@ -163,7 +166,7 @@ def astray(c: Contacts, k: int) -> float:
     own = c.found[c.width * k :]
     away = own[2] - c.anchors[k]
     away -= _TURN * math.floor(away / _TURN + 0.5)
-    return own[1] + FADING * own[0] + 0.25 * FADING * FADING * away
+    return own[1] + c.fading * own[0] + 0.25 * c.fading * c.fading * away
 
 
 def along(n: int, a: Reals, b: Reals) -> float:

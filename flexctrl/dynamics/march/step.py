@@ -295,7 +295,7 @@ def correct(m: March) -> float:
         if (
             m.contacts.count > 0
             and m.contacts.stuck > 0
-            and not held(m, m.tangent, 1.0 / firmness(to_v(m), to_rate(m)))
+            and not held(m, m.tangent, 1.0 / firmness(m.contacts, to_v(m), to_rate(m)))
         ):
             return math.nan
     speed = to_v(m)

@@ -3,7 +3,8 @@
 What sticks is held without a multiplier: the equations of motion lose their components along the slip
 directions W of the contacts that stick, and s̈ + κ ṡ + ¼ κ² (s − s₀) = 0 takes their place, with s the angle or
 travel of a contact and s₀ where it stuck. The force that holds is read off the components lost. Phases belong to
-the state; where they end is told by gaps, which are positive while they last.
+the state; where they end is told by gaps, which are positive while they last. Speeds, forces and κ are measured by
+what the contacts themselves do (`slip_scales`), so that nothing hangs on the units of a machine.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ import scipy.sparse as sp
 
 from flexctrl.effects.coulomb_friction import CoulombFriction
 from flexctrl.errors import StructureError
+from flexctrl.model.flows import flowing
 from flexctrl.model.laws.friction_kinds import STUCK
+from flexctrl.model.laws.slip_scales import SlipScales, slip_scales
 from flexctrl.model.laws.slips import Slips
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import Dry, State
@@ -26,12 +29,12 @@ from flexctrl.model.state import Dry, State
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
 
-__all__ = ["FADING", "Switches"]
+__all__ = ["Switches"]
 
 Force = TypeVar("Force", np.ndarray, sp.csr_matrix)
 T = TypeVar("T")
 
-FADING = 1e4
+_FADING = 1e4
 _STILL = 1e-10
 _SLACK = 1e-9
 _DEPENDENT = 1e12
@@ -69,6 +72,16 @@ class Switches:
         """What each contact bears before it breaks loose [N or N m]."""
         return np.concatenate([np.zeros(0), *(f.parameters[:, 4] for f in self.slips.families)])
 
+    @cached_property
+    def scales(self) -> SlipScales:
+        """What small and large speeds and times are to the contacts."""
+        return slip_scales(self.model, self.slips.rows(self.model.rest), self.static)
+
+    @cached_property
+    def fading(self) -> float:
+        """κ: how fast what is astray of a contact that sticks fades [1/s]."""
+        return _FADING * self.scales.rate
+
     def phases(self, state: State) -> np.ndarray:
         """Return the phase of each contact."""
         return state.dry.phase[self.slips.order]
@@ -97,7 +110,7 @@ class Switches:
         speeds, rates, places = self.slips.at(state, v, a)
         astray = places - state.dry.anchor[self.slips.order]
         astray -= 2.0 * np.pi * np.rint(astray / (2.0 * np.pi))
-        slip = rates + FADING * speeds + 0.25 * FADING**2 * astray
+        slip = rates + self.fading * speeds + 0.25 * self.fading**2 * astray
         return force - back @ (W @ force + self._weight * slip[self.phases(state) == STUCK])
 
     def freed(self, state: State, force: Force) -> Force:
@@ -115,7 +128,7 @@ class Switches:
     def held_slope(self, state: State, slope: sp.csr_matrix, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return the slope of `held` from that of the balance without."""
         W, back = self._hold(state)
-        hold = seeds[2] + FADING * seeds[1] + 0.25 * FADING**2 * seeds[0]
+        hold = seeds[2] + self.fading * seeds[1] + 0.25 * self.fading**2 * seeds[0]
         rows = W @ slope + hold * self._weight * W
         return sp.csr_matrix(slope - sp.csr_matrix(back) @ sp.csr_matrix(rows))
 
@@ -177,17 +190,17 @@ class Switches:
         Returns
         -------
         numpy.ndarray, shape (contacts,)
-            Sliding: the slip speed in its direction [m/s or rad/s]; sticking: the force left before it breaks
-            loose [N or N m].
+            Sliding: the slip speed in its direction, in `scales`; sticking: the share of the force it bears that is
+            left before it breaks loose.
         """
         phases = self.phases(state)
-        gaps = np.where(phases == 0.0, 1.0, phases * self.slips.speeds(state))
+        gaps = np.where(phases == 0.0, 1.0, phases * self.slips.speeds(state) / self.scales.speeds)
         stuck = phases == STUCK
         if stuck.any():
             held = self._once("gaps", state, lambda: (u, self._holding(state, u)[0]))
             if not np.array_equal(held[0], u):
                 held = (u, self._holding(state, u)[0])
-            gaps[stuck] = self.static[stuck] - np.abs(held[1])
+            gaps[stuck] = 1.0 - np.abs(held[1]) / self.static[stuck]
         return gaps
 
     def gap(self, state: State, u: np.ndarray, contact: int) -> float:
@@ -206,7 +219,7 @@ class Switches:
         phase = float(self.phases(state)[contact])
         if phase in (0.0, STUCK):
             return float(self.gaps(state, u)[contact])
-        return phase * float(self.slips.speeds(state)[contact])
+        return phase * float(self.slips.speeds(state)[contact] / self.scales.speeds[contact])
 
     def _holding(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the forces that hold what sticks, and the accelerations of what has mass."""
@@ -245,7 +258,8 @@ class Switches:
             return state
         self._check_mass(state, u)
         speeds = self.slips.speeds(state)
-        return self._settled(state, u, np.where(np.abs(speeds) <= _STILL, STUCK, np.sign(speeds)))
+        phases = np.where(np.abs(speeds) <= _STILL * self.scales.speeds, STUCK, np.sign(speeds))
+        return self._settled_under(state, u, phases)
 
     def under(self, state: State, u: np.ndarray) -> State:
         """Return a state under inputs that have jumped: what they overcome breaks loose.
@@ -259,7 +273,7 @@ class Switches:
         -------
         State
         """
-        return self._settled(state, u, self.phases(state).copy()) if self.sticks(state) else state
+        return self._settled_under(state, u, self.phases(state).copy()) if self.sticks(state) else state
 
     def like(self, state: State, other: State) -> State:
         """Return a state whose contacts do what those of another, nearby state do.
@@ -316,6 +330,10 @@ class Switches:
         phases[contact] = STUCK
         state = self._with(state, phases)
         return state.with_(v=self.still(state, state.v))
+
+    def _settled_under(self, state: State, u: np.ndarray, phases: np.ndarray) -> State:
+        """Settle under inputs that may have jumped: freedoms of first order follow them before anything is moved."""
+        return state.with_(dry=self._settled(flowing(self.model, state, u), u, phases).dry)
 
     def _settled(self, state: State, u: np.ndarray, phases: np.ndarray) -> State:
         """Break loose what cannot be held, the worst first, each once; what would then slide back is held after all."""
