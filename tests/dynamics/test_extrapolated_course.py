@@ -43,6 +43,18 @@ def hinged() -> tuple[fc.Model, np.ndarray, dict[str, float]]:
     return fc.assemble(machine, [fc.LargeRotation()]), np.array([0, 0, 0, 3, -2, 4, 5.0]), {"twist": 2.0}
 
 
+def hung() -> tuple[fc.Model, np.ndarray, dict[str, float]]:
+    """A load on a rigid rope that sways in two directions."""
+    rope, load = fc.Rope("rope", (0, 0, 0), (0.6, 0, -0.8), EA=1e6), fc.PointMass("load", (0.6, 0, -0.8), 2.0)
+    machine = fc.Structure(
+        [rope, load],
+        [fc.Support(rope.start, "u v w"), fc.Pin(rope.end, load.node)],
+        inputs=[fc.Force("push", load.node, "y")],
+        outputs=[t for c in "xyz" for t in (fc.Position(c, load.node, c), fc.Velocity(f"v{c}", load.node, c))],
+    )
+    return fc.assemble(machine, [fc.LargeRotation(), fc.Gravity()]), np.array([2.0, 3.0]), {"push": 3.0}
+
+
 def sliding() -> tuple[fc.Model, np.ndarray, dict[str, float]]:
     """A block that slides along a free body."""
     body = fc.RigidBody("body", (0, 0, 0), 3.0, INERTIA, {"rail": (0.3, 0.1, 0)})
@@ -60,7 +72,7 @@ def _told(place: fc.Node, spin: fc.Node) -> list:
     return [t for c in "xyz" for t in (fc.Position(c, place, c), fc.AngularVelocity(f"w{c}", spin, c))]
 
 
-MACHINES = {"rocket": rocket, "hinged": hinged, "sliding": sliding}
+MACHINES = {"rocket": rocket, "hinged": hinged, "hung": hung, "sliding": sliding}
 
 
 @cache
@@ -79,8 +91,8 @@ def alpha(h: float) -> fc.GeneralizedAlpha:
 
 @pytest.mark.parametrize(
     ("name", "method"),
-    [("rocket", alpha), ("rocket", fc.ConservingMidpoint), ("hinged", alpha), ("sliding", alpha)],
-    ids=["rocket", "rocket, midpoint", "hinged", "sliding"],
+    [("rocket", alpha), ("rocket", fc.ConservingMidpoint), ("hinged", alpha), ("sliding", alpha), ("hung", alpha)],
+    ids=["rocket", "rocket, midpoint", "hinged", "sliding", "hung"],
 )
 def test_courses_and_books_keep_their_orders(name, method):
     wanted, _ = run(name, fc.ExplicitRungeKutta(1e-3))

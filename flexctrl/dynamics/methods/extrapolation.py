@@ -23,6 +23,8 @@ from flexctrl.dynamics.steps import Counts, Integrator, Joining, Pace, Point, St
 from flexctrl.dynamics.swift.settling import quasistatic
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
+from flexctrl.model.linkages.chart import LeaningRope
+from flexctrl.model.linkages.charting import chart_of
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
@@ -110,6 +112,7 @@ class _Stepper:
     def __post_init__(self) -> None:
         self.between = Difference(self.model)
         self.local = _Apart(self.model)
+        self.seen = _Seen(self.model)
 
     def curve(self, before: Point, after: Point) -> _Course:
         """Return the motion over a step."""
@@ -184,7 +187,7 @@ class _Stepper:
     def moved_on(self, coarse: State, fine: State) -> State:
         """Return the extrapolated state."""
         gap = self.between(coarse, fine)
-        v = fine.v + self.weight * (fine.v - coarse.v)
+        v = fine.v + self.weight * (fine.v - self.seen(coarse, fine))
         return self.model.advance(fine, self.weight * gap, v, fine.t)
 
     def _supply(self, held: Supply, state: State, coarse: Point, fine: Point) -> Supply:
@@ -235,6 +238,28 @@ class Difference:
 
 _MEASURED = 2
 """Each time the coordinates of the end are measured, what they are off by is less by the angle turned."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Rates of one shape in the axes of a neighbouring one, where these depend on the steps that led there.
+
+    The axes of a rigid rope twist about it as it sways: those of the two runs part by O(h²), and rates across it too.
+    """
+
+    model: Plant
+
+    def __call__(self, one: State, other: State) -> np.ndarray:
+        v = one.v
+        for line in self._lines:
+            main = other.R[line.node] @ line.axes[:, line.main]
+            twist = float(main @ logarithm((other.R[line.node] @ one.R[line.node].T)[None])[0])
+            v = line.twisted(v, -twist)
+        return v
+
+    @cached_property
+    def _lines(self) -> tuple[LeaningRope, ...]:
+        return chart_of(self.model, self.model.rest).lines if isinstance(self.model, Model) and self.model.large else ()
 
 
 class _Apart(Local):

@@ -49,6 +49,20 @@ class LeaningRope:
     main: int
     freedoms: tuple[int, int]
 
+    @property
+    def across(self) -> list[int]:
+        """The axes that are not the main one."""
+        return [k for k in range(3) if k != self.main]
+
+    def twisted(self, v: np.ndarray, angle: float) -> np.ndarray:
+        """Return rates, shape (n,), turned about the rope by an angle [rad]."""
+        spin, main, places = np.zeros(3), np.zeros(3), list(self.freedoms)
+        spin[self.across], main[self.main] = v[places], 1.0
+        turned = np.cos(angle) * spin + np.sin(angle) * cross(main, spin)
+        found = v.copy()
+        found[places] = turned[self.across]
+        return found
+
 
 @dataclass(frozen=True)
 class Follower:
@@ -203,7 +217,7 @@ class Chart:
     ) -> None:
         """Leave the twist τ about the rope out of the chart: θ stays across the rope at the reference."""
         axes = self.reference.R[line.node] @ line.axes
-        across = [k for k in range(3) if k != line.main]
+        across = line.across
         places = list(line.freedoms)
         theta = axes[:, across] @ xi[places]
         along = self._direction(line, axes, theta)
