@@ -101,7 +101,9 @@ def cheaper(first, second):
     rounds = [[timed(*each) for each in zip((first, second), models, strict=True)] for _ in range(8)]
     times = [min(taken for _, taken in runs) for runs in zip(*rounds, strict=True)]
     pace = times[1] / times[0]
-    if isinstance(first.simulation.method, fc.Exact) or isinstance(second.simulation.method, fc.Exact):
+    exact = [isinstance(one.simulation.method, fc.Exact) for one in (first, second)]
+    sampled = [bool(getattr(one.law, "sample_time", 0.0)) for one in (first, second)]
+    if any(exact) or sampled[0] != sampled[1]:
         return pace > CLEARLY  # their steps do not count alike
     works = [
         Trial(s, run, [t], m, run).size.work for s, (run, t), m in zip((first, second), rounds[0], models, strict=True)
