@@ -119,7 +119,7 @@ def keeps(answer, other, within):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("demand", DEMANDS)
 def test_what_is_left_out_would_not_make_the_run_cheaper(name, demand):
@@ -135,14 +135,14 @@ def test_what_is_left_out_would_not_make_the_run_cheaper(name, demand):
             assert not cheaper(less, found.scene), one.name
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize(("strict", "loose"), [("strict", "curves"), ("curves", "loose"), ("strict", "loose")])
 def test_a_looser_demand_is_met_no_dearer(name, strict, loose):
     assert not cheaper(drawn_up(name, strict).scene, drawn_up(name, loose).scene)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_costs_more_than_it_saves_does_not_go_with_others(monkeypatch):
     """Without the limit a run takes a tenth, without samples three times as long: without both, less than with both."""
 
