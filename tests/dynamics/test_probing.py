@@ -44,7 +44,7 @@ def test_probed_tangents_are_the_assembled_ones(structure, effects, whole, seeds
     found.supply(u)
     found.open(state.q, np.zeros(model.n), False)
     F.flat.v[:], F.flat.rate[:] = F.ordered(v), F.ordered(a)
-    probe(m.probes, F.flat, whole, *seeds, least, m.entries)
+    probe(m.probes, F.flat, m.corners, whole, *seeds, least, m.entries)
     wanted = model.slope(state.with_(v=v), v, a, seeds, u).toarray()
     rows, columns = (cells.ravel() for cells in np.indices(wanted.shape))
     inside = np.zeros(wanted.shape, dtype=bool)
@@ -55,3 +55,26 @@ def test_probed_tangents_are_the_assembled_ones(structure, effects, whole, seeds
     assert not wanted[~inside].any()
     assert np.all(np.abs(got - wanted[rows, columns]) <= 1e-4 * scale + 1e-12 * np.abs(wanted).max())
     assert m.probes.groups <= model.n
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("flank", [-0.01, 0.01])
+def test_probes_do_not_reach_over_a_corner(flank, side):
+    """A hair beside a flank of its play, a trolley's drive pulls as on that side of it."""
+    rail = fc.Beam("rail", (0, 0, 0), (4, 0, 0), fc.Section.tube(fc.STEEL, 0.03, 0.002))
+    trolley = fc.Trolley("trolley", rail, at=2.0, mass=5.0)
+    drive = fc.LinearDrive("wheels", trolley.travel, direction="x", radius=0.2, stiffness=400.0, inertia=0.1)
+    machine = fc.Structure([rail, trolley], [fc.Support(rail.start), fc.Support(rail.end)], [drive])
+    model = fc.assemble(machine, [fc.LargeRotation(), fc.ShaftElasticity(), fc.Backlash({"wheels": 0.02})])
+    found, seeds = marcher(model), (1.0, 2e2, 4e4)
+    state = model.displace({"wheels_source": flank + side * 1e-11})
+    assert found.march.probes.groups > 1
+    wanted = model.slope(state, state.v, np.zeros(model.n), seeds, np.zeros(0)).toarray()
+    F, m = found.flattened, found.march
+    F.enter(state)
+    found.open(state.q, np.zeros(model.n), False)
+    probe(m.probes, F.flat, m.corners, 0, *seeds, 1.0, m.entries)
+    rows, columns = np.nonzero(wanted)
+    got = m.entries[F.plan.places(rows, columns)]
+    assert np.allclose(got, wanted[rows, columns], rtol=1e-6)
+    assert (wanted[0, 1] != 0.0) == (flank * side > 0.0)

@@ -38,8 +38,8 @@ class Corners:
         Slots of the nodes whose x is how far something has travelled.
     spans : Reals
         Sign and offset of each end of a rail (2 each).
-    dust, sides : Reals
-        What is zero but for round-off; the sides the motion is on, 0: not yet known.
+    dust, sides, there : Reals
+        What is zero but for round-off; the sides the motion is on, 0: not yet known; room for values.
     arms : Reals
         Of the lines to sheaves, before the step (3 each).
     last : Wholes
@@ -70,6 +70,7 @@ class Corners:
     spans: Reals
     dust: Reals
     sides: Reals
+    there: Reals
     arms: Reals
     last: Wholes
     step: Reals
@@ -84,7 +85,7 @@ def corners_of(F: Flattened) -> Corners:
     """Return the corners of a model."""
     kinks = F.model.kinks.met
     (ends, lengths), (drives, sums), (travels, spans) = kinks.lines, kinks.shafts, kinks.rails
-    sides = np.zeros(len(kinks.names))
+    sides, there = np.zeros((2, len(kinks.names)))
     counts = len(lengths), len(drives), len(travels), kinks.sheaves, len(kinks.ways)
     places = (
         NODE_SLOT * ends.ravel(),
@@ -99,7 +100,7 @@ def corners_of(F: Flattened) -> Corners:
     step, change = np.zeros((2, F.flat.padded))
     turning = int(bool(kinks.names) and not weightless(F.model).size)
     arms, bracket = np.zeros(3 * kinks.sheaves), Bracket(0.0, 0.0)
-    return Corners(*counts, *places, kinks.dust, sides, arms, last, step, change, bracket, turning)
+    return Corners(*counts, *places, kinks.dust, sides, there, arms, last, step, change, bracket, turning)
 
 
 def passes(c: Corners, f: Flat) -> bool:

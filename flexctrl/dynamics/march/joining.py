@@ -15,7 +15,7 @@ from flexctrl.model.flat.fronts import factor, whose
 
 __all__ = ["start_anew"]
 
-_SHARE, _CLEAR = 1e-4, 1e-3
+_SHARE = 1e-4
 
 
 _FIRM = 1e30
@@ -67,12 +67,8 @@ def firm(m: March) -> bool:
     """Factorise the forces that answer accelerations over a step, in the place of the tangent; tell if that can be."""
     f = m.flat
     clear(f.padded, f.rate)
-    if m.probes.groups > 0:  # differences are not to reach back over the corner
-        for i in range(0, f.padded, 8):
-            put(f.step[i:], _CLEAR * m.h * eight(m.v[i:]))
     at_rest_in(m)
     sloped(m, 1.0, m.gamma / (m.beta * m.h), 1.0 / (m.beta * m.h * m.h))
-    clear(f.padded, f.step)
     copy(f.padded, m.rate, f.rate)
     for k in range(m.flows.count):
         m.entries[m.flows.cells[k]] = -_FIRM * m.flows.mass

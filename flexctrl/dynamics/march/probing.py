@@ -2,7 +2,8 @@
 
 Where nodes are placed by others (drives, rigid parts, rails), the tangent of pieces is not that of the machine: what
 levers do as they turn comes on top. Here the forces themselves are asked. Columns without a row in common are probed
-together (A. R. Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Maths Applics 13 (1974) 117).
+together (A. R. Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Maths Applics 13 (1974) 117). Where one would reach over
+a corner of a law of force, they are probed the other way.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexctrl.dynamics.march.corners import Corners, value
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
-from flexctrl.model.flat.flat import Flat, clear, drive, place, press_entire, push
+from flexctrl.model.flat.flat import Flat, arrive, clear, drive, place, press_entire, push
 from flexctrl.model.flat.flattened import Flattened
 
 __all__ = ["Probes", "probe", "probes_of"]
@@ -111,6 +113,7 @@ def _grouped(F: Flattened) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.
 def probe(
     p: Probes,
     f: Flat,
+    c: Corners,
     whole: int,
     on_place: float,
     on_rate: float,
@@ -134,26 +137,56 @@ def probe(
     forces(f, whole, on_place)
     for i in range(0, f.padded, 8):
         put(p.base[i:], eight(f.force[i:]))
+    watched = on_place > 0.0 and c.lines + c.turns + c.rails > 0
+    if watched:
+        seen(c, f, whole)
     for k in range(p.groups):
-        for c in range(p.starts[k], p.starts[k + 1]):
-            j = p.columns[c]
-            way = far * p.size[j]
-            f.step[j] += on_place * way
-            f.v[j] += on_rate * way
-            f.rate[j] += on_acceleration * way
+        way = far
+        try_out(p, f, k, way * on_place, way * on_rate, way * on_acceleration)
         forces(f, whole, on_place)
-        for c in range(p.starts[k], p.starts[k + 1]):
-            j = p.columns[c]
-            way = far * p.size[j]
-            for i in range(p.firsts[c], p.firsts[c + 1]):
+        if watched and strays(c, f, whole):
+            way = -far
+            try_out(p, f, k, way * on_place, way * on_rate, way * on_acceleration)
+            forces(f, whole, on_place)
+        for g in range(p.starts[k], p.starts[k + 1]):
+            j = p.columns[g]
+            share = 1.0 / (way * p.size[j])
+            for i in range(p.firsts[g], p.firsts[g + 1]):
                 row = p.rows[i]
-                entries[p.cells[i]] = (f.force[row] - p.base[row]) / way
-            f.step[j] = p.step[j]
-            f.v[j] = p.v[j]
-            f.rate[j] = p.rate[j]
+                entries[p.cells[i]] = (f.force[row] - p.base[row]) * share
+        try_out(p, f, k, 0.0, 0.0, 0.0)
     forces(f, whole, on_place)
     for i in range(f.drives):
         f.driven[i] = p.driven[i]
+
+
+def try_out(p: Probes, f: Flat, k: int, on_place: float, on_rate: float, on_acceleration: float) -> None:
+    """Add increments to the motion of a group as it was, in yardsticks."""
+    for g in range(p.starts[k], p.starts[k + 1]):
+        j = p.columns[g]
+        f.step[j] = p.step[j] + on_place * p.size[j]
+        f.v[j] = p.v[j] + on_rate * p.size[j]
+        f.rate[j] = p.rate[j] + on_acceleration * p.size[j]
+
+
+@seldom
+def seen(c: Corners, f: Flat, whole: int) -> None:
+    """Take up how far parts are beyond their corners where the motion under way is."""
+    if whole == 1:
+        arrive(f)
+    for k in range(c.lines + c.turns + c.rails):
+        c.there[k] = value(c, f, k)
+
+
+@seldom
+def strays(c: Corners, f: Flat, whole: int) -> bool:
+    """Tell whether a probe has passed a corner: the law of force beyond is not the one whose slope is asked for."""
+    if whole == 1:
+        arrive(f)
+    passed = False
+    for k in range(c.lines + c.turns + c.rails):
+        passed = passed or c.there[k] * value(c, f, k) < 0.0
+    return passed
 
 
 def swiftest(p: Probes, f: Flat) -> float:

@@ -182,7 +182,7 @@ def sloped(m: March, on_place: float, on_rate: float, on_acceleration: float) ->
     """Fill in the slope of the forces for motions that add these times an increment."""
     if m.probes.groups > 0:
         least = _FINEST if m.attempt == 1 else 1.0
-        probe(m.probes, m.flat, m.whole, on_place, on_rate, on_acceleration, least, m.entries)
+        probe(m.probes, m.flat, m.corners, m.whole, on_place, on_rate, on_acceleration, least, m.entries)
     else:
         if m.fronts.beyond > 0:  # levers turn under the forces they carry
             push(m.flat)
