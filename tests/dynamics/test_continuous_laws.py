@@ -170,7 +170,7 @@ def test_steps_land_where_a_rope_goes_slack(monkeypatch):
 
 
 def test_a_law_that_says_no_number_is_told():
-    law = control.StateSpace([[300.0]], [[1.0]], [[1.0]], [[0.0]], inputs=["travel"], outputs=["push"])
+    law = control.StateSpace([[3000.0]], [[1.0]], [[1.0]], [[0.0]], inputs=["travel"], outputs=["push"])
     model = crane()
     run = fc.simulate(model, controller=fc.Tracking(law, {"travel": Step(1.0)}), until=5.0, start=model.rest)
     assert run.status is fc.Status.FAILED

@@ -91,8 +91,13 @@ def alpha(h: float) -> fc.GeneralizedAlpha:
 
 @pytest.mark.parametrize(
     ("name", "method"),
-    [("rocket", alpha), ("rocket", fc.ConservingMidpoint), ("hinged", alpha), ("sliding", alpha), ("hung", alpha)],
-    ids=["rocket", "rocket, midpoint", "hinged", "sliding", "hung"],
+    [
+        ("rocket", alpha),
+        ("rocket", fc.ConservingMidpoint),
+        ("hung", alpha),
+        pytest.param("hinged", alpha, marks=pytest.mark.long),
+        pytest.param("sliding", alpha, marks=pytest.mark.long),
+    ],
 )
 def test_courses_and_books_keep_their_orders(name, method):
     wanted, _ = run(name, fc.ExplicitRungeKutta(1e-3))

@@ -37,7 +37,13 @@ REFUSED = {
     "extrapolated conserving": {"dry friction", *RATES},
     "explicit": RATES,
 }
-CASES = [(method, kind) for method in METHODS for kind in EFFECTS if kind not in REFUSED.get(method, ())]
+LONG = "extrapolated, chosen"
+CASES = [
+    pytest.param(method, kind, marks=[pytest.mark.long] if method == LONG and kind != "play" else [])
+    for method in METHODS
+    for kind in EFFECTS
+    if kind not in REFUSED.get(method, ())
+]
 
 
 @cache

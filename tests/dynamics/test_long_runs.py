@@ -17,7 +17,7 @@ import flexctrl as fc
 from flexctrl.dynamics.march import ride
 
 HERE = Path(__file__).parent
-UNTIL = 0.4
+UNTIL = 0.25
 
 
 def process(*task: object) -> subprocess.Popen[str]:

@@ -75,11 +75,12 @@ def test_hardware_goes_alone_or_after_what_needs_it_in_every_order():
 @pytest.mark.parametrize("hardware", ["delayed", "rate_limited", "noisy"])
 def test_sampling_is_kept_under_what_counts_samples(hardware):
     scene = cart("sampled", "saturated", hardware)
-    found = fc.ledger(scene, 1e-6)
+    scene = scene.with_(simulation=replace(scene.simulation, until=0.06))
+    found = fc.ledger(scene, 1e-4)
     assert {hardware, "sampled"} <= set(found.minimal_set)
     assert found["sampled"].first == (hardware,)
     assert next(o for o in omissions(scene) if o.name == "sampled").is_in(found.scene)
-    chosen = scene.with_(effects=[*scene.effects, fc.Automatic(1e-6)]).settled
+    chosen = scene.with_(effects=[*scene.effects, fc.Automatic(1e-4)]).settled
     assert chosen.law.sample_time == 0.01
 
 
