@@ -20,7 +20,7 @@ from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.dense import Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Integrator, Joining, Pace, Point, Stepper
-from flexctrl.dynamics.swift.settling import quasistatic
+from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.linkages.chart import LeaningRope
@@ -143,8 +143,8 @@ class _Stepper:
         fine = self.fine.renew(fine, self._own(fine, supply), 0.5 * step)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
         point = replace(point, rate=rate, supply=supply, coarse=coarse, fine=fine)
-        if not quasistatic(self.model).size:
-            return point
+        if not (weightless(self.model).size or self.model.motion.flows.size):
+            return point  # no place and no rate has jumped
         state = self.moved_on(coarse.state, fine.state)
         return replace(point, state=state, supply=self._supply(supply, state, coarse, fine))
 

@@ -15,7 +15,7 @@ from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Integrator, Point
-from flexctrl.dynamics.swift.fleeting import felt_power
+from flexctrl.dynamics.swift.fleeting import felt_power, settled_power
 from flexctrl.dynamics.swift.settling import dragged, quasistatic
 from flexctrl.dynamics.swift.stiff_lines import noise, stiffest
 from flexctrl.model.state import State
@@ -161,7 +161,7 @@ class Books:
         self.sums.power = float(last[1])
 
     def _powers(self, state: State, u: np.ndarray) -> np.ndarray:
-        lost = self.model.energy(state)[2] if self.dissipates else 0.0
+        lost = settled_power(self.model, state, u) if self.dissipates else 0.0
         return np.array([self.model.loads(state, u) @ state.v, lost])
 
     def close(self, point: Point) -> None:

@@ -9,7 +9,7 @@ from flexctrl.model.flows import flow_rates, flowing
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
-__all__ = ["felt_power", "felt_rates"]
+__all__ = ["felt_power", "felt_rates", "settled_power"]
 
 _TRAPEZOID = 0.25, 0.5
 
@@ -72,6 +72,43 @@ def felt_power(model: Plant, state: State, rate: np.ndarray, u: np.ndarray, step
         alone[i] = v[i]
         lost += felt / v[i] * (model.energy(state.with_(v=alone))[2] - left)
     return lost
+
+
+def settled_power(model: Plant, state: State, u: np.ndarray) -> float:
+    """Return the power dissipated in motion drawn over a step, which may not see how freedoms of first order settle [W].
+
+    What these lose is quadratic in their rates. It is taken as what inputs that hold lose, in proportion to the rate:
+    the same along the true course, where the rate is the one that the inputs ask for.
+
+    Parameters
+    ----------
+    model : Plant
+    state : State
+    u : numpy.ndarray, shape (inputs,)
+
+    Returns
+    -------
+    float
+    """
+    settling = model.motion.settling
+    if not settling.size:
+        return model.energy(state)[2]
+    asked, calm = flowing(model, state, u).v, state.v.copy()
+    calm[settling] = 0.0
+    lost = left = model.energy(state.with_(v=calm))[2]
+    for i in settling.tolist():
+        rate, scale = float(state.v[i]), max(abs(state.v[i]), abs(asked[i]))
+        if rate:
+            up, down = (_lost_alone(model, state, calm, i, side * scale) - left for side in (1.0, -1.0))
+            lost += rate / scale * (0.5 * (up - down) + 0.5 * (up + down) * asked[i] / scale)
+    return lost
+
+
+def _lost_alone(model: Plant, state: State, calm: np.ndarray, i: int, rate: float) -> float:
+    """The power dissipated where only one of them has a rate."""
+    v = calm.copy()
+    v[i] = rate
+    return model.energy(state.with_(v=v))[2]
 
 
 def _over(model: Plant, v: np.ndarray, changes: np.ndarray, step: float) -> list[tuple[int, float]]:
