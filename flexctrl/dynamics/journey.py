@@ -30,7 +30,18 @@ from flexctrl.dynamics.records.dense import Track
 from flexctrl.dynamics.records.record import Unwritten, writing
 from flexctrl.dynamics.records.rows import Rows
 from flexctrl.dynamics.run import Status, Tolerance
-from flexctrl.dynamics.steps import Controlled, Counts, Fixed, Integrator, Mark, Point, StepError, Stepper, Twofold
+from flexctrl.dynamics.steps import (
+    Controlled,
+    Counts,
+    Fixed,
+    Integrator,
+    Mark,
+    Point,
+    StepError,
+    Stepper,
+    Twofold,
+    failed_step,
+)
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
 from flexctrl.model.laws.friction_kinds import STUCK
@@ -123,15 +134,34 @@ class Journey:
                 self._through_stops(interruption)
         except KeyboardInterrupt:
             self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
-        except StepError as error:
-            self.stepper.counts.worst = error.worst
-            worst = self.plan.model.coordinates[error.worst]
-            self.status, self.message = Status.FAILED, f"{error}; worst freedom: {worst}"
         except (ControllerError, EventError, Unwritten) as error:
             self.fail(error)
+        except (ArithmeticError, ValueError) as error:
+            failure = self._failure(error, self.point)
+            self.stepper.counts.worst = failure.worst
+            worst = self.plan.model.coordinates[failure.worst]
+            self.status, self.message = Status.FAILED, f"{failure}; worst freedom: {worst}"
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
         self._judge()
+
+    def step(self, point: Any, h: float) -> Any:
+        """Return the point a step later.
+
+        Raises
+        ------
+        StepError
+            If it does not converge, or its numbers fail on the way.
+        """
+        try:
+            return self.stepper.step(point, h)
+        except StepError:
+            raise
+        except (ArithmeticError, ValueError) as error:
+            raise self._failure(error, point) from error
+
+    def _failure(self, error: Exception, point: Any) -> StepError:
+        return failed_step(error, self.stepper.counts.worst, point.state.t)
 
     def fail(self, error: Exception) -> None:
         """End as failed, for what is no fault of the step."""

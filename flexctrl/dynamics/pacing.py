@@ -75,7 +75,7 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
         if h < SMALLEST * max(SHORTEST * journey.plan.until, t):
             raise StepError(journey.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
         try:
-            after = journey.stepper.step(journey.point, h)
+            after = journey.step(journey.point, h)
         except StepError as failure:
             why = f": {failure}"
             mark.rejected += 1
@@ -92,7 +92,7 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
 def _take(journey: Journey, h: float, stop: float) -> None:
     """A step of fixed length; where it does not converge, in halves."""
     try:
-        after = journey.stepper.step(journey.point, h)
+        after = journey.step(journey.point, h)
     except StepError as failure:
         journey.mark.rejected += 1
         if h >= 2e-3 * journey.mark.size:

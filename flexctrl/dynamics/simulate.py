@@ -192,8 +192,9 @@ def _run(
             journey = _begun(plan, stepper, start, watch, rows, track)
     except KeyboardInterrupt:
         return _result(unbegun(plan, stepper, start, watch, rows, track))
-    journey.travel()
-    return _result(journey)
+    with np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
+        journey.travel()
+        return _result(journey)
 
 
 def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:

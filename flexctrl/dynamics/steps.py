@@ -15,6 +15,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
+from flexctrl.errors import FlexctrlError, SingularMatrixError
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
@@ -34,6 +35,7 @@ __all__ = [
     "Stepper",
     "Twofold",
     "check_step",
+    "failed_step",
 ]
 
 
@@ -100,6 +102,32 @@ class StepError(ArithmeticError):
     def __init__(self, worst: int, reason: str) -> None:
         super().__init__(reason)
         self.worst = worst
+
+
+def failed_step(error: Exception, worst: int, t: float) -> StepError:
+    """Return the failure of a step that an error of arithmetic is: motion that diverges breaks any solver.
+
+    Parameters
+    ----------
+    error : ArithmeticError or ValueError
+        As it was raised; what is no error of arithmetic (a controller's, an event's) is raised again.
+    worst : int
+        The degree of freedom to name, unless the error knows better.
+    t : float
+        Where the run stands [s].
+
+    Returns
+    -------
+    StepError
+    """
+    if isinstance(error, StepError):
+        return error
+    if isinstance(error, FlexctrlError) and not isinstance(error, ArithmeticError):
+        raise error
+    if isinstance(error, SingularMatrixError):
+        why = "nothing holds a freedom there, or its numbers are beyond all bounds"
+        return StepError(error.where, f"{error} at t = {t:.6g} s: {why}")
+    return StepError(worst, f"the numbers fail at t = {t:.6g} s ({type(error).__name__}: {error})")
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from flexctrl.dynamics.checkpoint import Checkpoint
-from flexctrl.dynamics.events.event import EventError
 from flexctrl.dynamics.records.dense import Track
 from flexctrl.dynamics.records.record import InMemory
 from flexctrl.dynamics.records.rows import Rows
-from flexctrl.dynamics.steps import StepError
-from flexctrl.errors import ControllerError
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -58,7 +55,7 @@ def _tried(journey: Journey, stop: float, here: Checkpoint) -> Journey | None:
     other = _double(journey)
     try:
         other.go(stop, _beyond(journey), 1)
-    except (StepError, ControllerError, EventError):
+    except (ArithmeticError, ValueError):
         return None
     finally:
         journey.stepper.recall(here.memory)

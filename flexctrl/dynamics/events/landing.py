@@ -67,7 +67,7 @@ def _land(journey: Journey, before: Point, after: Point, crossing: Crossing) -> 
         if at - t <= SMALLEST * h:
             return before, replace(crossing, t=t)
         try:
-            after = journey.stepper.step(before, at - t)
+            after = journey.step(before, at - t)
         except StepError as error:
             raise Missed(error.worst, str(error)) from error
         left = watch.left(after, before, crossing)
@@ -127,7 +127,7 @@ def towards(journey: Journey, before: Point, h: float) -> Point:
     """Take a step to a corner, or just short of it: where a force jumps there, no step ends on it."""
     for k in range(TRIES):
         try:
-            return journey.stepper.step(before, h * (1.0 - shorter(k)))
+            return journey.step(before, h * (1.0 - shorter(k)))
         except StepError as error:
             failure = error
     raise failure

@@ -143,7 +143,8 @@ class _Stepper:
 
     def renew(self, point: _Point, supply: Supply, step: float) -> _Point:
         """Return the point under other inputs; the motion of the step before stays known."""
-        return replace(self.start(point.state, supply, step), slopes=point.slopes)
+        held = self.model.switches.at_rest(point.state)
+        return replace(point, rate=self.masses.accelerations(held, supply.u, np.zeros(self.model.n)), supply=supply)
 
     def _slope(self, point: _Point, y: np.ndarray, t: float, guess: np.ndarray) -> np.ndarray:
         xi, v, x = self._split(y)

@@ -75,7 +75,7 @@ def felt_power(model: Plant, state: State, rate: np.ndarray, u: np.ndarray, step
 
 
 def settled_power(model: Plant, state: State, u: np.ndarray) -> float:
-    """Return the power dissipated in motion drawn over a step, which may not see how freedoms of first order settle [W].
+    """Return the power dissipated in motion drawn over a step that may not see how freedoms settle [W].
 
     What these lose is quadratic in their rates. It is taken as what inputs that hold lose, in proportion to the rate:
     the same along the true course, where the rate is the one that the inputs ask for.
