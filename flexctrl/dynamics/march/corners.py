@@ -34,6 +34,8 @@ class Corners:
         These directions (3 each).
     lengths, sums : Reals
         Where lines have corners; weights of driven coordinates and source angles, and where their sums have (3 each).
+    wound, shares : Wholes, Reals
+        Of each line, the drive that pays it out, and by how much its motor moves the corner.
     travels : Wholes
         Slots of the nodes whose x is how far something has travelled.
     spans : Reals
@@ -66,6 +68,8 @@ class Corners:
     ways: Reals
     lengths: Reals
     sums: Reals
+    wound: Wholes
+    shares: Reals
     travels: Wholes
     spans: Reals
     dust: Reals
@@ -93,6 +97,7 @@ def corners_of(F: Flattened) -> Corners:
         kinks.ways.ravel(),
         lengths,
         sums.ravel(),
+        *kinks.wound,
         NODE_SLOT * travels,
         spans.ravel(),
     )
@@ -138,7 +143,8 @@ def stretch(c: Corners, f: Flat, k: int) -> float:
     """Return how far a line is beyond its corner."""
     start = f.z[c.ends[2 * k] :]
     end = f.z[c.ends[2 * k + 1] :]
-    return beyond(c, k, end[0] - start[0], end[1] - start[1], end[2] - start[2])
+    out = c.shares[k] * f.z[f.drive_base + DRIVE_SLOT * c.wound[k]] if c.shares[k] != 0.0 else 0.0
+    return beyond(c, k, end[0] - start[0], end[1] - start[1], end[2] - start[2]) - out
 
 
 def beyond(c: Corners, k: int, x: float, y: float, z: float) -> float:

@@ -59,13 +59,18 @@ class Turn:
 
 @dataclass(frozen=True)
 class Line:
-    """A line between two nodes with a corner at a length; what to say if a run cannot go on beyond it."""
+    """A line between two nodes with a corner at a length; what to say if a run cannot go on beyond it.
+
+    Where it is the rope of a winch, that length grows with the motor's angle.
+    """
 
     name: str
     start: Node
     end: Node
     length: float
     stop: str = ""
+    drive: int = 0
+    share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -105,14 +110,24 @@ class Kinks:
 
     @cached_property
     def _lines(self) -> tuple[Line, ...]:
-        """Ropes, springs with play, and what hangs on winches on its way to the sheave."""
+        """Ropes, springs with play, ropes of winches in small motion, and the ways from sheaves to what hangs there."""
         parts, gaps = self.model.structure.elements, gaps_of(self.model.effects)
         bent = [p for p in parts if isinstance(p, Rope) and self.model.bends(p)] if self.ropes else []
         ropes = [Line(p.name, p.start, p.end, p.length) for p in bent]
         loose = [p for p in parts if isinstance(p, Spring) and p.name in self._loose]
         gapped = [Line(p.name, p.start, p.end, p.length + s * gaps[p.name]) for p in loose for s in (0.5, -0.5)]
-        winches = [d for d in self.model.structure.drives if isinstance(d, Winch)]
-        return (*ropes, *gapped, *(Line(d.name, d.against, d.node, d.shortest, _down(d)) for d in winches))
+        winches = [(i, d) for i, d in enumerate(self.model.structure.drives) if isinstance(d, Winch)]
+        hoists = [self._hoist(i, d) for i, d in winches if self.model.bends(d) and not self.model.large]
+        return (*ropes, *gapped, *hoists, *(Line(d.name, d.against, d.node, d.shortest, _down(d)) for _, d in winches))
+
+    def _hoist(self, i: int, d: Winch) -> Line:
+        """The rope of a winch in small motion: EA (d − ℓ)/ℓ, to first order in both, is zero at the corner."""
+        rest = self.model.rest
+        angle = float(rest.q[self.model.motion.sources[i]])
+        out = d.length + angle / d.effective_ratio
+        apart = rest.x[self._number(d.node)] - rest.x[self._number(d.against)]
+        share = float(np.linalg.norm(apart)) / out / d.effective_ratio
+        return Line(d.name, d.against, d.node, out - share * angle, "", i, share)
 
     @cached_property
     def _turns(self) -> tuple[Turn, ...]:
@@ -129,7 +144,8 @@ class Kinks:
         """Where a rope that stretches goes slack, and where there is hardly any left."""
         least, dust = d.shortest - d.length, _ROUND_OFF * d.length
         slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, _DIGITS * (d.length + self._reach))
-        return [slack, Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, _down(d))]
+        end = Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, _down(d))
+        return [slack, end] if self.model.large else [end]
 
     @cached_property
     def _rails(self) -> tuple[RailEnd, ...]:
@@ -170,6 +186,12 @@ class Kinks:
         number = self.model.structure.number
         ends = [(number(line.start), number(line.end)) for line in self._lines]
         return np.array(ends, dtype=int).reshape(-1, 2), np.array([line.length for line in self._lines])
+
+    @cached_property
+    def wound(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of each line: the drive that pays it out, and by how much a radian of its motor moves the corner [m/rad]."""
+        lines = self._lines
+        return np.array([line.drive for line in lines], dtype=int), np.array([line.share for line in lines])
 
     @cached_property
     def ways(self) -> np.ndarray:
@@ -226,9 +248,11 @@ class Kinks:
             [m], or [rad] of a motor.
         """
         motion, (ends, lengths), (drives, rows) = self.model.motion, self.lines, self.shafts
-        arms = state.x[ends[:, 1]] - state.x[ends[:, 0]]
+        arms, angles = state.x[ends[:, 1]] - state.x[ends[:, 0]], np.append(state.q, 0.0)[motion.sources]
         strains = self._through(self._distances(arms), arms, before) - lengths
-        own = np.append(state.q, 0.0)[motion.sources[drives]]
+        if self.wound[1].any():
+            strains -= self.wound[1] * angles[self.wound[0]]
+        own = angles[drives]
         turned = rows[:, 0] * state.driven[drives] + rows[:, 1] * own - rows[:, 2]
         travelling, ends = self.rails
         return np.concatenate([strains, turned, ends[:, 0] * state.x[travelling, 0] + ends[:, 1]])
