@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,12 @@ import scipy.sparse as sp
 
 from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.scales import largest
 from flexctrl.dynamics.swift.easing import eased_change, eased_rate, unresolved
 from flexctrl.dynamics.swift.fleeting import felt_rates
 from flexctrl.dynamics.swift.massless import Massless, massless
 from flexctrl.dynamics.swift.settling import settled, steadied
+from flexctrl.dynamics.swift.thrown import CORRECTIONS, THROWN
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.flows import flow_rates, flowing, without
 from flexctrl.model.solve import Solve
@@ -26,6 +29,8 @@ __all__ = ["join", "renew", "start"]
 
 _SHARE = 1e-3
 
+_Holding = Callable[["Stepper", State, Supply, float], Solve]
+
 
 def start(stepper: Stepper, state: State, supply: Supply, step: float) -> AlphaPoint:
     """Return a state with the accelerations it has under its inputs; what has no mass where it balances.
@@ -35,7 +40,10 @@ def start(stepper: Stepper, state: State, supply: Supply, step: float) -> AlphaP
     SingularMatrixError
         If a freedom has neither mass nor stiffness.
     """
-    return _eased(stepper, _fresh(stepper, state, supply, step), step)
+    fresh = _fresh(stepper, state, supply, step)
+    if stepper.may_throw(step):
+        fresh = _tempered(stepper, fresh, np.zeros(stepper.model.n), step, _held)
+    return _eased(stepper, fresh, step)
 
 
 def _fresh(stepper: Stepper, state: State, supply: Supply, step: float) -> AlphaPoint:
@@ -90,6 +98,8 @@ def renew(stepper: Stepper, point: AlphaPoint, supply: Supply, step: float) -> A
     Without the lead every jump would cost an error of first order in the step.
     """
     fresh = _fresh(stepper, point.state, supply, step)
+    if stepper.inputs_may_throw(step):
+        fresh = _tempered(stepper, fresh, point.rate, step, _held_at_hand)
     lead = stepper.model.switches.still(point.state, point.algorithmic - point.rate)
     return _eased(stepper, replace(fresh, algorithmic=fresh.rate + lead), step)
 
@@ -102,12 +112,42 @@ def join(stepper: Stepper, point: AlphaPoint, supply: Supply, step: float) -> Al
     makes a lead that throws it.
     """
     c, fresh = stepper.coefficients, _fresh(stepper, point.state, supply, step)
+    if stepper.may_throw(step):
+        fresh = _tempered(stepper, fresh, np.zeros(stepper.model.n), step, _held)
     state, rate = (eased := _eased(stepper, fresh, step)).state, eased.rate
     change = stepper.model.slope(state, state.v, rate, (1.0, 0.0, 0.0), supply.u) @ state.v
     change += stepper.model.slope(state, state.v, rate, (0.0, 1.0, 0.0), supply.u) @ rate
     lead = (c.alpha_m - c.alpha_f) * step * _held(stepper, state, supply, step)(change)
     lead[stepper.model.motion.flows] = 0.0
     return _eased(stepper, replace(fresh, algorithmic=fresh.rate + lead), step)
+
+
+def _tempered(stepper: Stepper, fresh: AlphaPoint, before: np.ndarray, step: float, held: _Holding) -> AlphaPoint:
+    """Return a point whose accelerations have jumped from those before, by less where parts would be thrown.
+
+    See `flexctrl.dynamics.swift.thrown`.
+    """
+    change = fresh.rate - before
+    if stepper.coefficients.beta * step**2 * largest(change * stepper.weight)[0] <= stepper.tolerance:
+        return fresh
+    try:
+        solve = held(stepper, fresh.state, fresh.supply, step)
+    except SingularMatrixError:
+        return fresh
+    force = _forces(stepper, fresh, before)
+    answer = solve(force)
+    if not 0.0 < THROWN * float(force @ answer) < float(force @ change):
+        return fresh
+    rate = before + answer
+    for _ in range(1, CORRECTIONS):
+        rate = rate + solve(_forces(stepper, fresh, rate))
+    return replace(fresh, rate=rate, algorithmic=rate)
+
+
+def _forces(stepper: Stepper, point: AlphaPoint, rate: np.ndarray) -> np.ndarray:
+    """The forces that accelerations leave."""
+    state = point.state
+    return stepper.model.balance(state, state.v, rate) + stepper.model.loads(state, point.supply.u)
 
 
 def _eased(stepper: Stepper, point: AlphaPoint, step: float) -> AlphaPoint:
@@ -152,6 +192,11 @@ def _held(stepper: Stepper, state: State, supply: Supply, step: float) -> Solve:
     c, zero = stepper.coefficients, np.zeros(stepper.model.n)
     seeds = (c.beta * step**2, c.gamma * step, 1.0)
     return stepper.factorised(_massive(stepper, -stepper.model.slope(state, state.v, zero, seeds, supply.u)))
+
+
+def _held_at_hand(stepper: Stepper, state: State, supply: Supply, step: float) -> Solve:
+    """The same by the tangent at hand, where it is of about that step."""
+    return stepper.held if stepper.at_hand(step) else _held(stepper, state, supply, step)
 
 
 def _massive(stepper: Stepper, matrix: sp.csr_matrix) -> sp.csr_matrix:

@@ -23,6 +23,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
 from flexctrl.dynamics.steps import Counts, StepError
 from flexctrl.dynamics.swift.stiff_lines import STIFF, SURE, Caution, firmest
+from flexctrl.dynamics.swift.thrown import AT_HAND, BLURRED, THROWN, holding_inputs, may_throw
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import Plan, Solve, factorise, plan
@@ -76,6 +77,7 @@ class Stepper:
         self.weight = 1.0 / yardsticks(self.model)
         self.coning = coning_of(self.model)
         self.firmest = firmest(self.model)
+        self.throws = may_throw(self.model)
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
@@ -94,6 +96,27 @@ class Stepper:
     def join(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
         """Return the point beyond a corner of a law of force; see `outset.join`."""
         return join(self, point, supply, step)
+
+    def may_throw(self, h: float) -> bool:
+        """Tell whether forces that jump may throw parts over a step."""
+        return self.throws and h * self.firmest < BLURRED
+
+    def inputs_may_throw(self, h: float) -> bool:
+        """Tell whether inputs that jump may; they are not those of a continuous law that reads what moves."""
+        if (self.feed.continuous and self.feed.reads.size) or not self.may_throw(h):
+            return False
+        damping, stiffness = holding_inputs(self.model)
+        return h * (self.coefficients.gamma * damping + self.coefficients.beta * h * stiffness) > THROWN
+
+    def at_hand(self, h: float) -> bool:
+        """Tell whether the tangent is of about such a step."""
+        return self.memory is not None and self.memory.h <= h * AT_HAND and h <= self.memory.h * AT_HAND
+
+    def held(self, force: np.ndarray) -> np.ndarray:
+        """Solve with the forces that answer accelerations over a step, as told by the tangent at hand."""
+        assert self.memory is not None
+        assert self._solve is not None
+        return self.memory.seeds[2] * self._solve(force)
 
     def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later.

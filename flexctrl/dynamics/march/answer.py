@@ -42,6 +42,8 @@ class Answer:
         One row a step: inputs, state and rate of the law at its end.
     asked, answers : Reals
         Rows of what the law reads, and of its commands.
+    reading : int
+        How many outputs it reads; 0: what it commands depends on time and its state alone.
     tries, still, wanted : int
         How often the inputs were put right in this step, how often that moved nothing; rows to be answered.
     most : float
@@ -75,6 +77,7 @@ class Answer:
     told: Reals
     asked: Reals
     answers: Reals
+    reading: int = 0
     tries: int = 0
     still: int = 0
     wanted: int = 0

@@ -208,6 +208,7 @@ def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
         told=np.zeros((m + 2 * s) * CAPACITY),
         asked=np.zeros(wide * _ROWS),
         answers=np.zeros(k * _ROWS),
+        reading=feed.reads.size,
     )
 
 

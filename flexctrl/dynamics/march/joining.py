@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from flexctrl.dynamics.march.axes import mark, solved
+from flexctrl.dynamics.march.axes import solved
 from flexctrl.dynamics.march.books import copy, reach
 from flexctrl.dynamics.march.flowing import released
 from flexctrl.dynamics.march.jumping import jump
 from flexctrl.dynamics.march.record import DONE, SINGULAR, March
-from flexctrl.dynamics.march.step import press_all, sloped
+from flexctrl.dynamics.march.step import press_all
+from flexctrl.dynamics.march.tempering import at_rest_in, firm, may_throw, temper
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import clear, drive, energy, place
-from flexctrl.model.flat.fronts import factor, whose
+from flexctrl.model.flat.flat import clear, energy
 
-__all__ = ["start_anew"]
+__all__ = ["start_anew", "started"]
 
 _SHARE = 1e-4
-
-
-_FIRM = 1e30
-"""What holds freedoms of first order, over what stands for their mass."""
 
 
 @seldom
@@ -49,6 +45,9 @@ def start_anew(m: March) -> int:
         m.power = f.books[2]
     if not firm(m):
         return SINGULAR
+    m.factorisations += 1
+    if may_throw(m):
+        temper(m)
     forces_change(m)
     at_rest_in(m)
     give_lead(m)
@@ -56,30 +55,20 @@ def start_anew(m: March) -> int:
 
 
 @seldom
-def at_rest_in(m: March) -> None:
-    """Put nodes and drives where the march stands."""
-    place(m.flat)
-    drive(m.flat)
-
-
-@seldom
-def firm(m: March) -> bool:
-    """Factorise the forces that answer accelerations over a step, in the place of the tangent; tell if that can be."""
+def started(m: March) -> int:
+    """Find the accelerations with which a run sets out, and the method's own."""
     f = m.flat
-    clear(f.padded, f.rate)
-    at_rest_in(m)
-    sloped(m, 1.0, m.gamma / (m.beta * m.h), 1.0 / (m.beta * m.h * m.h))
-    copy(f.padded, m.rate, f.rate)
-    for k in range(m.flows.count):
-        m.entries[m.flows.cells[k]] = -_FIRM * m.flows.mass
-    where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)
-    m.made_for = -1.0
-    if where >= 0:
-        m.worst = whose(m.fronts, where)
-        return False
-    m.factorisations += 1
-    mark(m.axes, m.tangent, f)
-    return True
+    m.unsure = 1  # no rates are known that a change of the inputs could be added to
+    status = jump(m)
+    m.unsure = 0
+    if status == DONE and may_throw(m):
+        if not firm(m):
+            return SINGULAR
+        if temper(m):
+            m.factorisations += 1
+            copy(f.padded, m.rate, m.algorithmic)
+        at_rest_in(m)
+    return status
 
 
 @seldom

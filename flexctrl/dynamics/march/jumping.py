@@ -11,6 +11,7 @@ from flexctrl.dynamics.march.flowing import feel_mean, flow_on, pivot, released
 from flexctrl.dynamics.march.holding import follows, held, settled_lead
 from flexctrl.dynamics.march.record import DONE, FAILED, SINGULAR, WANTS_MASS, March
 from flexctrl.dynamics.march.step import sloped
+from flexctrl.dynamics.march.tempering import inputs_may_throw, temper_jump
 from flexctrl.dynamics.swift.easing import eased_change, eased_rate
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
@@ -41,6 +42,9 @@ def jump(m: March) -> int:
     clear(f.padded, f.step)
     copy(f.padded, m.v, f.v)
     if m.swift == 1 and answered(m):
+        if inputs_may_throw(m):
+            load(f)
+            temper_jump(m)
         return changed(m)
     load(f)
     if m.leaping == 1:
@@ -62,6 +66,8 @@ def jump(m: March) -> int:
         return FAILED
     if m.flows.count > 0:
         run_on(m)
+    if inputs_may_throw(m):
+        temper_jump(m)
     changed(m)
     if m.contacts.count > 0 and m.contacts.stuck > 0:
         settled_lead(m)

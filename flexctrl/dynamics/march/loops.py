@@ -11,6 +11,7 @@ from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.gliding import back, glide, land, leap, level
 from flexctrl.dynamics.march.holding import lets_go
+from flexctrl.dynamics.march.joining import started
 from flexctrl.dynamics.march.judging import compared, growth, judge
 from flexctrl.dynamics.march.jumping import jump, weighed
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
@@ -28,6 +29,7 @@ from flexctrl.dynamics.march.record import (
     SHORT,
     SILENT,
     SINGULAR,
+    START,
     WANTS_MASS,
     WANTS_TANGENT,
     WEIGHED,
@@ -61,6 +63,8 @@ def task(m: March) -> int:
         return sampled(m)
     if m.task == JUMP:
         return jump(m)
+    if m.task == START:
+        return started(m)
     if m.task == SETTLE:
         return settle(m)
     if m.task == REMADE or m.task == WEIGHED:
@@ -135,7 +139,7 @@ def set_out(m: March, law: Law) -> bool:
 def hurried(m: March) -> int:
     """Let the inputs jump if they are to, then take steps of controlled error."""
     if m.jumping == 1:
-        if m.flows.count > 0:
+        if m.flows.count > 0 or m.throws == 1:
             m.h = m.size
         status = jump(m)
         if status != DONE:

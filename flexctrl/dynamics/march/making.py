@@ -23,6 +23,7 @@ from flexctrl.dynamics.march.record import (
 from flexctrl.dynamics.march.shelf import width_of
 from flexctrl.dynamics.scales import components
 from flexctrl.dynamics.swift.stiff_lines import firmest
+from flexctrl.dynamics.swift.thrown import holding_inputs, may_throw
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import Flattened
 
@@ -104,10 +105,15 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
 
 def _motion(F: Flattened) -> dict[str, Any]:
     """Where the motion stands, and what turns in it."""
-    names = ("v", "rate", "algorithmic", "trend", "pulled", "reach", "first")
+    names = ("v", "rate", "algorithmic", "trend", "pulled", "fresh", "before", "asked", "reach", "first")
     cones = F.plan.position[coning_of(F.model).triples]
     vectors = dict(zip(names, np.zeros((len(names), F.flat.padded)), strict=True))
-    return {**vectors, "cones": cones.ravel(), "coning": len(cones), "firmest": firmest(F.model)}
+    return {**vectors, "cones": cones.ravel(), "coning": len(cones), "firmest": firmest(F.model), **_throwing(F)}
+
+
+def _throwing(F: Flattened) -> dict[str, Any]:
+    damping, holding = holding_inputs(F.model)
+    return {"throws": int(may_throw(F.model)), "damping": damping, "holding": holding}
 
 
 def _yardsticks(F: Flattened, method: Method) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from flexctrl.dynamics.march.record import (
     JUMP,
     SAMPLED,
     SETTLE,
+    START,
 )
 from flexctrl.dynamics.march.shelf import states_of, width_of
 from flexctrl.dynamics.march.weaving import Weaver
@@ -320,14 +321,19 @@ class Marcher(Loops):
         )
 
     def about_to(self, h: float) -> None:
-        """Tell about how long the steps are, which says over what time rates of first order change little."""
-        if self.model.motion.flows.size:
+        """Tell about how long the steps are: over what time rates of first order change little, and parts are held."""
+        if self.model.motion.flows.size or self.march.throws:
             self.march.h = h
 
     def jump(self, u: np.ndarray) -> int:
         """Let the inputs jump; return how it ended."""
         self.supply(u)
         return self._through(JUMP)
+
+    def start(self, u: np.ndarray) -> int:
+        """Find the accelerations that a run sets out with under some inputs; return how it ended."""
+        self.supply(u)
+        return self._through(START)
 
     def states(self) -> Sequence[State]:
         """Return the states kept in the last call; they are made when one is looked at."""

@@ -26,7 +26,7 @@ TURNED, TURN = 8, 9
 one that passes a corner of a law of force, or a place where a loop of rigid parts may lock; at a sample at which the
 law does not say numbers; beyond a corner, anew, or where that is to be done."""
 
-FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED = 0, 1, 2, 3, 4, 5, 6, 7, 8
+FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED, START = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 """What to do."""
 
 OFTEN = 32
@@ -180,6 +180,10 @@ class March:
         Whether steps of controlled error, or from sample to sample of a law, are among the tasks.
     firmest, short : float
         Highest frequency of a line against the masses at its ends [rad/s]; by what share corrections are shortened.
+    throws : int
+        Whether parts may be thrown by forces that jump; see `flexctrl.dynamics.swift.thrown`.
+    damping, holding : float
+        What holds motions that inputs bring about, over the mass [1/s, 1/s²].
     swift : int
         1: accelerations come from kernels of the whole machine, and Newton's method takes the mass at hand for the
         tangent; 0: the machine has none; below: steps until that is tried again, after one for which it was not enough.
@@ -214,6 +218,8 @@ class March:
         At the start of the step; see `AlphaPoint`.
     pulled : Reals
         The inputs' forces at its start.
+    fresh, before, asked : Reals
+        Where forces jump: accelerations over the mass alone, those before, and the forces between.
     weight, turns, dust : Reals
         One over the yardsticks; 1 for what turns; mass that is but rounding.
     coning, cones : int, Wholes
@@ -252,6 +258,9 @@ class March:
     algorithmic: Reals
     trend: Reals
     pulled: Reals
+    fresh: Reals
+    before: Reals
+    asked: Reals
     weight: Reals
     turns: Reals
     dust: Reals
@@ -278,6 +287,9 @@ class March:
     answering: int
     paced: int = 1
     firmest: float = 0.0
+    throws: int = 0
+    damping: float = 0.0
+    holding: float = 0.0
     short: float = 0.0
     swift: int = 0
     whole: int = 0

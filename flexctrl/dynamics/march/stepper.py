@@ -88,9 +88,7 @@ class MarchingStepper:
         zero = np.zeros(self.plain.model.n)
         self.enter(AlphaPoint(state, zero, supply, zero, zero))
         self.marcher.about_to(step)
-        self.marcher.march.unsure = 1  # no rates are known that a change of the inputs could be added to
-        status = self.marcher.jump(supply.u)
-        self.marcher.march.unsure = 0
+        status = self.marcher.start(supply.u)
         if status != DONE:
             self._here = None
             return self.plain.start(state, supply, step)
