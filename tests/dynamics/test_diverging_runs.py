@@ -100,8 +100,17 @@ def test_loops_that_throw_an_arm_away(backend, method, kp, kd):
     ids=["undamped", "lagging", "extrapolated"],
 )
 def test_loops_that_leave_a_rope_slack(backend, effects, method, kp, kd, sample):
-    """The first two died of a singular matrix."""
     fails(hoist(backend, *effects), law(kp, kd, sample), METHODS[method])
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_motor_that_nothing_holds_any_more(backend):
+    """Driven by its own speed it throws the rope slack; the run died of a singular matrix there."""
+    driven = pd(kp=0.0, kd=-10.0, measured="angle", rate="speed", command="torque")
+    run = fails(hoist(backend), driven, METHODS["alpha"])
+    assert run.t[-1] > 0.0
+    assert "singular" in run.report.message
+    assert run.report.message.endswith("worst freedom: motor_source")
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
