@@ -114,3 +114,16 @@ def test_steps_are_of_second_order_through_a_corner():
         for h in (4e-3, 2e-3, 1e-3)
     ]
     assert all(3.0 < coarse / fine < 5.5 for coarse, fine in pairwise(errors))
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_speed_that_stays_the_same_up_to_a_corner_is_not_zero_there(method):
+    """A block flies through its play, into a spring, and turns after a quarter of a period."""
+    body, spring = fc.PointMass("block", (1, 0, 0), 1.0), fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=100.0)
+    held = [fc.Support(spring.start), fc.Pin(spring.end, body.node), fc.Support(body.node, "v w")]
+    structure = fc.Structure([body, spring], held, outputs=[fc.Velocity("v", body.node, "x")])
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.Backlash({"spring": 0.02})])
+    how = {"start": model.rest.with_(v=np.ones(1)), "until": 0.2, "method": method}
+    run = fc.simulate(model, events=[fc.Event("turns", "v")], **how)
+    assert [event.name for event in run.events] == ["spring", "turns"]
+    assert [event.t for event in run.events] == pytest.approx([0.01, 0.01 + np.pi / 20.0], abs=1e-4)

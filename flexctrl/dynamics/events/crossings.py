@@ -67,11 +67,13 @@ def met(
 
 
 def offset(watch: Watch, curve: Curve, before: Point, after: Point, gauge: int) -> float:
-    """Return how much later than at the end of a step a gauge is zero, by its slope there."""
+    """Return how much later than at the end of a step a gauge is zero, by its slope there: never if it has none."""
     t, h = after.state.t, after.state.t - before.state.t
     now = watch.value(after.state, after.supply.u, before.state, gauge)
+    if abs(now) <= watch.dust_of(watch.sizes[gauge]):
+        return 0.0
     slope = (now - _Along(watch, curve, before, after).one(gauge, t - _SLOPE * h)) / (_SLOPE * h)
-    return float(-now / slope) if abs(now) > watch.dust_of(watch.sizes[gauge]) and slope != 0.0 else 0.0
+    return float(-now / slope) if slope != 0.0 else math.inf
 
 
 def _clear(watch: Watch, values: np.ndarray) -> bool:

@@ -116,7 +116,7 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
             at = inside(bracket, at + on - back)
             continue
         bracket.high = at if missed else bracket.high
-        found, when, last, back = after, end + max(off, 0.0), (end, above), lead
+        found, when, last, back = after, end + (max(off, 0.0) if off < math.inf else 0.0), (end, above), lead
         if near_enough(off * above / left, h, lead, missed):
             break
         at = inside(bracket, end + on - lead)

@@ -142,7 +142,7 @@ def short_of(m: March, guess: float, h: float) -> bool:
             last = end
             best = end
             back = lead
-            c.when = max(off, 0.0)
+            c.when = max(off, 0.0) if off < math.inf else 0.0
             if near_enough(off * above / (above + dust), h, lead, missed):
                 return True
             at = inside(b, end + on - lead)
@@ -196,4 +196,4 @@ def time_left(m: March) -> float:
     slope = (here - distance(m)) / (_SLOPE * m.h)
     copy(f.padded, c.step, f.step)
     reach(m)
-    return -here / slope if slope != 0.0 else 0.0
+    return -here / slope if slope != 0.0 else math.inf
