@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.dynamics.alpha import method as alpha
 
 END, PERIOD = 0.3, 0.02
 
@@ -164,3 +165,26 @@ def test_a_run_stopped_anywhere_goes_on_with_the_same_bits(machine, law, method,
         rest = ran(case, events, start=half.checkpoint)
         assert same(whole, rest, half.t[-1] + 1e-9)
         assert [(e.name, e.t) for e in (*half.events, *rest.events)] == [(e.name, e.t) for e in whole.events]
+
+
+def happened(run: fc.Run, until: float = np.inf) -> tuple[list[Any], list[float]]:
+    """What has happened up to a time, in one order at any instant, and when."""
+    found = sorted((round(e.t, 6), e.name, e.rising) for e in run.events if e.t <= until)
+    return [e[1:] for e in found], [e[0] for e in found]
+
+
+@pytest.mark.parametrize("method", ["adaptive", "alpha"])
+@pytest.mark.parametrize("law", ["none", "sampled"])
+@pytest.mark.parametrize("machine", ["rope", "play", "dry", "lag"])
+def test_events_are_those_of_plain_steps_and_of_longer_runs(machine, law, method, monkeypatch):
+    """Signals that stand still up to a corner, and ones that a step would see pass if it went on over it."""
+    case = machine, law, method
+    run = ran(case, "met", until=0.1)
+    cuts = {cut: happened(ran(case, "met", until=cut)) for cut in (0.031, 0.06, 0.0887)}
+    monkeypatch.setattr(alpha, "_quickest", lambda plain: plain)
+    told, times = happened(ran(case, "met", until=0.1))
+    assert happened(run)[0] == told
+    assert happened(run)[1] == pytest.approx(times, abs=1e-5)
+    for cut, (what, when) in cuts.items():
+        assert what == happened(run, cut)[0]
+        assert when == pytest.approx(happened(run, cut)[1], abs=1e-6)

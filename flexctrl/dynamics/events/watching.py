@@ -37,13 +37,13 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
         watch.settle(after)
         journey.mark.stuck = 0
         return after, None
-    earlier, slid = [c for c in found if c.t < landing.t], after
+    slid = after
     after, landing = landed(journey, before, after, landing)
     switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
     brief = 0 <= switch < len(watch.names) and is_brief(journey, before, after, slid, switch)
     closest = {c.gauge: c for c in sorted(found, key=lambda c: -abs(c.t - landing.t))}.values()
     there = [c for c in closest if c.gauge != landing.gauge and _is_there(journey, c, before, after, slid)]
-    _note(journey, [c for c in earlier if c not in there], curve, before)
+    _note_before(journey, before, after, {c.gauge for c in there}, TOGETHER * (slid.state.t - before.state.t))
     watch.settle(after)
     together = sorted((*there, landing), key=lambda c: c.gauge)
     for c in together:
@@ -58,6 +58,16 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
     if switch >= len(watch.names):
         return after, landing
     return _switched(journey, after, landing, switch, brief), None
+
+
+def _note_before(journey: Journey, before: Point, after: Point, there: set[int], near: float) -> None:
+    """Note events within a step that is cut short, as that one goes, but those that happen just where it ends."""
+    if after.state.t == before.state.t:
+        return
+    watch, curve, asked = journey.watch, journey.track.curve(before, after), len(journey.watch.events)
+    passed = met(watch, journey.track.curve, before, after, journey.rows.every)
+    within = [c for c in passed if c.gauge < asked and not watch.stops(c.gauge)]
+    _note(journey, [c for c in within if c.gauge not in there or c.t < after.state.t - near], curve, before)
 
 
 def _is_there(journey: Journey, crossing: Crossing, before: Point, after: Point, slid: Point) -> bool:
