@@ -121,7 +121,7 @@ def test_a_motor_that_nothing_holds_any_more(backend):
         fc.ViscousFriction({"motor": 1e-2}),
         fc.CoulombFriction({"motor": 0.01}),
         fc.LuGreFriction({"motor": fc.LuGre(1e3, kinetic=0.5, static=0.6, stribeck=0.1, damping=1.0)}),
-        fc.Backlash({"motor": 1e-3}),
+        pytest.param(fc.Backlash({"motor": 1e-3}), marks=pytest.mark.slow),
     ],
     ids=lambda effect: type(effect).__name__,
 )

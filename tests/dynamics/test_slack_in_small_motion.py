@@ -10,7 +10,7 @@ import flexctrl as fc
 EA, LIFT, SIDE = 1e4, 60.0, 15.0
 HELD = -0.01 * 98.1 * (1.0 + 98.1 / (2.0 * EA))
 """The torque that holds ten kilograms on a winch, with the energy of the stretch that goes onto its drum [N m]."""
-METHODS = [fc.GeneralizedAlpha(1e-3), fc.AdaptiveAlpha(), fc.ExplicitRungeKutta(1e-3), fc.Exact(1e-3)]
+METHODS = [fc.GeneralizedAlpha(1e-3), fc.AdaptiveAlpha(), fc.ExplicitRungeKutta(2e-3), fc.Exact(1e-3)]
 BACKENDS = {"plain": fc.CasadiVM(), "marched": None}
 
 
@@ -28,7 +28,7 @@ def swung(request):
     return fc.assemble(machine, [fc.Gravity(), fc.Flexible(), fc.GeometricStiffness()], BACKENDS[request.param])
 
 
-@pytest.fixture(scope="module", params=[(b, angle) for b in BACKENDS for angle in (0.0, 20.0)], ids=str)
+@pytest.fixture(scope="module", params=[("plain", 20.0), ("marched", 0.0), ("marched", 20.0)], ids=str)
 def hoisted(request):
     """The same load on a winch that has paid out some rope, or none, and pays out more as it is pulled."""
     backend, angle = request.param
