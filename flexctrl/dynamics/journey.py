@@ -327,16 +327,15 @@ class Journey:
 
     def _jump(self, fresh: Supply, step: float) -> None:
         """Let the inputs jump, as a ride does where steps are marched, with a step about to be taken."""
-        stepper = self.stepper
+        stepper, held, leapt = self.stepper, self.point, None
         if isinstance(stepper, MarchingStepper) and self.plan.model.switches.names and rides(self):
-            leapt = stepper.leap(self.point, fresh, step)
-            if leapt is not None:
-                self.point = leapt
-                return
+            leapt = stepper.leap(held, fresh, step)
             stepper = stepper.plain
-        held = replace(self.point, state=self.under(fresh.u))
-        self.point = stepper.renew(held, fresh, step)
-        self.books.jump(held, self.point, step)
+        if leapt is None:
+            held = replace(held, state=self.under(fresh.u))
+            leapt = stepper.renew(held, fresh, step)
+        self.point = leapt
+        self.books.jump(held, leapt, step)
 
     def coming(self, t: float) -> float:
         """Return the length of the step after a stop, which is over."""

@@ -167,6 +167,24 @@ def test_a_run_stopped_anywhere_goes_on_with_the_same_bits(machine, law, method,
         assert [(e.name, e.t) for e in (*half.events, *rest.events)] == [(e.name, e.t) for e in whole.events]
 
 
+@pytest.mark.parametrize("method", ["adaptive", "alpha"])
+@pytest.mark.parametrize(
+    "effects",
+    [(), (fc.CoulombFriction({"drive": 1.0}),), (fc.Backlash({"drive": 0.02}),)],
+    ids=["alone", "beside dry friction", "beside play"],
+)
+def test_a_run_of_a_lagging_motor_stopped_at_a_sample_goes_on_with_the_same_books(effects, method):
+    """What is dissipated jumps with the command, which the motor follows within a step or two."""
+    model = driven(fc.MotorLag({"drive": 3e-3}), *effects)
+    servo = control.ss([], [], [], [[-80.0, -0.5]], PERIOD, inputs=["x", "v"], outputs=["torque"])
+    how = {"method": METHODS[method], "start": model.rest.with_(v=np.append(0.3, np.zeros(model.n - 1)))}
+    whole = fc.simulate(model, servo, until=END, **how).report.energy
+    for cut in (PERIOD, 6 * PERIOD):
+        half = fc.simulate(model, servo, until=cut, **how)
+        rest = fc.simulate(model, servo, until=END, method=METHODS[method], start=half.checkpoint)
+        assert rest.report.energy == whole
+
+
 def happened(run: fc.Run, until: float = np.inf) -> tuple[list[Any], list[float]]:
     """What has happened up to a time, in one order at any instant, and when."""
     found = sorted((round(e.t, 6), e.name, e.rising) for e in run.events if e.t <= until)
