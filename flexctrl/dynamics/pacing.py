@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexctrl.dynamics.events.ending import ends_before
 from flexctrl.dynamics.events.landing import Missed, towards
 from flexctrl.dynamics.events.nearing import SHORTEST, SMALLEST
-from flexctrl.dynamics.events.switching import lead
+from flexctrl.dynamics.events.switching import lead, lengthen
 from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.steps import Controlled, Point, StepError
 
@@ -32,6 +32,7 @@ def fixed(journey: Journey, stop: float, until: float) -> None:
         if not ends_before(journey, stop):
             _take(journey, until - t, stop)
         return
+    lengthen(journey, mark.size)
     _take(journey, mark.size, stop)
     if mark.left > 0:
         mark.left -= 1

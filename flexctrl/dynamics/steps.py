@@ -84,6 +84,8 @@ class Mark:
         Steps still to be taken no longer than ``cap`` [s]: an impact is followed.
     led : float
         The step [s] that the method's own accelerations were made for at a corner; 0 once it has been taken.
+    taken : float
+        Of steps of one length, the last [s], or the one that accelerations were made for since; 0 before the first.
     """
 
     size: float
@@ -94,6 +96,7 @@ class Mark:
     follow: int = 0
     cap: float = 0.0
     led: float = 0.0
+    taken: float = 0.0
 
 
 class StepError(ArithmeticError):
@@ -215,10 +218,13 @@ class Stepper(Protocol[P]):
 
 @runtime_checkable
 class Joining(Stepper[P], Protocol[P]):
-    """A stepper with several runs side by side."""
+    """A stepper that sets out anew at corners of laws of force, and where steps grow by far."""
 
     def join(self, point: P, supply: Supply, step: float) -> P:
         """Return the point with all runs in its state, under other inputs; ``step`` is about to be taken."""
+
+    def lengthen(self, point: P, step: float) -> P:
+        """Return the point before a step many times longer than the last."""
 
 
 @runtime_checkable

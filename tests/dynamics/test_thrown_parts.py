@@ -76,9 +76,9 @@ def test_a_force_that_is_switched_on_moves_what_it_bends(law, method):
     assert np.abs(run["block"] - 1.0).max() < 1.5 * BENT
 
 
-def stopped(light: float, backend: str = "compiled") -> tuple[fc.Model, fc.State]:
+def stopped(light: float, backend: str = "compiled", stiff: float = STIFF) -> tuple[fc.Model, fc.State]:
     """A block of 1 kg flies at 1 m/s at a stop with damping on a light part that a stiff spring holds."""
-    spring = fc.Spring("spring", (1, 0, 0), (2, 0, 0), stiffness=STIFF)
+    spring = fc.Spring("spring", (1, 0, 0), (2, 0, 0), stiffness=stiff)
     stop = fc.Spring("stop", (0, 0, 0), (1, 0, 0), stiffness=1e4, damping=30.0)
     part, block = fc.PointMass("part", (1, 0, 0), light), fc.PointMass("block", (0, 0, 0), 1.0)
     joints = [fc.Support(spring.end), fc.Pin(spring.start, part.node), fc.Pin(stop.end, part.node)]
@@ -89,6 +89,7 @@ def stopped(light: float, backend: str = "compiled") -> tuple[fc.Model, fc.State
     return model, model.rest.with_(v=np.array([0.0, 1.0]))
 
 
+@cache
 def returned(light: float) -> float:
     """The speed with which it leaves the stop, which does not hold it."""
 
@@ -113,6 +114,73 @@ def test_a_damped_stop_gives_back_what_it_does(method, backend):
     run = fc.simulate(model, until=0.06, start=start, method=METHODS[method])
     assert run.status is fc.Status.FINISHED
     assert run["speed"][-1] == pytest.approx(returned(1e-4), rel=5e-3)
+
+
+@dataclass(frozen=True)
+class Idle:
+    """Nothing, from sample to sample."""
+
+    sample_time: float = 0.01
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> list[float]:
+        return []
+
+    def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return x
+
+
+SHIFTS = [-1e-6, -1e-10, 0.0, 1e-11, 2e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4, 3e-4, 5e-4, 7e-4, 9e-4]
+"""How much earlier than after ten steps of 1 ms the stop is met [s]: anywhere in a step."""
+
+
+def met(model: fc.Model, start: fc.State, shift: float, law: fc.OpenLoop | Idle | None = None, **how) -> fc.Run:
+    start = model.advance(start, np.array([0.0, shift]), start.v, 0.0)
+    return fc.simulate(model, law, start=start, **{"until": 0.06, "method": METHODS["fine"], **how})
+
+
+@pytest.mark.parametrize("sample_time", [0.01, 0.001])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_stop_may_be_met_anywhere_in_a_step(backend, sample_time):
+    """Just before a sample, too, where a tiny step is left to that, and full ones follow."""
+    model, start = stopped(1e-4, backend)
+    for shift in SHIFTS:
+        run = met(model, start, shift, Idle(sample_time))
+        assert run.status is fc.Status.FINISHED, shift
+        assert run["speed"][-1] == pytest.approx(returned(1e-4), rel=5e-3), shift
+
+
+def test_extrapolated_runs_too():
+    model, start = stopped(1e-4)
+    for shift in (1e-9, 1e-6, 1e-5):
+        run = met(model, start, shift, Idle(), method=fc.Richardson(METHODS["fine"]))
+        assert run.status is fc.Status.FINISHED
+        assert run["speed"][-1] == pytest.approx(returned(1e-4), rel=2e-3)
+
+
+def test_a_stop_met_just_before_a_sample_is_the_same_uncompiled():
+    for shift in (1e-7, 1e-6, 1e-5):
+        ours, plain = (met(*stopped(1e-4, backend), shift, Idle()) for backend in BACKENDS)
+        assert ours.t == pytest.approx(plain.t, rel=1e-9)
+        assert ours.y == pytest.approx(plain.y, abs=1e-8)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_runs_go_on_from_a_tiny_step(backend):
+    """Bit for bit, from its ends and from the next one; states on the way are those of the run."""
+    model, start = stopped(1e-4, backend)
+    whole = met(model, start, 1e-7, Idle())
+    tiny = int(np.argmin(np.diff(whole.t)))
+    for until in whole.t[tiny : tiny + 3].tolist():
+        half = met(model, start, 1e-7, Idle(), until=until)
+        rest = fc.simulate(model, Idle(), until=0.06, start=half.checkpoint, method=METHODS["fine"])
+        assert np.array_equal(rest.final.v, whole.final.v)
+    for k in range(tiny, len(whole.t), 7):
+        assert whole.at(whole.t[k])["speed"] == pytest.approx(whole["speed"][k], abs=1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -150,7 +218,7 @@ def test_what_steps_resolve_keeps_its_order():
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("method", ["fine", "chosen"])
 def test_nothing_changes_where_nothing_is_thrown(method, backend, monkeypatch):
-    """To the bit: a spring of 10⁴ N/m, 100 rad/s with 1 kg, and a rope that catches a load."""
+    """To the bit: a spring of 10⁴ N/m, 100 rad/s with 1 kg; a rope that catches a load; a stop just before a sample."""
 
     def curves() -> list[np.ndarray]:
         rope = fc.Rope("rope", (0, 0, 1), (0, 0, 0.1), EA=1e4, length=1.0)
@@ -162,6 +230,7 @@ def test_nothing_changes_where_nothing_is_thrown(method, backend, monkeypatch):
         return [
             fc.simulate(pushed(1.0, 1e4, backend), Switched(), until=0.1, method=how).y,
             fc.simulate(caught, until=0.5, method=how).y,
+            met(*stopped(1.0, backend, 1e4), 1e-7, Idle(), method=how).y,
         ]
 
     ours = curves()

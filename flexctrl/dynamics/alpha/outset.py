@@ -25,7 +25,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.alpha.steps import Stepper
 
-__all__ = ["join", "renew", "start"]
+__all__ = ["join", "lengthen", "renew", "start"]
 
 _SHARE = 1e-3
 
@@ -120,6 +120,18 @@ def join(stepper: Stepper, point: AlphaPoint, supply: Supply, step: float) -> Al
     lead = (c.alpha_m - c.alpha_f) * step * _held(stepper, state, supply, step)(change)
     lead[stepper.model.motion.flows] = 0.0
     return _eased(stepper, replace(fresh, algorithmic=fresh.rate + lead), step)
+
+
+def lengthen(stepper: Stepper, point: AlphaPoint, step: float) -> AlphaPoint:
+    """Return a point before a step many times longer than the last, which may have resolved parts that this one throws.
+
+    With their accelerations the true ones start anew, the method's own with them; elsewhere nothing changes.
+    """
+    if not stepper.may_throw(step):
+        return point
+    zero = np.zeros(stepper.model.n)
+    fresh = _tempered(stepper, point, zero, step, _held)
+    return point if fresh is point else replace(fresh, trend=zero, lean=1.0)
 
 
 def _tempered(stepper: Stepper, fresh: AlphaPoint, before: np.ndarray, step: float, held: _Holding) -> AlphaPoint:

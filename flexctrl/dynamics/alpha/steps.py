@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from flexctrl.dynamics.alpha.coning import coning_of
 from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough
-from flexctrl.dynamics.alpha.outset import join, renew, start
+from flexctrl.dynamics.alpha.outset import join, lengthen, renew, start
 from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
@@ -96,6 +96,10 @@ class Stepper:
     def join(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:
         """Return the point beyond a corner of a law of force; see `outset.join`."""
         return join(self, point, supply, step)
+
+    def lengthen(self, point: AlphaPoint, step: float) -> AlphaPoint:
+        """Return the point before a step many times longer than the last; see `outset.lengthen`."""
+        return lengthen(self, point, step)
 
     def may_throw(self, h: float) -> bool:
         """Tell whether forces that jump may throw parts over a step."""

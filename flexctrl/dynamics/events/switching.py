@@ -15,13 +15,14 @@ from flexctrl.dynamics.events.watch import Crossing
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.scales import farthest
 from flexctrl.dynamics.steps import Controlled, Joining, Point, Stepper
+from flexctrl.dynamics.swift.thrown import AT_HAND
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["anew", "beyond", "is_brief", "lead", "withheld"]
+__all__ = ["anew", "beyond", "is_brief", "lead", "lengthen", "withheld"]
 
 
 def anew(journey: Journey, at: Point, switch: int) -> Point:
@@ -85,6 +86,15 @@ def lead(journey: Journey, h: float) -> None:
     joined = stepper.join if isinstance(stepper, Joining) else stepper.renew
     journey.point = joined(journey.point, journey.point.supply, h)
     journey.mark.led = h if isinstance(journey.plan.method.pace, Controlled) else 0.0
+    journey.mark.taken = h
+
+
+def lengthen(journey: Journey, h: float) -> None:
+    """Make accelerations anew where those of a far shorter step would throw parts over the one about to be taken."""
+    if h > AT_HAND * journey.mark.taken > 0.0:
+        stepper: Any = journey.stepper.plain if isinstance(journey.stepper, MarchingStepper) else journey.stepper
+        journey.point = stepper.lengthen(journey.point, h) if isinstance(stepper, Joining) else journey.point
+    journey.mark.taken = h
 
 
 def _follow(journey: Journey, before: State, after: State, u: np.ndarray) -> None:

@@ -43,6 +43,7 @@ class Begun(NamedTuple):
     follow: int
     cap: float
     led: float
+    taken: float
 
     @classmethod
     def of(cls, ride: Ride) -> Begun:
@@ -50,7 +51,7 @@ class Begun(NamedTuple):
         m, marcher = ride.marcher.march, ride.marcher
         point, sums = ride.stepper.leave(ride.supply), marcher.books(ride.journey.books.sums)
         counted = m.newton, m.factorisations, m.rejected
-        return cls(point, ride.stepper.memory, sums, m.due, *counted, m.h, m.follow, m.cap, m.led)
+        return cls(point, ride.stepper.memory, sums, m.due, *counted, m.h, m.follow, m.cap, m.led, m.taken)
 
 
 def guarded(ride: Ride, lookout: Lookout, pacing: float | Pacing, count: int) -> tuple[int, int]:
@@ -121,5 +122,5 @@ def go_back(ride: Ride, begun: Begun) -> None:
     ride.marcher.open(books.first, begun.sums.moved, books.dissipates)
     ride.marcher.go_on(begun.sums)
     ride.marcher.watch(ride.journey.watch.corner_sides, begun.point.state)
-    m.follow, m.cap, m.led = begun.follow, begun.cap, begun.led
+    m.follow, m.cap, m.led, m.taken = begun.follow, begun.cap, begun.led, begun.taken
     ride.marcher.keep(keeping, begun.due, spacing)

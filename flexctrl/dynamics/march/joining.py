@@ -13,7 +13,7 @@ from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, energy
 
-__all__ = ["start_anew", "started"]
+__all__ = ["lengthen", "start_anew", "started"]
 
 _SHARE = 1e-4
 
@@ -69,6 +69,20 @@ def started(m: March) -> int:
             copy(f.padded, m.rate, m.algorithmic)
         at_rest_in(m)
     return status
+
+
+@seldom
+def lengthen(m: March) -> None:
+    """Make accelerations anew where those of a far shorter step would throw parts over the one about to be taken."""
+    f = m.flat
+    clear(f.padded, f.step)
+    copy(f.padded, m.v, f.v)
+    if may_throw(m) and firm(m) and temper(m):
+        m.factorisations += 1
+        copy(f.padded, m.rate, m.algorithmic)
+        clear(f.padded, m.trend)
+        m.lean = 1.0
+    at_rest_in(m)
 
 
 @seldom

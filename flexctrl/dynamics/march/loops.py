@@ -11,7 +11,7 @@ from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.gliding import back, glide, land, leap, level
 from flexctrl.dynamics.march.holding import lets_go
-from flexctrl.dynamics.march.joining import started
+from flexctrl.dynamics.march.joining import lengthen, started
 from flexctrl.dynamics.march.judging import compared, growth, judge
 from flexctrl.dynamics.march.jumping import jump, weighed
 from flexctrl.dynamics.march.law import Law, enter_inputs, enter_leg, obeyed, said
@@ -37,6 +37,7 @@ from flexctrl.dynamics.march.record import (
 )
 from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
 from flexctrl.dynamics.march.turning import start_anew, turn_corner
+from flexctrl.dynamics.swift.thrown import AT_HAND
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import energy
 
@@ -160,6 +161,9 @@ def fixed(m: March) -> int:
         if status != DONE:
             return status
         m.jumping = 0
+    if m.throws == 1 and m.leaping == 0 and m.taken > 0.0 and m.h > AT_HAND * m.taken:
+        lengthen(m)
+    m.taken = m.h
     while m.done < m.wanted and m.kept < m.shelf:
         status = advanced(m)
         if status != DONE:

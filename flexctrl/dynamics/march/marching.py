@@ -195,6 +195,7 @@ class Marcher(Loops):
 
     def fixed(self, h: float, count: int) -> int:
         """Take up to ``count`` steps of one length; return how it ended."""
+        self.march.taken = h
         return self.travel(h, count)[0]
 
     def travel(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
@@ -297,8 +298,9 @@ class Marcher(Loops):
         m.watching, self.contacts.watched = int(sides.size > 0), int(self.contacts.count > 0)
 
     def follow(self, mark: Mark) -> None:
-        """Take up how steps of controlled error go on beyond a corner."""
-        self.march.follow, self.march.cap, self.march.led = mark.follow, mark.cap, mark.led
+        """Take up how steps of controlled error go on beyond a corner, and how long the last step of one length was."""
+        m = self.march
+        m.follow, m.cap, m.led, m.taken = mark.follow, mark.cap, mark.led, mark.taken
 
     def watch_no_more(self) -> None:
         """End steps wherever they do."""

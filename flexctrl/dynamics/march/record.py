@@ -170,8 +170,8 @@ class March:
         Steps.
     tried, refused : float, int
         Size and count before the step under way was rejected.
-    follow, cap, led : int, float
-        Of error-controlled steps beyond a corner; see `flexctrl.dynamics.steps.Mark`.
+    follow, cap, led, taken : int, float
+        Of error-controlled steps beyond a corner, of steps of one length; see `flexctrl.dynamics.steps.Mark`.
     phase, attempt, iteration, last, contraction, strayed : int, float
         Where in a step it is.
     leaping, answering : int
@@ -313,6 +313,7 @@ class March:
     follow: int = 0
     cap: float = 0.0
     led: float = 0.0
+    taken: float = 0.0
     phase: int = FRESH
     attempt: int = 0
     iteration: int = 0

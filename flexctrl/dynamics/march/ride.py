@@ -285,7 +285,7 @@ class Ride:
         j.mark.follow, j.mark.cap, j.mark.led = m.follow, m.cap, m.led
         if not self.legs.parts:
             return False
-        j.balked, j.mark.stuck = self.balked, 0
+        j.balked, j.mark.stuck, j.mark.taken = self.balked, 0, m.taken
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)

@@ -159,6 +159,12 @@ class _Stepper:
         fine = _joined(self.fine, replace(point.fine, state=point.state), supply, 0.5 * step)
         return replace(point, rate=fine.rate, supply=supply, coarse=coarse, fine=fine)
 
+    def lengthen(self, point: _Point, step: float) -> _Point:
+        """Return the point before a step many times longer than the last."""
+        coarse, fine = _longer(self.coarse, point.coarse, step), _longer(self.fine, point.fine, 0.5 * step)
+        rate = fine.rate + self.weight * (fine.rate - coarse.rate)
+        return replace(point, rate=rate, coarse=coarse, fine=fine)
+
     def _own(self, run: Point, supply: Supply) -> Supply:
         """What a run is supplied with: the states of a continuous law are integrated, by each run its own."""
         return replace(supply, x=run.supply.x) if self.feed.continuous else supply
@@ -208,6 +214,11 @@ def _joined(stepper: Stepper[Any], run: Any, supply: Supply, step: float) -> Any
     """Start a run anew, as the method by itself does beyond a corner."""
     plain = stepper.plain if isinstance(stepper, MarchingStepper) else stepper
     return plain.join(run, supply, step) if isinstance(plain, Joining) else plain.start(run.state, supply, step)
+
+
+def _longer(stepper: Stepper[Any], run: Any, step: float) -> Any:
+    plain = stepper.plain if isinstance(stepper, MarchingStepper) else stepper
+    return plain.lengthen(run, step) if isinstance(plain, Joining) else run
 
 
 @dataclass(frozen=True, eq=False)
