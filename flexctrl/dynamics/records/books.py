@@ -209,7 +209,7 @@ class Books:
         """What the books say against a motion that goes on: they miss a visible share of what was turned over."""
         s = self.sums
         if not self._doubtful(_DOUBTFUL):
-            return (*self._stiff, *self._made)
+            return (*self._stiff, *self._small)
         return (
             *self._stiff,
             f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is "
@@ -233,15 +233,21 @@ class Books:
         )
 
     @property
-    def _made(self) -> tuple[str, ...]:
-        """What is to be said of motion too small to be seen, yet beyond the tolerance, that the method itself makes."""
+    def _small(self) -> tuple[str, ...]:
+        """What is to be said of motion too small to be seen, yet beyond the tolerance, of which the books miss much."""
         s = self.sums
-        beyond = (s.moved >= self.slight).any() and s.made >= _ROUND_OFF * abs(s.start)
-        if not (self.lawful and beyond and s.made > _ABSURD * s.turnover):
+        beyond = (s.moved >= self.slight).any() and s.gap >= _ROUND_OFF * abs(s.start)
+        if self._seen or not (self.lawful and beyond and self.residual > _DOUBTFUL):
             return ()
+        if s.made > _ABSURD * s.turnover:
+            return (
+                f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: it would be nearer to rest "
+                "than it seems; take smaller steps, a smaller Tolerance, or an implicit method",
+            )
         return (
-            f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: it would be nearer to rest "
-            "than it seems; take smaller steps, a smaller Tolerance, or an implicit method",
+            f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: what moves is less than a "
+            "thousandth of the machine's size, and is not resolved; take smaller steps or a smaller Tolerance if it "
+            "counts",
         )
 
     @property
