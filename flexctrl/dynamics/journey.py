@@ -23,6 +23,7 @@ from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
+from flexctrl.dynamics.notes.growing import growth
 from flexctrl.dynamics.notes.straying import astray
 from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.records.books import Books
@@ -129,6 +130,7 @@ class Journey:
     def travel(self) -> None:
         """Go on to the end, or as far as it goes."""
         self._pause()
+        began = self.point
         try:
             with Interruption() as interruption:
                 self._through_stops(interruption)
@@ -144,6 +146,8 @@ class Journey:
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
         self._judge()
+        if self.status in (Status.FINISHED, Status.STOPPED):
+            self._look_for_growth(began)
 
     def step(self, point: Any, h: float) -> Any:
         """Return the point a step later.
@@ -176,6 +180,14 @@ class Journey:
             self.message = f"{unresolved} at t = {self.point.state.t:.6g} s{ended}; {self._remedy}"
         elif self.status is not Status.FAILED:
             self.notes += self.books.doubts
+
+    def _look_for_growth(self, began: Any) -> None:
+        """Tell of a loop that grows and that steps do not see grow: as a failure, where that is so all the time."""
+        found = growth(self, (began.state, began.supply))
+        if found is not None and found.missed:
+            self.status, self.message = Status.FAILED, str(found)
+        elif found is not None:
+            self.notes += (str(found),)
 
     @property
     def tick(self) -> float:

@@ -1,0 +1,164 @@
+"""Loops that grow faster than steps see: an implicit step maps what grows fast into the unit circle, as what decays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import scipy.linalg as la
+
+from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.linear_motion.exact import Exact
+from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
+from flexctrl.dynamics.methods.extrapolation import Richardson
+from flexctrl.model.state import State
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["Growth", "growth", "loop_poles"]
+
+_MOST = 400
+_DOUBTED, _MISSED = 0.5, 1.5
+_GROWN = 4.0
+_INFINITE = 1e6
+_SAME = 1e-3
+_SMALL = 1e-7
+
+
+class Growth(NamedTuple):
+    """A pole by which a loop grows.
+
+    Attributes
+    ----------
+    pole : complex
+        [1/s]
+    step : float
+        The mean step [s].
+    span : float
+        How long it had to grow [s].
+    missed : bool
+        Whether the loop was and is one that steps by far do not see grow, at the start and at the end.
+    """
+
+    pole: complex
+    step: float
+    span: float
+    missed: bool
+
+    def __str__(self) -> str:
+        pole = f"{self.pole.real:.3g}" + (f" ± {abs(self.pole.imag):.3g}i" if self.pole.imag else "")
+        unstable = f"the continuous loop is unstable, with a pole at {pole} 1/s"
+        if abs(self.pole) * self.step > _DOUBTED:
+            finer = f"look at the gains, or take steps below {0.1 / abs(self.pole):.1g} s"
+            return f"{unstable} that steps of {self.step:.2g} s do not see grow; {finer}"
+        return f"{unstable}: over the run what steps err by grows with it, by up to e^{self.pole.real * self.span:.0f}"
+
+
+def growth(journey: Journey, start: tuple[State, Supply]) -> Growth | None:
+    """Return the pole by which a continuous loop grows in truth, and may not in implicit steps; None if there is none.
+
+    Linear about the start and about the end: at one of these, if steps do not see it grow, at both otherwise. What
+    grows by less than e⁴ over the run is let pass.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+    start : tuple of State and Supply
+        Where it set out.
+
+    Returns
+    -------
+    Growth or None
+    """
+    feed, method, end = journey.plan.feed, journey.plan.method, journey.point
+    method = method.method if isinstance(method, Richardson) else method
+    span = end.state.t - start[0].t
+    if not feed.continuous or isinstance(method, ExplicitRungeKutta | Exact) or not journey.mark.steps or span <= 0.0:
+        return None
+    step = end.state.t / journey.mark.steps
+    found = [_growing(loop_poles(feed, at, to, step), span) for at, to in (start, (end.state, end.supply))]
+    least, worst = sorted(found, key=lambda pole: pole.real)
+    if least or abs(worst) * step > _DOUBTED:
+        return Growth(worst, step, span, abs(least) * step > _MISSED)
+    return None
+
+
+def _growing(poles: np.ndarray, span: float) -> complex:
+    """Return the pole that grows most over the run, 0 if none does."""
+    return complex(max(poles[poles.real * span > _GROWN], key=lambda pole: pole.real, default=0.0))
+
+
+def loop_poles(feed: Feed, state: State, supply: Supply, step: float) -> np.ndarray:
+    """Return the finite poles of a model under a continuous law, linear about a state in motion [1/s].
+
+    Parameters
+    ----------
+    feed : Feed
+        With a continuous law.
+    state : State
+    supply : Supply
+        The inputs there.
+    step : float
+        Poles far above 1/step are left out [s].
+
+    Returns
+    -------
+    numpy.ndarray of complex
+        Empty for a law that reads nothing, for machines too large for it, and while contacts stick.
+    """
+    model = feed.model
+    if not feed.reads.size or 2 * model.n + supply.x.size > _MOST or model.switches.sticks(state):
+        return np.zeros(0, complex)
+    J, E = _pencil(feed, state, supply, step)
+    poles = _finite(J, E)
+    if (poles.real > _SAME).any():  # what has no mass has poles that round-off makes finite: others each time
+        columns = 2.0 ** np.random.default_rng(0).integers(-4, 5, len(J))
+        again = _finite(J * columns, E * columns)
+        poles = poles[[p.real <= _SAME or bool((abs(p - again) <= _SAME * abs(p)).any()) for p in poles]]
+    return np.asarray(poles / step)
+
+
+def _finite(J: np.ndarray, E: np.ndarray) -> np.ndarray:
+    over, under = la.eig(J, E, right=False, homogeneous_eigvals=True)
+    finite = (abs(over) < _INFINITE * abs(under)) & np.isfinite(over) & np.isfinite(under)
+    return np.asarray(over[finite] / under[finite])
+
+
+def _pencil(feed: Feed, state: State, supply: Supply, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """J z = λ h E z of places, h times rates, and the law's states; rows of one size."""
+    model, n, still, x = feed.model, feed.model.n, np.zeros(feed.model.n), supply.x.size
+    kinds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    place, rate, mass = (model.slope(state, state.v, still, seeds, supply.u).toarray() for seeds in kinds)
+    on_place, on_rate = model.signals.slopes(state, model.rates(state), model.motion.raw)
+    T = model.motion.jacobian(state)[: model.motion.raw]
+    reads, reads_rate = ((part[feed.reads] @ T).toarray() for part in (on_place, on_rate))
+    push = (T.T @ model.reach(state, supply.u)).toarray()
+    on_y, on_x = _answers(feed, state, supply)
+    says, follows = (on_y[: len(supply.u)], on_y[len(supply.u) :])
+    J = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n) / step, np.zeros((n, x))],
+            [place + push @ says @ reads, (rate + push @ says @ reads_rate) / step, push @ on_x[: len(supply.u)]],
+            [follows @ reads, follows @ reads_rate / step, on_x[len(supply.u) :]],
+        ]
+    )
+    E = la.block_diag(np.eye(n), -mass / step, np.eye(x)) / step
+    size = np.maximum(abs(J).max(axis=1), abs(E).max(axis=1))
+    size[size == 0.0] = 1.0
+    return J / size[:, None], E / size[:, None]
+
+
+def _answers(feed: Feed, state: State, supply: Supply) -> tuple[np.ndarray, np.ndarray]:
+    """How the inputs and the rates of a law's states change with what it reads and with its states."""
+    y, x = feed.measured(state), supply.x
+
+    def said(d: np.ndarray) -> np.ndarray:
+        found = feed.renewed(state.t, y + d[: y.size], Supply(supply.u, x + d[y.size :], supply.rate))
+        return np.concatenate([found.u, found.rate])
+
+    at = np.concatenate([y, x])
+    steps = np.diag(_SMALL * np.maximum(1.0, abs(at)))
+    slope = np.array([(said(d) - said(-d)) / (2.0 * d.max()) for d in steps]).T
+    return slope[:, : y.size], slope[:, y.size :]
