@@ -8,7 +8,7 @@ import pytest
 from scipy.special import jn_zeros
 
 CHAIN = """
-import resource
+from pathlib import Path
 import numpy as np
 import flexctrl as fc
 section = fc.Section(EA=2e5 * np.pi, EI_y=1e-3, EI_z=1e-3, GJ=1, rhoA=1, rhoJ=1e-4)
@@ -16,11 +16,13 @@ chain = fc.Beam("chain", (0, 0, 0), (0, 0, -10), section, elements=10_000)
 hung = fc.Structure([chain], [fc.Support(chain.start, held="u v w rz")])
 model = fc.assemble(hung, [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
 modes = fc.linearize(model, at=fc.equilibrium(model)).modes(6)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, *modes.omega)
+lines = Path("/proc/self/status").read_text().splitlines()  # its own peak: getrusage tells the parent's beside
+print(next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:")) // 1024, *modes.omega)
 """
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads its memory from /proc")
 def test_ten_thousand_elements_hang_swing_and_fit_in_a_gigabyte():
     done = subprocess.run([sys.executable, "-c", CHAIN], capture_output=True, text=True, check=True)
     memory, *omega = (float(word) for word in done.stdout.split())
