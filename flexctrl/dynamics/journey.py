@@ -183,7 +183,11 @@ class Journey:
 
     def _look_for_growth(self, began: Any) -> None:
         """Tell of a loop that grows and that steps do not see grow: as a failure, where that is so all the time."""
-        found = growth(self, (began.state, began.supply))
+        try:
+            found = growth(self, (began.state, began.supply))
+        except (ControllerError, ArithmeticError, ValueError) as error:  # beside where it was, a law may say nothing
+            self.notes += (f"whether the loop grows could not be told: {error}",)
+            return
         if found is not None and found.missed:
             self.status, self.message = Status.FAILED, str(found)
         elif found is not None:

@@ -16,6 +16,7 @@ import flexctrl as fc
 from flexctrl.design import MinimumJerk, pd
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.notes.growing import loop_poles
+from flexctrl.errors import ControllerError
 
 INERTIA, MOTOR, K, D, R = 2.0, 1e-3, 50.0, 0.01, 10.0
 IMPLICIT = [
@@ -127,3 +128,13 @@ def test_stable_loops_are_not_told_of(method):
         found = run(controller, method, 0.05)
         assert found.status is fc.Status.FINISHED
         assert not any("unstable" in note for note in found.report.notes)
+
+
+def test_a_law_that_does_not_answer_beside_its_course_loses_no_run(monkeypatch):
+    def refused(*_: Any) -> None:
+        raise ControllerError("turned back")
+
+    monkeypatch.setattr("flexctrl.dynamics.journey.growth", refused)
+    found = run(law(2.0, 0.05), fc.GeneralizedAlpha(2e-3), 0.02)
+    assert found.status is fc.Status.FINISHED
+    assert any("could not be told" in note and "turned back" in note for note in found.report.notes)
