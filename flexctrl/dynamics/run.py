@@ -256,9 +256,12 @@ class Run:
         Raises
         ------
         StructureError
-            For a time outside the run, or if its steps took too much room to be kept.
+            For a time outside the run, if it took no step, or if its steps took too much room to be kept.
         """
         track = self.track
+        if track.empty:
+            ended = f"the run ended before its first step ({self.status.value}: {self.report.message})"
+            raise StructureError(f"run.at: {ended}; run.final is where it stood")
         if not track.stretches:
             raise StructureError(
                 "run.at: the steps of this run were not kept, they need more room; give record=InMemory(states=bytes), "

@@ -36,6 +36,7 @@ __all__ = [
     "Twofold",
     "check_step",
     "failed_step",
+    "singular_tangent",
 ]
 
 
@@ -131,6 +132,11 @@ def failed_step(error: Exception, worst: int, t: float) -> StepError:
         why = "nothing holds a freedom there, or its numbers are beyond all bounds"
         return StepError(error.where, f"{error} at t = {t:.6g} s: {why}")
     return StepError(worst, f"the numbers fail at t = {t:.6g} s ({type(error).__name__}: {error})")
+
+
+def singular_tangent(error: SingularMatrixError, t: float, h: float) -> StepError:
+    """Return the failure of an implicit step to a time whose tangent is singular [s]."""
+    return StepError(error.where, f"the tangent is singular at t = {t:.6g} s with a step of {h:.3g} s")
 
 
 @dataclass(frozen=True)

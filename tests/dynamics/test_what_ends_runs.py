@@ -145,3 +145,29 @@ def test_ctrl_c_in_the_last_step_is_not_lost():
             os.kill(os.getpid(), signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def light(mass: float) -> fc.Model:
+    """So light that the spring is all there is to hold it, and that only along itself."""
+    spring = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=1e3)
+    body = fc.PointMass("mass", spring.end, mass)
+    structure = fc.Structure([spring, body], [fc.Support(spring.start), fc.Pin(spring.end, body.node)])
+    return fc.assemble(structure, [fc.LargeRotation(), fc.Gravity()])
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-2)], ids=str)
+def test_a_singular_tangent_tells_its_time(method):
+    run = fc.simulate(light(1e-200), until=1.0, method=method)
+    assert run.status is fc.Status.FAILED
+    assert "the tangent is singular at t = " in run.report.message
+
+
+def test_a_run_without_steps_has_nothing_between_them():
+    run = fc.simulate(light(1e-200), until=1.0)
+    assert run.report.steps == 0
+    with pytest.raises(StructureError, match=r"ended before its first step \(failed: .* singular at t = "):
+        run.at(0.0)
+    for room in (0.0, 1e3):
+        kept = fc.simulate(swing(), until=1.0, record=fc.InMemory(states=room))
+        with pytest.raises(StructureError, match="steps of this run were not kept"):
+            kept.at(0.0)

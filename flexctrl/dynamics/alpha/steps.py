@@ -21,7 +21,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
-from flexctrl.dynamics.steps import Counts, StepError
+from flexctrl.dynamics.steps import Counts, StepError, singular_tangent
 from flexctrl.dynamics.swift.stiff_lines import STIFF, SURE, Caution, firmest
 from flexctrl.dynamics.swift.thrown import AT_HAND, BLURRED, THROWN, holding_inputs, may_throw
 from flexctrl.errors import SingularMatrixError
@@ -214,7 +214,7 @@ class Stepper:
             solve = self.factorised(slope)
             self._solve = lambda force: solve(-force)
         except SingularMatrixError as error:
-            raise StepError(error.where, "the tangent is singular") from error
+            raise singular_tangent(error, at.state.t, at.h) from error
         self.counts.factorisations += 1
         self.memory = at
 

@@ -22,7 +22,7 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.methods.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import largest, turning, yardsticks
-from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step
+from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step, singular_tangent
 from flexctrl.dynamics.swift.massless import massless
 from flexctrl.dynamics.swift.reflected import Motors
 from flexctrl.dynamics.swift.settling import settled, steadied
@@ -329,7 +329,7 @@ class _Stepper:
         try:
             solve = factorise(slope, self._plan)
         except SingularMatrixError as error:
-            raise StepError(error.where, "the tangent is singular") from error
+            raise singular_tangent(error, at.middle.t + 0.5 * h, h) from error
         self._solve = lambda gap: solve(gap * (-2.0 / h))
         self.counts.factorisations += 1
         self.tangent = at

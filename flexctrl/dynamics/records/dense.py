@@ -169,6 +169,11 @@ class Track:
     starts: list[float] = field(default_factory=list)
     stretches: list[Parted] = field(default_factory=list)
 
+    @property
+    def empty(self) -> bool:
+        """Whether there were no steps to keep."""
+        return not self.stretches and self.used <= self.room
+
     def keep(self, states: Sequence[State], before: Point, after: Point) -> None:
         """Keep one step or many."""
         if self.used > self.room:
