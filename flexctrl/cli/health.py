@@ -38,8 +38,12 @@ def _integrator(data: Mapping[str, Any]) -> str:
     worst = f"; converged last: {data['worst']}" if data["worst"] else ""
     e = data["energy"]
     rows = [(name, e[name]) for name in ("start", "work", "dissipated", "kinetic", "stored")]
-    closed = f"\nloops of rigid parts closed to {data['closure_error']:.2g}" if data["closure_error"] else ""
-    return f"{data['method']}, order {data['order']}, {data['damping']}{worst}{closed}\n{grid(('energy', 'J'), rows)}"
+    lines = [f"{data['method']}, order {data['order']}, {data['damping']}{worst}"]
+    if data["closure_error"]:
+        lines.append(f"loops of rigid parts closed to {data['closure_error']:.2g}")
+    if data["drift"]:
+        lines.append(f"errors of steps add up to {data['drift']:.2g} of the motion of {data['drifted']}")
+    return "\n".join([*lines, grid(("energy", "J"), rows)])
 
 
 def _linear(scene: Scene) -> str:

@@ -36,6 +36,7 @@ from flexctrl.dynamics.steps import (
     Counts,
     Fixed,
     Integrator,
+    Judging,
     Mark,
     Point,
     StepError,
@@ -397,6 +398,8 @@ class Journey:
                 return
         curve = self.track.curve(before, after)
         self.books.enter(before, after, curve)
+        if isinstance(self.plan.method.pace, Controlled) and isinstance(self.stepper, Judging):
+            self.books.miss(self.stepper.missed(before, after), after.state.v, after.state.t - before.state.t)
         self.point = after
         self.mark.steps += 1
         self.track.keep((after.state,), before, after)

@@ -37,6 +37,7 @@ class Tolerance:
 
     Their errors may all go one way and add up: a top that sways for 10 s in 1,200 steps under the default is 0.17 rad
     off. Each tenth of the tolerance leaves about a fifth of that; `Richardson` and `ExplicitRungeKutta` leave far less.
+    The report's ``drift`` tells what they may have added up to.
 
     Parameters
     ----------
@@ -126,6 +127,10 @@ class Report:
         The degree of freedom that converged last.
     closure_error : float
         How far conditions that close rigid loops were violated [rad, or shares of what they span].
+    drift : float
+        What errors of steps may have added up to, over the largest motion; 0 for steps that are not chosen by them.
+    drifted : str
+        The degree of freedom in which that is most.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str
@@ -145,6 +150,8 @@ class Report:
     energy_residual: float
     worst: str
     closure_error: float
+    drift: float
+    drifted: str
     message: str
     notes: tuple[str, ...]
 
@@ -159,6 +166,7 @@ class Report:
             "turnover",
             f"converged last: {self.worst or 'none'}",
             *([f"loops of rigid parts closed to {self.closure_error:.2g}"] if self.closure_error else []),
+            *([f"errors of steps add up to {self.drift:.2g} of the motion of {self.drifted}"] if self.drift else []),
             *([self.message] if self.message else []),
             *self.notes,
         ]

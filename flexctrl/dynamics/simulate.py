@@ -19,13 +19,14 @@ from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply, feed_of
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
+from flexctrl.dynamics.notes.adding import Drift, drifted
 from flexctrl.dynamics.notes.straying import strayed
 from flexctrl.dynamics.notes.unsure import unsure
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track, curves_of
 from flexctrl.dynamics.records.record import InMemory, Record, Unwritten
 from flexctrl.dynamics.records.rows import Rows
-from flexctrl.dynamics.run import EnergyBalance, Report, Run, Tolerance
+from flexctrl.dynamics.run import EnergyBalance, Report, Run, Status, Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.swift.layers import beyond_layers
@@ -285,7 +286,10 @@ def _result(journey: Journey) -> Run:
         journey.fail(error)
         rows = journey.rows.recorder.table()
     width = len(plan.model.outputs)
+    drift = drifted(journey)
     journey.notes += strayed(journey) + unsure(journey, rows[:, 1 : 1 + width])
+    if drift.note and journey.status is not Status.FAILED:
+        journey.notes += (drift.note,)
     return Run(
         rows[:, 0],
         plan.model.outputs,
@@ -295,7 +299,7 @@ def _result(journey: Journey) -> Run:
         state,
         journey.rows.frames,
         journey.status,
-        _report(journey),
+        _report(journey, drift),
         plan.model.structure.name,
         tuple(journey.events),
         checkpoint,
@@ -304,7 +308,7 @@ def _result(journey: Journey) -> Run:
     )
 
 
-def _report(journey: Journey) -> Report:
+def _report(journey: Journey, drift: Drift) -> Report:
     plan, mark, counts, sums = journey.plan, journey.mark, journey.stepper.counts, journey.books.sums
     model = plan.model
     return Report(
@@ -321,6 +325,8 @@ def _report(journey: Journey) -> Report:
         energy_residual=journey.books.residual,
         worst=model.coordinates[counts.worst] if model.n else "",
         closure_error=sums.closure,
+        drift=drift.share,
+        drifted=drift.freedom,
         message=journey.message,
         notes=(*model.notes, *journey.notes),
     )

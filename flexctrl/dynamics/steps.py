@@ -27,6 +27,7 @@ __all__ = [
     "Fixed",
     "Integrator",
     "Joining",
+    "Judging",
     "Mark",
     "Pace",
     "Point",
@@ -220,6 +221,17 @@ class Stepper(Protocol[P]):
 
         ``h`` is its length, which times differ by but for round-off; ``moved`` is the reach so far (n,).
         """
+
+
+@runtime_checkable
+class Judging(Stepper[P], Protocol[P]):
+    """A stepper that tells the local error of a step by degrees of freedom."""
+
+    def missed(self, before: P, after: P) -> np.ndarray:
+        """Return by how much a step is beyond where it should be, shape (n,)."""
+
+    def remains(self, share: float) -> float:
+        """Return what a run is off by whose local errors add up to a share of the motion."""
 
 
 @runtime_checkable

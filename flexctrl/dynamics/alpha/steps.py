@@ -233,6 +233,15 @@ class Stepper:
         allowed = tolerance.of(farthest(self.model, moved))
         return abs(self.coefficients.beta - 1.0 / 6.0) * h * h * float((change / allowed).max(initial=0.0))
 
+    def missed(self, before: AlphaPoint, after: AlphaPoint) -> np.ndarray:
+        """Return the local error of a step, (β − 1/6) h² Δa."""
+        h = after.state.t - before.state.t
+        return (self.coefficients.beta - 1.0 / 6.0) * h * h * (after.algorithmic - before.algorithmic)
+
+    def remains(self, share: float) -> float:
+        """Return what a run is off by: as much as its errors add up to."""
+        return share
+
 
 def _lean(change: np.ndarray, before: np.ndarray) -> float:
     """Return the share of the change before that is nearest to a change, within ±1."""

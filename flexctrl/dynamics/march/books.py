@@ -5,7 +5,7 @@ from __future__ import annotations
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import settled
 from flexctrl.dynamics.march.holding import begun
-from flexctrl.dynamics.march.judging import follow, lean, tighten
+from flexctrl.dynamics.march.judging import chosen, follow, lean, miss, tighten
 from flexctrl.dynamics.march.record import DONE, OFTEN, March
 from flexctrl.dynamics.march.step import blended
 from flexctrl.kernels.eights import eight, larger, largest, put, total
@@ -22,6 +22,8 @@ def accept(m: March) -> None:
     """Go on to the end of the step, where the nodes have been placed; enter it in the books and records."""
     f = m.flat
     keep(f)
+    if m.paced == 1 and chosen(m):
+        miss(m)
     zero = 0.0 * eight(m.weight)
     one = zero + 1.0
     still = zero

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.march.record import March
+from flexctrl.dynamics.march.record import CONTROLLED, SAMPLED, March
 from flexctrl.dynamics.march.step import blended
-from flexctrl.kernels.eights import eight, larger, largest
+from flexctrl.kernels.eights import eight, larger, largest, put
 
-__all__ = ["compared", "follow", "growth", "judge", "lean", "tighten"]
+__all__ = ["chosen", "compared", "follow", "growth", "judge", "lean", "miss", "tighten"]
 
 _QUIET = 1e-7
 _LAST = 1e-14
@@ -42,6 +42,24 @@ def compared(m: March) -> float:
         local = abs(rate * (1.0 / (1.0 - m.alpha_m)) - m.algorithmic[i]) * m.weight[i]
         worst = max(worst, local / (m.absolute + m.relative * m.farthest[m.part[i]]))
     return scale * worst
+
+
+def chosen(m: March) -> bool:
+    """Tell whether steps are those of controlled error."""
+    return m.task == CONTROLLED or (m.task == SAMPLED and m.law.pace == 0.0)
+
+
+def miss(m: March) -> None:
+    """Add up the local error of a step about to be accepted; as `Books.miss` does."""
+    f = m.flat
+    scale = (m.beta - 1.0 / 6.0) * m.h * m.h
+    for i in range(0, f.padded, 8):
+        own = eight(m.algorithmic[i:])
+        lead = blended(m, eight(f.rate[i:]), eight(m.rate[i:]), own)
+        v = eight(f.v[i:])
+        put(m.ahead[i:], eight(m.ahead[i:]) + scale * (lead - own) * v)
+        put(m.swept[i:], eight(m.swept[i:]) + m.h * v * v)
+        put(m.path[i:], eight(m.path[i:]) + m.h * abs(v))
 
 
 def follow(m: March) -> None:

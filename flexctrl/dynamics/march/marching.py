@@ -171,9 +171,10 @@ class Marcher(Loops):
 
     def go_on(self, sums: Sums) -> None:
         """Go on with books: what is summed up does not depend on where marches begin and end."""
-        m = self.march
+        m, F = self.march, self.flattened
         m.drawing, m.gained, m.lost, m.entered = 1, sums.work, sums.lost, sums.entered
         m.begun, m.moving, m.turnover, m.gap, m.made = sums.start, sums.moving, sums.turnover, sums.gap, sums.made
+        m.ahead[:], m.swept[:], m.path[:] = F.ordered(sums.ahead), F.ordered(sums.swept), F.ordered(sums.path)
         m.closing.open = sums.closure
         if m.losing and self.model.motion.flows.size:  # which may be over within the step: their state does not tell
             m.power = sums.power
@@ -308,7 +309,7 @@ class Marcher(Loops):
 
     def books(self, sums: Sums) -> Sums:
         """Return the books, gone on from some sums."""
-        m = self.march
+        m, F = self.march, self.flattened
         return replace(
             sums,
             work=m.gained,
@@ -319,7 +320,10 @@ class Marcher(Loops):
             power=m.power if m.losing else sums.power,
             closure=m.closing.open,
             entered=m.entered,
-            moved=self.flattened.own(m.reach),
+            moved=F.own(m.reach),
+            ahead=F.own(m.ahead),
+            swept=F.own(m.swept),
+            path=F.own(m.path),
         )
 
     def about_to(self, h: float) -> None:

@@ -230,6 +230,8 @@ class March:
         The farthest that anything has turned within a step since this was set to zero [rad].
     reach, first : Reals
         Largest distance of each degree of freedom from where it was first.
+    ahead, swept, path : Reals
+        Sums of local errors of steps of controlled error; see `flexctrl.dynamics.records.books.Sums`.
     rows : Reals
         Time and outputs after each step.
     states : Reals
@@ -267,6 +269,9 @@ class March:
     cones: Wholes
     reach: Reals
     first: Reals
+    ahead: Reals
+    swept: Reals
+    path: Reals
     rows: Reals
     states: Reals
     parts: int

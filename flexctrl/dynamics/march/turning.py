@@ -12,8 +12,9 @@ from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import comes_through, value
 from flexctrl.dynamics.march.impact import follow_impact, stiffness
 from flexctrl.dynamics.march.joining import start_anew
+from flexctrl.dynamics.march.judging import chosen
 from flexctrl.dynamics.march.landing import shortened
-from flexctrl.dynamics.march.record import CONTROLLED, CORNER, DONE, FRESH, SAMPLED, TURN, TURNED, March
+from flexctrl.dynamics.march.record import CORNER, DONE, FRESH, TURN, TURNED, March
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, keep
@@ -42,14 +43,14 @@ def turn_corner(m: March, size: float) -> int:
     accept(m)
     m.h = size
     m.corners.sides[m.corners.which] = -m.corners.sides[m.corners.which]
-    chosen = m.task == CONTROLLED or (m.task == SAMPLED and m.law.pace == 0.0)
-    if chosen:
+    controlled = m.paced == 1 and chosen(m)
+    if controlled:
         m.size = size
         m.follow = max(0, m.follow - 1)
-    before = stiffness(m, -_SHARE * size) if chosen else 0.0
+    before = stiffness(m, -_SHARE * size) if controlled else 0.0
     if not nudged(m):
         return TURN
-    if chosen:
+    if controlled:
         follow_impact(m, stiffness(m, _SHARE * size) - before)
         m.h = min(size, m.cap) if m.follow > 0 else size
         m.led = m.h

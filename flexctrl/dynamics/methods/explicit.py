@@ -197,15 +197,29 @@ class _Stepper:
 
     def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error over what is allowed; errors of rates count over the step."""
-        n, c = self.model.n, self.local.count
-        K, table = after.slopes, self.table
-        high, low = table.E5 @ K, table.E3 @ K
         weight = self.weight / tolerance.of(farthest(self.model, moved))
+        high, fifth, share = self._compared(after.slopes, h, weight)
+        self.counts.worst = int(np.argmax(np.abs(high * weight))) if high.size else 0
+        return h * fifth * share
+
+    def missed(self, before: _Point, after: _Point) -> np.ndarray:
+        """Return the local error of a step."""
+        h = after.state.t - before.state.t
+        high, _, share = self._compared(after.slopes, h, self.weight)
+        return h * share * high
+
+    def remains(self, share: float) -> float:
+        """Return what a run is off by: as much as its errors add up to."""
+        return share
+
+    def _compared(self, slopes: np.ndarray, h: float, weight: np.ndarray) -> tuple[np.ndarray, float, float]:
+        """Compare with the method of order 5: the difference over the step, its size, and what of it is our error."""
+        n, c = self.model.n, self.local.count
+        high, low = self.table.E5 @ slopes, self.table.E3 @ slopes
         scale = np.concatenate([weight, h * weight])
         places = np.concatenate([np.arange(n), np.arange(c, c + n)])
         fifth, third = (float(np.abs(e[places] * scale).max(initial=0.0)) for e in (high, low))
-        self.counts.worst = int(np.argmax(np.abs(high[:n] * weight))) if n else 0
-        return h * fifth * fifth / float(np.hypot(fifth, 0.1 * third)) if fifth > 0.0 else 0.0
+        return high[:n], fifth, fifth / float(np.hypot(fifth, 0.1 * third)) if fifth > 0.0 else 0.0
 
     def curve(self, before: _Point, after: _Point) -> _Curve:
         """Return the motion over a step."""

@@ -19,7 +19,7 @@ from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.dense import Hermite
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.steps import Counts, Integrator, Joining, Pace, Point, Stepper
+from flexctrl.dynamics.steps import Counts, Integrator, Joining, Judging, Pace, Point, Stepper
 from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
@@ -208,6 +208,15 @@ class _Stepper:
         and no shorter step makes it less.
         """
         return self.coarse.error(before.coarse, after.coarse, h, moved, tolerance)
+
+    def missed(self, before: _Point, after: _Point) -> np.ndarray:
+        """Return the local error of the coarser run."""
+        assert isinstance(self.coarse, Judging)
+        return self.coarse.missed(before.coarse, after.coarse)
+
+    def remains(self, share: float) -> float:
+        """Return what a run is off by: of second order in the lag of the coarser one."""
+        return 0.5 * share * share
 
 
 def _joined(stepper: Stepper[Any], run: Any, supply: Supply, step: float) -> Any:

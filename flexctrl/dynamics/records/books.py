@@ -57,6 +57,8 @@ class Sums:
         Steps since the start.
     moved : numpy.ndarray, shape (n,)
         How far each degree of freedom has been from its start.
+    ahead, swept, path : numpy.ndarray, shape (n,)
+        Of steps of controlled error, local errors e and rates v: Σ e v, Σ h v², Σ h |v|.
     """
 
     start: float = 0.0
@@ -72,6 +74,9 @@ class Sums:
     closure: float = 0.0
     entered: int = 0
     moved: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    ahead: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    swept: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    path: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class Books:
@@ -88,9 +93,9 @@ class Books:
         self.dissipates = changing or self.model.energy(state.with_(v=probe))[2] != 0.0
         self.loses = self.dissipates or not method.symmetric  # steps that lead back in time take nothing for good
         kinetic, stored, power = self.model.energy(state)
-        self.sums = Sums(
-            kinetic + stored, kinetic, kinetic=kinetic, stored=stored, power=power, moved=np.zeros(self.model.n)
-        )
+        self.sums = Sums(kinetic + stored, kinetic, kinetic=kinetic, stored=stored, power=power)
+        for name in ("moved", "ahead", "swept", "path"):
+            setattr(self.sums, name, np.zeros(self.model.n))
 
     def enter(self, before: Point, after: Point, curve: Curve) -> None:
         """Enter a step."""
@@ -104,6 +109,13 @@ class Books:
         sums.entered += 1
         if sums.entered < OFTEN or sums.entered % OFTEN == 0:
             self.close(after)
+
+    def miss(self, error: np.ndarray, v: np.ndarray, h: float) -> None:
+        """Add up the local error of a step that ends at some rates."""
+        sums = self.sums
+        sums.ahead = sums.ahead + error * v
+        sums.swept = sums.swept + h * v * v
+        sums.path = sums.path + h * np.abs(v)
 
     def jump(self, before: Point, after: Point, step: float) -> None:
         """Note that rates have jumped with the inputs before a step, and with them what is dissipated.
