@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from flexctrl.kernels.native import Packed, Reals
-from flexctrl.model.flat.fronts import Fronts, Plan, factor, plan_of, solve
+from flexctrl.model.flat.fronts import Fronts, Plan, factor, plan_of
+from flexctrl.model.flat.solving import solve
 
 pytest.importorskip("llvmlite")
 
@@ -48,6 +49,8 @@ MATRICES = {
     "beams": chain(9, 6, RNG),
     "planar": chain(12, 3, RNG),
     "single": chain(30, 1, RNG),
+    "sevens": chain(5, 7, RNG),
+    "wide": chain(3, 18, RNG),
     "grid": sp.kronsum(sp.diags([-1, 2.5, -1.3], [-1, 0, 1], (6, 6)), sp.diags([-1, 2.5, -1], [-1, 0, 1], (7, 7))),
     "scattered": sp.random(50, 50, 0.08, random_state=4) + 4.0 * sp.identity(50),
     "full": sp.csr_matrix(RNG.normal(size=(19, 19)) + 9.0 * np.eye(19)),

@@ -11,7 +11,8 @@ from flexctrl.kernels.eights import eight, largest
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.flat import Flat
-from flexctrl.model.flat.fronts import Fronts, solve_own
+from flexctrl.model.flat.fronts import Fronts
+from flexctrl.model.flat.solving import solve_own
 from flexctrl.model.laws.kinds import NODE_SLOT
 
 __all__ = ["mark", "solved", "turned_too_far"]

@@ -1,4 +1,4 @@
-"""Elimination by fronts: a sparse matrix factorised and solved with, in compiled loops.
+"""Elimination by fronts: a sparse matrix factorised in compiled loops; see `solving`.
 
 Unknowns with the same neighbours (a node's) are eliminated together, the ones with the fewest neighbours
 first. Each group has a front: a small dense matrix of the group and the unknowns that it touches. Sweeping
@@ -21,7 +21,7 @@ from flexctrl.errors import KernelError
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 
-__all__ = ["Fronts", "Plan", "factor", "plan_of", "seat", "solve", "solve_own", "whose"]
+__all__ = ["Fronts", "Plan", "factor", "plan_of", "seat", "whose"]
 
 _VANISHING = 1e-13
 _MERGED = 12
@@ -365,55 +365,3 @@ def whose(f: Fronts, where: int) -> int:
             if f.seats[i] >= where:
                 return i
     return where
-
-
-def solve_own(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals, wide: Reals) -> None:
-    """Solve in place for the degrees of freedom, nothing being on the other unknowns; these need ``wide``."""
-    if f.beyond > 0:
-        for i in range(f.n):
-            wide[i] = 0.0
-        for i in range(f.n - f.beyond):
-            wide[f.seats[i]] = b[i]
-        solve(f, down, up, wide, work)
-        for i in range(f.n - f.beyond):
-            b[i] = wide[f.seats[i]]
-    else:
-        solve(f, down, up, b, work)
-
-
-def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:
-    """Solve in place with a factorised matrix."""
-    below = 0
-    for s in range(f.count):
-        pivots = f.pivots[s]
-        size = f.size[s]
-        own = b[f.first[s] :]
-        for i in range(0, size, 8):
-            a = down[below + i :]
-            found = own[0] * eight(a)
-            for k in range(1, pivots):
-                found = found + own[k] * eight(a[k * size :])
-            put(work[i:], found)
-        below += pivots * size
-        for k in range(pivots):
-            own[k] = work[k]
-        others = f.others[f.rest[s] :]
-        for i in range(pivots, size):
-            b[others[i - pivots]] += work[i]
-    right = f.right
-    for s in range(f.count - 1, -1, -1):
-        pivots = f.pivots[s]
-        rest = f.size[s] - pivots
-        right -= pivots * rest
-        others = f.others[f.rest[s] :]
-        own = b[f.first[s] :]
-        for k in range(pivots):
-            work[k] = own[k]
-        for i in range(0, pivots, 8):
-            a = up[right + i :]
-            found = eight(work[i:])
-            for j in range(rest):
-                found = found - b[others[j]] * eight(a[j * pivots :])
-            put(work[i:], found)
-        for k in range(pivots):
-            own[k] = work[k]

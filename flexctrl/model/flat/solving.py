@@ -1,0 +1,112 @@
+"""Solving with a matrix that has been eliminated by fronts, in compiled loops.
+
+As long as all of it is in a near cache, what takes time is waiting: for the product before in a sum, and for entries
+written one by one that are read eight at once. So rows are summed up side by side, and copied eight at a time.
+"""
+
+from __future__ import annotations
+
+from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.native import Reals, Wholes
+from flexctrl.model.flat.fronts import Fronts
+
+__all__ = ["solve", "solve_own"]
+
+
+def solve_own(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals, wide: Reals) -> None:
+    """Solve in place for the degrees of freedom, nothing being on the other unknowns; these need ``wide``."""
+    if f.beyond > 0:
+        for i in range(f.n):
+            wide[i] = 0.0
+        for i in range(f.n - f.beyond):
+            wide[f.seats[i]] = b[i]
+        solve(f, down, up, wide, work)
+        for i in range(f.n - f.beyond):
+            b[i] = wide[f.seats[i]]
+    else:
+        solve(f, down, up, b, work)
+
+
+def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:
+    """Solve in place with a factorised matrix."""
+    below = 0
+    for s in range(f.count):
+        pivots = f.pivots[s]
+        size = f.size[s]
+        own = b[f.first[s] :]
+        forward(pivots, size, own, down[below:], work)
+        below += pivots * size
+        copy_on(pivots, work, own)
+        others = f.others[f.rest[s] :]
+        for i in range(pivots, size):
+            b[others[i - pivots]] += work[i]
+    right = f.right
+    for s in range(f.count - 1, -1, -1):
+        pivots = f.pivots[s]
+        rest = f.size[s] - pivots
+        right -= pivots * rest
+        own = b[f.first[s] :]
+        others = f.others[f.rest[s] :]
+        if pivots >= 8 and pivots <= 16:
+            backward_in_place(pivots, rest, b, others, up[right:], own)
+        else:
+            copy_on(pivots, own, work)
+            backward(pivots, rest, b, others, up[right:], work)
+            copy_on(pivots, work, own)
+
+
+def copy_on(n: int, x: Reals, y: Reals) -> None:
+    """Copy entries, eight at a time: what was written one by one is not there yet when eight of it are read."""
+    i = 0
+    while n - i >= 8:
+        put(y[i:], eight(x[i:]))
+        i += 8
+    while i < n:
+        y[i] = x[i]
+        i += 1
+
+
+def forward(pivots: int, size: int, own: Reals, a: Reals, work: Reals) -> None:
+    """Sum up columns times their unknowns, up to 24 rows side by side: each sum waits for its last product."""
+    i = 0
+    while size - i > 16:
+        one = own[0] * eight(a[i:])
+        two = own[0] * eight(a[i + 8 :])
+        three = own[0] * eight(a[i + 16 :])
+        for k in range(1, pivots):
+            column = a[k * size + i :]
+            one = one + own[k] * eight(column)
+            two = two + own[k] * eight(column[8:])
+            three = three + own[k] * eight(column[16:])
+        put(work[i:], one)
+        put(work[i + 8 :], two)
+        put(work[i + 16 :], three)
+        i += 24
+    while i < size:
+        one = own[0] * eight(a[i:])
+        for k in range(1, pivots):
+            one = one + own[k] * eight(a[k * size + i :])
+        put(work[i:], one)
+        i += 8
+
+
+def backward(pivots: int, rest: int, b: Reals, others: Wholes, a: Reals, found: Reals) -> None:
+    """Take columns times other unknowns from the rows of pivots."""
+    for i in range(0, pivots, 8):
+        one = eight(found[i:])
+        for j in range(rest):
+            one = one - b[others[j]] * eight(a[j * pivots + i :])
+        put(found[i:], one)
+
+
+def backward_in_place(pivots: int, rest: int, b: Reals, others: Wholes, a: Reals, own: Reals) -> None:
+    """Do so for 8 to 16 pivots, the first eight and the last eight side by side; some may be in both."""
+    last = pivots - 8
+    one = eight(own)
+    two = eight(own[last:])
+    for j in range(rest):
+        column = a[j * pivots :]
+        one = one - b[others[j]] * eight(column)
+        two = two - b[others[j]] * eight(column[last:])
+    put(own, one)
+    put(own[last:], two)
