@@ -73,8 +73,8 @@ class Writer:
         return self.value(f"fmul contract {self.real} {a}, {b}")
 
     def div(self, a: str, b: str) -> str:
-        """Return a / b."""
-        return self.value(f"fdiv contract {self.real} {a}, {b}")
+        """Return a / b, to round-off: what divides several times is inverted once."""
+        return self.value(f"fdiv contract arcp {self.real} {a}, {b}")
 
     def neg(self, a: str) -> str:
         """Return −a."""
