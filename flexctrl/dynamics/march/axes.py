@@ -7,7 +7,7 @@ is that axes that meet in a piece have turned against each other.
 from __future__ import annotations
 
 from flexctrl.dynamics.march.record import Factors
-from flexctrl.kernels.eights import eight, largest
+from flexctrl.kernels.eights import eight, larger, largest
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.flat import Flat
@@ -39,14 +39,19 @@ def turned_too_far(axes: Axes, factors: Factors, f: Flat, most: float) -> bool:
             return True
     for k in range(axes.count):
         since(f.z[NODE_SLOT * axes.nodes[k] + 3 :], factors.made[9 * k :], factors.turned[9 * k :])
+    if axes.pair_count == 0:
+        return False
+    apart = 0.0 * eight(factors.made)
+    rest = 0.0
     for k in range(axes.pair_count):
         one = factors.turned[9 * axes.pairs[2 * k] :]
         if axes.pairs[2 * k + 1] >= 0:
-            if apart(one, factors.turned[9 * axes.pairs[2 * k + 1] :]) > most:
-                return True
-        elif tilt(one) > most:
-            return True
-    return False
+            other = factors.turned[9 * axes.pairs[2 * k + 1] :]
+            apart = larger(apart, abs(eight(one) - eight(other)))
+            rest = max(rest, abs(one[8] - other[8]))
+        else:
+            rest = max(rest, tilt(one))
+    return max(largest(apart), rest) > most
 
 
 def since(R: Reals, made: Reals, turned: Reals) -> None:
@@ -60,11 +65,6 @@ def since(R: Reals, made: Reals, turned: Reals) -> None:
     turned[6] = R[6] * made[0] + R[7] * made[1] + R[8] * made[2]
     turned[7] = R[6] * made[3] + R[7] * made[4] + R[8] * made[5]
     turned[8] = R[6] * made[6] + R[7] * made[7] + R[8] * made[8]
-
-
-def apart(a: Reals, b: Reals) -> float:
-    """Return the largest difference of the entries of two rotations."""
-    return max(largest(abs(eight(a) - eight(b))), abs(a[8] - b[8]))
 
 
 def tilt(a: Reals) -> float:
