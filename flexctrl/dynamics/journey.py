@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -397,9 +397,10 @@ class Journey:
                 self.point = after if corner is None else beyond(self, after, corner)
                 return
         curve = self.track.curve(before, after)
+        if isinstance(self.plan.method.pace, Controlled) and self.books.looking:
+            missed = cast("Judging[Any]", self.stepper).missed(before, after)
+            self.books.miss(missed, after.state.v, after.state.t - before.state.t)
         self.books.enter(before, after, curve)
-        if isinstance(self.plan.method.pace, Controlled) and isinstance(self.stepper, Judging):
-            self.books.miss(self.stepper.missed(before, after), after.state.v, after.state.t - before.state.t)
         self.point = after
         self.mark.steps += 1
         self.track.keep((after.state,), before, after)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.march.record import CONTROLLED, SAMPLED, March
+from flexctrl.dynamics.march.record import CONTROLLED, LOOKED_AT, SAMPLED, March
 from flexctrl.dynamics.march.step import blended
 from flexctrl.kernels.eights import eight, larger, largest, put
 
@@ -53,13 +53,14 @@ def miss(m: March) -> None:
     """Add up the local error of a step about to be accepted; as `Books.miss` does."""
     f = m.flat
     scale = (m.beta - 1.0 / 6.0) * m.h * m.h
+    way = LOOKED_AT * m.h
     for i in range(0, f.padded, 8):
         own = eight(m.algorithmic[i:])
         lead = blended(m, eight(f.rate[i:]), eight(m.rate[i:]), own)
         v = eight(f.v[i:])
         put(m.ahead[i:], eight(m.ahead[i:]) + scale * (lead - own) * v)
         put(m.swept[i:], eight(m.swept[i:]) + m.h * v * v)
-        put(m.path[i:], eight(m.path[i:]) + m.h * abs(v))
+        put(m.path[i:], eight(m.path[i:]) + way * abs(v))
 
 
 def follow(m: March) -> None:

@@ -32,6 +32,9 @@ FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED, STAR
 OFTEN = 32
 """Steps between balances of energy; the first so many have one each."""
 
+LOOKED_AT = 4
+"""Steps of controlled error of which the error of one is added up: of more, it could be told from the clock."""
+
 FRESH, EVALUATE, CORRECT = 0, 1, 2
 """Where in a step it is: before it, before an iteration, or with the forces of one known."""
 

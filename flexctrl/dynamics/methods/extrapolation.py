@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -211,8 +211,7 @@ class _Stepper:
 
     def missed(self, before: _Point, after: _Point) -> np.ndarray:
         """Return the local error of the coarser run."""
-        assert isinstance(self.coarse, Judging)
-        return self.coarse.missed(before.coarse, after.coarse)
+        return cast("Judging[Any]", self.coarse).missed(before.coarse, after.coarse)
 
     def remains(self, share: float) -> float:
         """Return what a run is off by: of second order in the lag of the coarser one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -53,10 +53,10 @@ def drifted(journey: Journey) -> Drift:
     -------
     Drift
     """
-    plan, sums, stepper = journey.plan, journey.books.sums, journey.stepper
-    model = plan.model
-    if not (isinstance(plan.method.pace, Controlled) and isinstance(stepper, Judging) and model.n):
+    plan, sums, model = journey.plan, journey.books.sums, journey.plan.model
+    if not (isinstance(plan.method.pace, Controlled) and sums.swept.any()):
         return Drift()
+    stepper = cast("Judging[Any]", journey.stepper)
     went = (sums.swept > 0.0) & np.isfinite(sums.ahead * sums.path / sums.swept)
     late = 0.5 * math.pi * np.abs(sums.ahead[went]) * sums.path[went] / sums.swept[went]
     off = np.zeros(model.n)

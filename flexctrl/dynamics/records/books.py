@@ -9,7 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
-from flexctrl.dynamics.march.record import OFTEN
+from flexctrl.dynamics.march.record import LOOKED_AT, OFTEN
 from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
@@ -58,7 +58,7 @@ class Sums:
     moved : numpy.ndarray, shape (n,)
         How far each degree of freedom has been from its start.
     ahead, swept, path : numpy.ndarray, shape (n,)
-        Of steps of controlled error, local errors e and rates v: Σ e v, Σ h v², Σ h |v|.
+        Of every few steps of controlled error, local errors e and rates v: Σ e v, Σ h v², and Σ h |v| of all.
     """
 
     start: float = 0.0
@@ -110,12 +110,17 @@ class Books:
         if sums.entered < OFTEN or sums.entered % OFTEN == 0:
             self.close(after)
 
+    @property
+    def looking(self) -> bool:
+        """Whether the error of the step about to be entered is added up."""
+        return self.sums.entered % LOOKED_AT == 0
+
     def miss(self, error: np.ndarray, v: np.ndarray, h: float) -> None:
         """Add up the local error of a step that ends at some rates."""
         sums = self.sums
         sums.ahead = sums.ahead + error * v
         sums.swept = sums.swept + h * v * v
-        sums.path = sums.path + h * np.abs(v)
+        sums.path = sums.path + LOOKED_AT * h * np.abs(v)
 
     def jump(self, before: Point, after: Point, step: float) -> None:
         """Note that rates have jumped with the inputs before a step, and with them what is dissipated.
