@@ -34,6 +34,7 @@ from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import (
     Controlled,
     Counts,
+    Exact,
     Fixed,
     Integrator,
     Judging,
@@ -158,8 +159,22 @@ class Journey:
         StepError
             If it does not converge, or its numbers fail on the way.
         """
+        return self._taken(self.stepper.step, point, h)
+
+    def exactly(self, point: Any, h: float) -> Any:
+        """Return the point a step later, solved to the last digits where that can be: whether it ends before a corner.
+
+        Raises
+        ------
+        StepError
+            As `step` does.
+        """
+        stepper = self.stepper
+        return self._taken(stepper.exactly if isinstance(stepper, Exact) else stepper.step, point, h)
+
+    def _taken(self, step: Callable[[Any, float], Any], point: Any, h: float) -> Any:
         try:
-            return self.stepper.step(point, h)
+            return step(point, h)
         except StepError:
             raise
         except (ArithmeticError, ValueError) as error:

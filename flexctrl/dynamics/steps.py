@@ -24,6 +24,7 @@ __all__ = [
     "MOST_STEPS",
     "Controlled",
     "Counts",
+    "Exact",
     "Fixed",
     "Integrator",
     "Joining",
@@ -242,6 +243,20 @@ class Joining(Stepper[P], Protocol[P]):
 
     def lengthen(self, point: P, step: float) -> P:
         """Return the point before a step many times longer than the last."""
+
+
+@runtime_checkable
+class Exact(Stepper[P], Protocol[P]):
+    """A stepper that can solve its steps more exactly than errors of the method ask for."""
+
+    def exactly(self, point: P, h: float) -> P:
+        """Return the point a step later, solved to the last digits.
+
+        Raises
+        ------
+        StepError
+            If it does not converge.
+        """
 
 
 @runtime_checkable

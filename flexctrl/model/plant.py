@@ -110,6 +110,8 @@ class Kinked(Protocol):
 
     def values(self, state: State, before: State) -> np.ndarray: ...
 
+    def sides(self, state: State) -> np.ndarray: ...
+
 
 class Plant(Protocol):
     """All that methods of integration, controllers, books and events ask; `Model` says what each gives."""

@@ -13,10 +13,11 @@ from flexctrl.dynamics.alpha import method as alpha
 from flexctrl.dynamics.events import watching
 
 
-def geared(*effects: fc.Effect) -> fc.Model:
+def geared(*effects: fc.Effect, stiffness: float = 30.0, damping: float = 0.05) -> fc.Model:
     """A wheel on a motor with play."""
     wheel = fc.RigidBody("wheel", (0, 0, 0), 1.0, (1.0, 1.0, 1.0))
-    drive = fc.RotaryDrive("motor", wheel.node, axis="z", stiffness=30.0, ratio=2.0, inertia=0.05, damping=0.05)
+    shaft = {"stiffness": stiffness, "ratio": 2.0, "damping": damping}
+    drive = fc.RotaryDrive("motor", wheel.node, axis="z", inertia=0.05, **shaft)
     structure = fc.Structure(
         [wheel],
         [fc.Support(wheel.node, "u v w rx ry")],
@@ -99,6 +100,29 @@ def test_states_on_the_way_are_those_of_the_run(case, method):
         for t, value in zip(run.t.tolist(), run[name].tolist(), strict=True):
             if np.abs(met - t).min() > 1e-6:  # where a step ends at a corner, the next one starts just beyond
                 assert run.at(t)[name] == pytest.approx(value, rel=1e-11, abs=1e-11)
+
+
+@pytest.mark.parametrize("step", [1e-3, 4e-3])
+@pytest.mark.parametrize("damping", [1.0, 30.0])
+def test_a_stiff_flank_is_met_when_it_is(damping, step, plainly):
+    """A motor driven through half its play of 0.1 rad by 1.9 N m, to a flank that throws back what ends beyond it."""
+    asked = {"model": geared(stiffness=1e8, damping=damping), "until": 0.06, "inputs": {"torque": 1.9}}
+    runs = [take(**asked, method=fc.GeneralizedAlpha(step)) for take in (fc.simulate, plainly)]
+    for run in runs:
+        assert run.events[0].t == pytest.approx((0.1 * 0.05 / 1.9) ** 0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("controlled", [False, True])
+def test_a_run_whose_method_makes_energy_ends_at_a_balance(controlled, plainly):
+    """Which comes after so many steps, however many are taken at once: here after 32, in the damped flank's throes."""
+    model = geared(stiffness=1e6, damping=30.0)
+    asked = sampled(model) if controlled else {"model": model, "until": 0.5, "inputs": {"torque": 6.0}}
+    runs = [take(**asked, method=fc.GeneralizedAlpha(1e-3)) for take in (fc.simulate, plainly)]
+    for run in runs:
+        assert run.status is fc.Status.FAILED
+        assert "has made" in run.report.message
+        assert run.report.steps % 32 == 0
+    assert runs[0].final.t == pytest.approx(runs[1].final.t, abs=1e-12)
 
 
 def test_steps_are_of_second_order_through_a_corner():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["ASTRAY", "ITERATIONS", "POOR", "small_enough"]
+__all__ = ["ASTRAY", "ITERATIONS", "POOR", "small_enough", "wanted"]
 
 ITERATIONS = 12
 POOR = 0.25
@@ -13,6 +13,12 @@ _ROUND_OFF = 1e-13
 """Corrections below this that do not shrink any more are round-off."""
 
 
-def small_enough(size: float, contraction: float, tolerance: float) -> bool:
+def small_enough(size: float, contraction: float, tolerance: float, exact: bool) -> bool:
     """Tell whether a correction of this size was the last that is needed, or can be had."""
-    return size <= tolerance or (contraction > POOR and size <= _ROUND_OFF)
+    can_be = tolerance if exact else _ROUND_OFF
+    return size <= wanted(tolerance, exact) or (contraction > POOR and size <= can_be)
+
+
+def wanted(tolerance: float, exact: bool) -> float:
+    """Return the size of the last correction; exact steps end near stiff flanks, whose force is felt in last digits."""
+    return min(tolerance, _ROUND_OFF) if exact else tolerance

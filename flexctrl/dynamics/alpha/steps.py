@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics.alpha.coning import coning_of
-from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough
+from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough, wanted
 from flexctrl.dynamics.alpha.outset import join, lengthen, renew, start
 from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
 from flexctrl.dynamics.feed import Feed, Supply
@@ -71,6 +71,8 @@ class Stepper:
     memory: Tangent | None = None
     _solve: Solve | None = None
     _plan: Plan | None = None
+    _exact: bool = False
+    _sides: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         self.turning = turning(self.model)
@@ -78,6 +80,7 @@ class Stepper:
         self.coning = coning_of(self.model)
         self.firmest = firmest(self.model)
         self.throws = may_throw(self.model)
+        self.kinks = self.model.kinks.met
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
@@ -135,6 +138,20 @@ class Stepper:
         except StepError:
             return self._attempt(point, h, fresh=True)
 
+    def exactly(self, point: AlphaPoint, h: float) -> AlphaPoint:
+        """Return the point a step later, solved to the last digits.
+
+        Raises
+        ------
+        StepError
+            If Newton's method does not converge.
+        """
+        self._exact = True
+        try:
+            return self.step(point, h)
+        finally:
+            self._exact = False
+
     def _attempt(self, point: AlphaPoint, h: float, fresh: bool) -> AlphaPoint:
         c, now = self.coefficients, point.state
         to_v = c.gamma / (h * c.beta)
@@ -142,12 +159,12 @@ class Stepper:
         step, v, rate = self._foreseen(point, h)
         foreseen, last, contraction, end = step, np.inf, 0.0, later(now.t, h)
         wary = h * self.firmest > STIFF
-        caution = Caution(min(self.tolerance, SURE))
+        caution, across = Caution(min(self.tolerance, SURE), self._exact), False
         for iteration in range(ITERATIONS):
             state = self.model.advance(now, step, v, end)
             supply = self.feed.at(state, point.supply, h)
             force = self.model.balance(state, v, rate) + self.model.loads(state, supply.u)
-            if fresh or wary or contraction > POOR or (iteration == 0 and self._stale(state, h)):
+            if fresh or wary or across or contraction > POOR or (iteration == 0 and self._stale(state, h)):
                 self._factor(Tangent(state, v, rate, (1.0, to_v, to_rate), supply, h))
                 last = last if wary else np.inf
             assert self._solve is not None
@@ -161,7 +178,9 @@ class Stepper:
             if not np.isfinite(size) or worse or self._astray(step - foreseen):
                 break
             if caution.over(size, contraction, iteration) if wary else self._solved(size, contraction):
-                return self._finish(point, h, step, v, rate, worst)
+                across = self._across(now, step, v)
+                if not across:
+                    return self._finish(point, h, step, v, rate, worst)
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
 
@@ -192,8 +211,18 @@ class Stepper:
 
     def _solved(self, size: float, contraction: float) -> bool:
         """Tell whether a correction was the last that is needed, or the next is foretold to be none."""
-        foretold = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * self.tolerance
-        return foretold or small_enough(size, contraction, self.tolerance)
+        tolerance = wanted(self.tolerance, self._exact)
+        foretold = 0.0 < contraction < 1.0 and size * contraction <= 0.5 * tolerance
+        return foretold or small_enough(size, contraction, self.tolerance, self._exact)
+
+    def _across(self, now: State, step: np.ndarray, v: np.ndarray) -> bool:
+        """Tell whether forces jump between where the tangent was made and where the step ends.
+
+        What a correction by a stiff flank's tangent leaves in the gap beside it is small, and says nothing.
+        """
+        if not self._sides.size:
+            return False
+        return bool((self._sides * self.kinks.sides(self.model.advance(now, step, v, now.t)) < 0.0).any())
 
     def _astray(self, unforeseen: np.ndarray) -> bool:
         """Tell whether Newton's method heads for a turn that the motion did not announce: another root."""
@@ -216,7 +245,7 @@ class Stepper:
         except SingularMatrixError as error:
             raise singular_tangent(error, at.state.t, at.h) from error
         self.counts.factorisations += 1
-        self.memory = at
+        self.memory, self._sides = at, self.kinks.sides(at.state)
 
     def factorised(self, matrix: sp.csr_matrix) -> Solve:
         """Return what solves with a matrix, whose pattern is gone through once."""

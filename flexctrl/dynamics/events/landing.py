@@ -127,7 +127,7 @@ def towards(journey: Journey, before: Point, h: float) -> Point:
     """Take a step to a corner, or just short of it: where a force jumps there, no step ends on it."""
     for k in range(TRIES):
         try:
-            return journey.step(before, h * (1.0 - shorter(k)))
+            return journey.exactly(before, h * (1.0 - shorter(k)))
         except StepError as error:
             failure = error
     raise failure

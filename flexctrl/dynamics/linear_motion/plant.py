@@ -167,6 +167,10 @@ class _Straight:
         """Return nothing."""
         return np.zeros(0)
 
+    def sides(self, state: State) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros(0)
+
 
 @dataclass(frozen=True, eq=False)
 class LinearPlant:

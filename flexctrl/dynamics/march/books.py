@@ -6,8 +6,9 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import settled
 from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import chosen, follow, lean, miss, tighten
-from flexctrl.dynamics.march.record import DONE, LOOKED_AT, OFTEN, March
+from flexctrl.dynamics.march.record import DONE, LOOKED_AT, March
 from flexctrl.dynamics.march.step import blended
+from flexctrl.dynamics.records.absurd import OFTEN, absurd
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
@@ -124,6 +125,8 @@ def draw(m: March) -> None:
     turned = max(abs(m.gained), max(m.lost, abs(stored + kinetic - m.begun)))
     swung = max(kinetic, max(abs(kinetic - m.moving), abs(stored - (m.begun - m.moving))))
     m.turnover = max(m.turnover, max(turned, swung))
+    if m.lawful == 1 and absurd(m.entered, m.made, m.turnover, m.reached, m.begun):
+        m.absurd = 1
 
 
 def note(m: March) -> None:

@@ -14,7 +14,18 @@ from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
-__all__ = ["Corners", "beyond", "comes_through", "corners_of", "crossed", "passes", "value", "within"]
+__all__ = [
+    "Corners",
+    "beyond",
+    "comes_through",
+    "corners_of",
+    "crossed",
+    "over_a_jump",
+    "passes",
+    "tell_sides",
+    "value",
+    "within",
+]
 
 
 @dataclass
@@ -23,8 +34,8 @@ class Corners:
 
     Attributes
     ----------
-    lines, turns, rails, sheaves : int
-        The last ones of the lines lead to sheaves of winches.
+    lines, turns, rails, sheaves, jumping : int
+        The last ones of the lines lead to sheaves of winches; how many corners there are where forces jump.
     ends : Wholes
         Slots of the nodes at the ends of each line.
     drives : Wholes
@@ -42,6 +53,8 @@ class Corners:
         Sign and offset of each end of a rail (2 each).
     dust, sides, there : Reals
         What is zero but for round-off; the sides the motion is on, 0: not yet known; room for values.
+    jumps, made : Wholes, Reals
+        These, and how far beyond each the tangent was made; 0: on it, but for round-off.
     arms : Reals
         Of the lines to sheaves, before the step (3 each).
     last : Wholes
@@ -62,6 +75,7 @@ class Corners:
     turns: int
     rails: int
     sheaves: int
+    jumping: int
     straight: int
     ends: Wholes
     drives: Wholes
@@ -75,6 +89,8 @@ class Corners:
     dust: Reals
     sides: Reals
     there: Reals
+    jumps: Wholes
+    made: Reals
     arms: Reals
     last: Wholes
     step: Reals
@@ -90,7 +106,7 @@ def corners_of(F: Flattened) -> Corners:
     kinks = F.model.kinks.met
     (ends, lengths), (drives, sums), (travels, spans) = kinks.lines, kinks.shafts, kinks.rails
     sides, there = np.zeros((2, len(kinks.names)))
-    counts = len(lengths), len(drives), len(travels), kinks.sheaves, len(kinks.ways)
+    counts = len(lengths), len(drives), len(travels), kinks.sheaves, len(kinks.jumps), len(kinks.ways)
     places = (
         NODE_SLOT * ends.ravel(),
         drives,
@@ -104,8 +120,9 @@ def corners_of(F: Flattened) -> Corners:
     last = np.array([bool(end) for end in kinks.ends], dtype=np.int64)
     step, change = np.zeros((2, F.flat.padded))
     turning = int(bool(kinks.names) and not weightless(F.model).size)
-    arms, bracket = np.zeros(3 * kinks.sheaves), Bracket(0.0, 0.0)
-    return Corners(*counts, *places, kinks.dust, sides, there, arms, last, step, change, bracket, turning)
+    arms, made, bracket = np.zeros(3 * kinks.sheaves), np.zeros(len(kinks.jumps)), Bracket(0.0, 0.0)
+    known, room = (kinks.dust, sides, there, kinks.jumps, made, arms), (step, change)
+    return Corners(*counts, *places, *known, last, *room, bracket, turning)
 
 
 def passes(c: Corners, f: Flat) -> bool:
@@ -119,6 +136,27 @@ def crossed(c: Corners, f: Flat) -> int:
         if not within(c, k, value(c, f, k)):
             return k
     return -1
+
+
+def tell_sides(c: Corners, f: Flat) -> None:
+    """Note how far beyond corners where forces jump the motion is."""
+    for i in range(c.jumping):
+        k = c.jumps[i]
+        c.made[i] = clear_of(value(c, f, k), c.dust[k])
+
+
+def over_a_jump(c: Corners, f: Flat) -> bool:
+    """Tell whether forces jump between where the tangent was made and where the motion is."""
+    away = False
+    for i in range(c.jumping):
+        k = c.jumps[i]
+        away = away or c.made[i] * clear_of(value(c, f, k), c.dust[k]) < 0.0
+    return away
+
+
+def clear_of(value: float, dust: float) -> float:
+    """Return a value if it is clear of zero, else 0."""
+    return value if abs(value) > dust else 0.0
 
 
 def value(c: Corners, f: Flat, k: int) -> float:

@@ -24,6 +24,7 @@ from flexctrl.dynamics.events.nearing import (
 from flexctrl.dynamics.march.books import copy, reach
 from flexctrl.dynamics.march.corners import crossed, value, within
 from flexctrl.dynamics.march.record import DONE, FRESH, March
+from flexctrl.dynamics.march.siding import decided
 from flexctrl.dynamics.march.step import step
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
@@ -169,13 +170,19 @@ def opened(b: Bracket, h: float) -> None:
 @seldom
 def towards(m: March, h: float) -> bool:
     """Take a step to a corner, or just short of it: where a force jumps there, no step ends on it."""
-    for k in range(TRIES):
+    m.exact = 1
+    done = False
+    k = 0
+    while k < TRIES and not done:
         m.h = h * (1.0 - shorter(k))
         m.phase = FRESH
-        if step(m) == DONE:
+        done = step(m) == DONE
+        if done:
             reach(m)
-            return True
-    return False
+            done = decided(m) == DONE
+        k += 1
+    m.exact = 0
+    return done
 
 
 @seldom

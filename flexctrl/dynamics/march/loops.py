@@ -35,6 +35,7 @@ from flexctrl.dynamics.march.record import (
     WEIGHED,
     March,
 )
+from flexctrl.dynamics.march.siding import decided
 from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
 from flexctrl.dynamics.march.turning import start_anew, turn_corner
 from flexctrl.dynamics.swift.thrown import AT_HAND
@@ -164,11 +165,10 @@ def fixed(m: March) -> int:
     if m.throws == 1 and m.leaping == 0 and m.taken > 0.0 and m.h > AT_HAND * m.taken:
         lengthen(m)
     m.taken = m.h
-    while m.done < m.wanted and m.kept < m.shelf:
+    while m.done < m.wanted and m.kept < m.shelf and m.absurd == 0:
         status = advanced(m)
         if status != DONE:
             return status
-        reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
             if m.answering == 1:
                 return CORNER
@@ -184,10 +184,19 @@ def fixed(m: March) -> int:
 
 
 def advanced(m: March) -> int:
-    """Solve a step."""
-    if m.answering == 1:
-        return commanded(m)
-    return leap(m) if m.leaping == 1 else step(m)
+    """Solve a step, and put nodes where it ends."""
+    if m.leaping == 1:
+        status = leap(m)
+    elif m.answering == 1:
+        status = commanded(m)
+    else:
+        status = step(m)
+    if status != DONE:
+        return status
+    reach(m)
+    if m.corners.jumping == 0 or m.leaping == 1 or m.answering == 1:
+        return DONE
+    return decided(m)
 
 
 def accepted(m: March) -> None:
@@ -200,7 +209,7 @@ def accepted(m: March) -> None:
 def glided(m: March) -> int:
     """Take exact steps of one length on modal states alone, but where a state is to be kept."""
     m.jumping = 0
-    while m.done < m.wanted and m.kept < m.shelf:
+    while m.done < m.wanted and m.kept < m.shelf and m.absurd == 0:
         status = glide(m)
         if status != DONE:
             return status
@@ -217,7 +226,7 @@ def glided(m: March) -> int:
 def controlled(m: March) -> int:
     """Take steps of controlled error until all wanted are done, the stop is reached or the end would be passed."""
     again = False
-    while m.done < m.wanted and m.kept < m.shelf and m.stop - m.t > 1e-12 * m.until:
+    while m.done < m.wanted and m.kept < m.shelf and m.absurd == 0 and m.stop - m.t > 1e-12 * m.until:
         if m.phase == FRESH:
             if not again:
                 m.tried = m.size
@@ -244,7 +253,6 @@ def controlled(m: March) -> int:
             m.size = 0.25 * m.h if status != DONE else m.h * max(0.2, 0.9 * growth(error))
             continue
         grown = grown_by(m, 0.9 * growth(error))
-        reach(m)
         if m.watching == 1 and passes(m.corners, m.flat):
             if m.answering == 1:
                 return unmarched(m)

@@ -149,6 +149,7 @@ def _newton(F: Flattened, method: Method, groups: int) -> dict[str, Any]:
         "asking": int(not flat.tangents and not groups),
         "swift": int(flat.quick > 0 and not flat.pressing),
         "whole": flat.pressing,
+        "lawful": int(F.model.large),
     }
 
 

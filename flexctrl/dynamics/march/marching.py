@@ -166,13 +166,14 @@ class Marcher(Loops):
         way = farthest(self.model, moved)
         m.reached = float(way.max(initial=0.0))
         m.farthest[components(self.model)] = way
-        m.losing, m.drawing, m.gained, m.lost, m.closing.open = int(losing), 0, 0.0, 0.0, 0.0
+        m.losing, m.drawing, m.absurd, m.gained, m.lost, m.closing.open = int(losing), 0, 0, 0.0, 0.0, 0.0
         self._do(SETTLE)
 
     def go_on(self, sums: Sums) -> None:
         """Go on with books: what is summed up does not depend on where marches begin and end."""
         m, F = self.march, self.flattened
-        m.drawing, m.gained, m.lost, m.entered = 1, sums.work, sums.lost, sums.entered
+        m.drawing, m.absurd, m.entered = 1, int(sums.absurd), sums.entered
+        m.gained, m.lost = sums.work, sums.lost
         m.begun, m.moving, m.turnover, m.gap, m.made = sums.start, sums.moving, sums.turnover, sums.gap, sums.made
         m.ahead[:], m.swept[:], m.path[:] = F.ordered(sums.ahead), F.ordered(sums.swept), F.ordered(sums.path)
         m.closing.open = sums.closure
@@ -320,6 +321,7 @@ class Marcher(Loops):
             power=m.power if m.losing else sums.power,
             closure=m.closing.open,
             entered=m.entered,
+            absurd=bool(m.absurd),
             moved=F.own(m.reach),
             ahead=F.own(m.ahead),
             swept=F.own(m.swept),

@@ -29,9 +29,6 @@ law does not say numbers; beyond a corner, anew, or where that is to be done."""
 FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED, START = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 """What to do."""
 
-OFTEN = 32
-"""Steps between balances of energy; the first so many have one each."""
-
 LOOKED_AT = 4
 """Steps of controlled error of which the error of one is added up: of more, it could be told from the clock."""
 
@@ -177,6 +174,8 @@ class March:
         Of error-controlled steps beyond a corner, of steps of one length; see `flexctrl.dynamics.steps.Mark`.
     phase, attempt, iteration, last, contraction, strayed : int, float
         Where in a step it is.
+    exact : int
+        Whether steps are solved to the last digits; see `flexctrl.dynamics.alpha.newton.wanted`.
     leaping, answering : int
         Whether steps are exact ones on modal states; whether inputs follow from what is at the end of the step.
     paced : int
@@ -215,6 +214,8 @@ class March:
         Whether balances are drawn, and steps since the run's start: often at first, then every few.
     begun, moving, turnover, gap, made : float
         Energy at the run's start and what of it was kinetic; see `flexctrl.dynamics.records.books.Sums`.
+    lawful, absurd : int
+        Whether energy is kept but for what is dissipated; whether the method makes so much of it that the run ends.
     power, gained, lost : float
         Dissipated power; work of the inputs and energy dissipated.
     v, rate, algorithmic, trend : Reals
@@ -324,6 +325,7 @@ class March:
     taken: float = 0.0
     phase: int = FRESH
     attempt: int = 0
+    exact: int = 0
     iteration: int = 0
     last: float = math.inf
     contraction: float = 0.0
@@ -359,6 +361,8 @@ class March:
     turnover: float = 0.0
     gap: float = 0.0
     made: float = 0.0
+    lawful: int = 0
+    absurd: int = 0
     power: float = 0.0
     gained: float = 0.0
     lost: float = 0.0

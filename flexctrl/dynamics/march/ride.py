@@ -164,6 +164,8 @@ class Ride:
         if status in (TURNED, TURN):
             corner = self._met()
             self.turn = corner if status == TURN else None
+        if self.marcher.march.absurd:
+            return False
         return status == DONE or (status == TURNED and self._on_steps == (not self.marcher.march.keeping))
 
     @property
@@ -177,6 +179,8 @@ class Ride:
         watch, m = self.journey.watch, self.marcher.march
         corner = watch.corner(m.corners.which, m.corners.when, bool(m.corners.sides[m.corners.which] > 0.0))
         watch.cross(corner)
+        if self.weaver is not None:  # as a ride that begins here does
+            self.weaver.set_out(self.stepper.leave(self.supply).state)
         self.journey.tell(watch.named(corner, self.marcher.rows[m.done - 1, 1:], self.supply.u))
         return corner
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.alpha.coning import LARGEST, eta
-from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough
+from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough, wanted
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.contacts import feel, firmness
+from flexctrl.dynamics.march.corners import tell_sides
 from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
@@ -21,7 +22,7 @@ from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
 from flexctrl.model.flat.fronts import factor, whose
 
-__all__ = ["blended", "press_all", "refactored", "sloped", "step", "to_rate", "to_v"]
+__all__ = ["blended", "newton", "press_all", "refactored", "sloped", "step", "to_rate", "to_v"]
 
 _TURNED = 0.1
 _TRUSTED = 8
@@ -222,7 +223,7 @@ def sure(m: March, size: float) -> bool:
 
     What goes back and forth between a slack rope and a taut one goes a little less far from then on.
     """
-    if small_enough(size, m.contraction, min(m.tolerance, SURE)):
+    if small_enough(size, m.contraction, min(m.tolerance, SURE), m.exact == 1):
         last = m.short == 0.0
         m.short = 0.0
         return last
@@ -264,6 +265,7 @@ def refactored(m: March) -> int:
     m.spent = m.price
     m.lately = 0.0
     mark(m.axes, m.tangent, m.flat)
+    tell_sides(m.corners, m.flat)
     return DONE
 
 
@@ -276,11 +278,12 @@ def converged(m: March, size: float) -> bool:
     if m.contraction > 0.0:
         m.habit = max(m.contraction, max(m.habit, _HABIT))
         m.trusted = 0
-    if small_enough(size, m.contraction, m.tolerance):
+    if small_enough(size, m.contraction, m.tolerance, m.exact == 1):
         return True
+    tolerance = wanted(m.tolerance, m.exact == 1)
     if m.contraction > 0.0:
-        return m.contraction < 1.0 and size * m.contraction <= 0.5 * m.tolerance
-    if m.habit > 0.0 and m.trusted < _TRUSTED and size * m.habit <= 0.25 * m.tolerance:
+        return m.contraction < 1.0 and size * m.contraction <= 0.5 * tolerance
+    if m.habit > 0.0 and m.trusted < _TRUSTED and size * m.habit <= 0.25 * tolerance:
         m.trusted += 1
         return True
     return False

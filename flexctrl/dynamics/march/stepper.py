@@ -119,6 +119,21 @@ class MarchingStepper:
         self._here = None
         return None
 
+    def exactly(self, point: AlphaPoint, h: float) -> AlphaPoint:
+        """Return the point a step later, solved to the last digits.
+
+        Raises
+        ------
+        StepError
+            If Newton's method does not converge.
+        """
+        march = self.marcher.march
+        march.exact = 1
+        try:
+            return self.step(point, h)
+        finally:
+            march.exact = 0
+
     def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later.
 

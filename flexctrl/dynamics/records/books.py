@@ -9,8 +9,9 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
-from flexctrl.dynamics.march.record import LOOKED_AT, OFTEN
+from flexctrl.dynamics.march.record import LOOKED_AT
 from flexctrl.dynamics.methods.local import Local
+from flexctrl.dynamics.records.absurd import ABSURD, OFTEN, ROUND_OFF, VISIBLE, absurd
 from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
@@ -22,12 +23,10 @@ from flexctrl.model.state import State
 
 __all__ = ["Books", "Sums"]
 
-_ABSURD, _UNRESOLVED, _DOUBTFUL = 0.5, 0.2, 0.05
+_UNRESOLVED, _DOUBTFUL = 0.2, 0.05
 _MOSTLY = 0.9
-_VISIBLE = 1e-3
 _FELT = 3e-3
 _SLIGHT, _RESTING = 10.0, 1e-2
-_ROUND_OFF = 1e-6
 _LOBATTO = ((0.5 * (1.0 - (3.0 / 7.0) ** 0.5), 49.0 / 180.0), (0.5, 64.0 / 180.0))
 _ENDS = 1.0 / 20.0
 _OVERSHOT = 2.0
@@ -55,6 +54,8 @@ class Sums:
         Largest violation of conditions that close rigid loops.
     entered : int
         Steps since the start.
+    absurd : bool
+        Whether the method makes so much energy that the run ends.
     moved : numpy.ndarray, shape (n,)
         How far each degree of freedom has been from its start.
     ahead, swept, path : numpy.ndarray, shape (n,)
@@ -73,6 +74,7 @@ class Sums:
     power: float = 0.0
     closure: float = 0.0
     entered: int = 0
+    absurd: bool = False
     moved: np.ndarray = field(default_factory=lambda: np.zeros(0))
     ahead: np.ndarray = field(default_factory=lambda: np.zeros(0))
     swept: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -109,6 +111,9 @@ class Books:
         sums.entered += 1
         if sums.entered < OFTEN or sums.entered % OFTEN == 0:
             self.close(after)
+            gone = float((sums.moved / self.reach).max(initial=0.0))
+            if self.lawful and absurd(sums.entered, sums.made, sums.turnover, gone, sums.start):
+                sums.absurd = True
 
     @property
     def looking(self) -> bool:
@@ -201,9 +206,7 @@ class Books:
     def nonsense(self) -> str:
         """What is wrong with a run whose method makes energy from nothing, a large share of all; empty if none is."""
         s = self.sums
-        if not (self.lawful and s.entered >= OFTEN and s.made > _ABSURD * s.turnover):
-            return ""
-        if (s.moved < _VISIBLE * self.reach).all() or s.made < _ROUND_OFF * abs(s.start):
+        if not s.absurd:
             return ""
         return f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: the motion is not resolved"
 
@@ -253,10 +256,10 @@ class Books:
     def _small(self) -> tuple[str, ...]:
         """What is to be said of motion too small to be seen, yet beyond the tolerance, of which the books miss much."""
         s = self.sums
-        beyond = (s.moved >= self.slight).any() and s.gap >= _ROUND_OFF * abs(s.start)
+        beyond = (s.moved >= self.slight).any() and s.gap >= ROUND_OFF * abs(s.start)
         if self._seen or not (self.lawful and beyond and self.residual > _DOUBTFUL):
             return ()
-        if s.made > _ABSURD * s.turnover:
+        if s.made > ABSURD * s.turnover:
             return (
                 f"the method has made {s.made:.3g} J of {s.turnover:.3g} J turned over: it would be nearer to rest "
                 "than it seems; take smaller steps, a smaller Tolerance, or an implicit method",
@@ -270,12 +273,12 @@ class Books:
     @property
     def _seen(self) -> bool:
         """Whether the motion is large enough to be seen."""
-        return bool((self.sums.moved >= _VISIBLE * self.reach).any())
+        return bool((self.sums.moved >= VISIBLE * self.reach).any())
 
     def _doubtful(self, share: float) -> bool:
         """Whether the books miss more than a share, in a motion large enough to be seen."""
         s = self.sums
-        visible = self._seen and s.gap >= _ROUND_OFF * abs(s.start)
+        visible = self._seen and s.gap >= ROUND_OFF * abs(s.start)
         return bool(self.lawful and self.residual > share and visible)
 
     @property

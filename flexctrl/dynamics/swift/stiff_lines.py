@@ -46,11 +46,14 @@ class Caution:
     ----------
     enough : float
         Size of the last correction.
+    exact : bool
+        Whether the step is solved to the last digits.
     short : float
         By what share corrections are shortened.
     """
 
     enough: float
+    exact: bool = False
     short: float = 0.0
 
     def over(self, size: float, contraction: float, iteration: int) -> bool:
@@ -58,7 +61,7 @@ class Caution:
 
         What goes back and forth between a slack rope and a taut one goes a little less far from then on.
         """
-        if small_enough(size, contraction, self.enough):
+        if small_enough(size, contraction, self.enough, self.exact):
             last = not self.short
             self.short = 0.0
             return last

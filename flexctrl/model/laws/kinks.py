@@ -47,6 +47,8 @@ class Turn:
         The value, and what is zero but for round-off.
     end : str
         What to say if a run cannot go on beyond; empty if it can.
+    jumps : bool
+        Whether its force jumps there, as a damper's does.
     """
 
     drive: int
@@ -55,13 +57,14 @@ class Turn:
     at: float
     dust: float
     end: str = ""
+    jumps: bool = False
 
 
 @dataclass(frozen=True)
 class Line:
     """A line between two nodes with a corner at a length; what to say if a run cannot go on beyond it.
 
-    Where it is the rope of a winch, that length grows with the motor's angle.
+    Where it is the rope of a winch, that length grows with the motor's angle. ``jumps``: whether its force jumps there.
     """
 
     name: str
@@ -69,6 +72,7 @@ class Line:
     end: Node
     length: float
     stop: str = ""
+    jumps: bool = False
     drive: int = 0
     share: float = 0.0
 
@@ -113,9 +117,10 @@ class Kinks:
         """Ropes, springs with play, ropes of winches in small motion, and the ways from sheaves to what hangs there."""
         parts, gaps = self.model.structure.elements, gaps_of(self.model.effects)
         bent = [p for p in parts if isinstance(p, Rope) and self.model.bends(p)] if self.ropes else []
-        ropes = [Line(p.name, p.start, p.end, p.length) for p in bent]
+        ropes = [Line(p.name, p.start, p.end, p.length, jumps=p.damping > 0.0) for p in bent]
         loose = [p for p in parts if isinstance(p, Spring) and p.name in self._loose]
-        gapped = [Line(p.name, p.start, p.end, p.length + s * gaps[p.name]) for p in loose for s in (0.5, -0.5)]
+        sides = [(p, p.length + s * gaps[p.name]) for p in loose for s in (0.5, -0.5)]
+        gapped = [Line(p.name, p.start, p.end, length, jumps=p.damping > 0.0) for p, length in sides]
         winches = [(i, d) for i, d in enumerate(self.model.structure.drives) if isinstance(d, Winch)]
         hoists = [self._hoist(i, d) for i, d in winches if self.model.bends(d) and not self.model.large]
         return (*ropes, *gapped, *hoists, *(Line(d.name, d.against, d.node, d.shortest, _down(d)) for _, d in winches))
@@ -127,7 +132,7 @@ class Kinks:
         out = d.length + angle / d.effective_ratio
         apart = rest.x[self._number(d.node)] - rest.x[self._number(d.against)]
         share = float(np.linalg.norm(apart)) / out / d.effective_ratio
-        return Line(d.name, d.against, d.node, out - share * angle, "", i, share)
+        return Line(d.name, d.against, d.node, out - share * angle, "", d.damping > 0.0, i, share)
 
     @cached_property
     def _turns(self) -> tuple[Turn, ...]:
@@ -135,7 +140,8 @@ class Kinks:
         gaps, found = gaps_of(self.model.effects), []
         for i, d in enumerate(self.model.structure.drives):
             if d.name in self._loose:
-                found += [Turn(i, d.effective_ratio, -1.0, side * gaps[d.name], _ROUND_OFF) for side in (0.5, -0.5)]
+                flanks = [side * gaps[d.name] for side in (0.5, -0.5)]
+                found += [Turn(i, d.effective_ratio, -1.0, at, _ROUND_OFF, jumps=d.damping > 0.0) for at in flanks]
             elif isinstance(d, Winch) and self.model.bends(d):
                 found += self._winch(i, d)
         return tuple(found)
@@ -143,7 +149,8 @@ class Kinks:
     def _winch(self, i: int, d: Winch) -> list[Turn]:
         """Where a rope that stretches goes slack, and where there is hardly any left."""
         least, dust = d.shortest - d.length, _ROUND_OFF * d.length
-        slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, _DIGITS * (d.length + self._reach))
+        dust_here = _DIGITS * (d.length + self._reach)
+        slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, dust_here, jumps=d.damping > 0.0)
         end = Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, _down(d))
         return [slack, end] if self.model.large else [end]
 
@@ -228,6 +235,19 @@ class Kinks:
         """Values below these are zero but for round-off: a stiff rope that is taut by more bears a load."""
         longest = [_ROUND_OFF * track.places[-1] for track in self.model.structure.tracks for _ in range(2)]
         return np.concatenate([_DIGITS * (self.lines[1] + self._reach), [turn.dust for turn in self._turns], longest])
+
+    @cached_property
+    def jumps(self) -> np.ndarray:
+        """Numbers of the corners where forces jump: a damper comes into play, or goes out of it, at speed."""
+        found = [*(line.jumps for line in self._lines), *(turn.jumps for turn in self._turns)]
+        return np.flatnonzero(found)
+
+    def sides(self, state: State) -> np.ndarray:
+        """Return on which side of those corners a state is: ±1, or 0 for on one but for round-off."""
+        if not self.jumps.size:
+            return np.zeros(0)
+        values = self.values(state, state)[self.jumps]
+        return np.where(np.abs(values) > self.dust[self.jumps], np.sign(values), 0.0)
 
     @cached_property
     def _reach(self) -> float:

@@ -1,0 +1,47 @@
+"""Steps that end on the other side of a corner than their tangent was made on, in compiled loops; see `alpha.steps`.
+
+What a correction by a stiff flank's tangent leaves in the gap beside it is small, and says nothing.
+"""
+
+from __future__ import annotations
+
+from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.corners import over_a_jump
+from flexctrl.dynamics.march.record import DONE, EVALUATE, FRESH, WANTS_TANGENT, March
+from flexctrl.dynamics.march.step import newton
+from flexctrl.kernels.native import seldom
+from flexctrl.model.flat.flat import clear
+
+__all__ = ["decided"]
+
+
+@seldom
+def decided(m: March) -> int:
+    """Iterate on, with tangents made anew, in a step that is solved while forces jump between these and its end.
+
+    Nodes are where the step ends.
+    """
+    status = DONE
+    while status == DONE and over_a_jump(m.corners, m.flat):
+        set_back(m)
+        m.attempt = 1
+        m.phase = EVALUATE
+        m.iteration += 1
+        status = newton(m)
+        if status == DONE:
+            reach(m)
+    if status != WANTS_TANGENT:
+        m.attempt = 0
+        m.phase = FRESH
+    return status
+
+
+@seldom
+def set_back(m: March) -> None:
+    """Put nodes where the step starts; forces of whole machines and the mass alone are those of a step from there."""
+    if m.whole == 1 or m.swift == 1:
+        f = m.flat
+        copy(f.padded, f.step, m.corners.step)
+        clear(f.padded, f.step)
+        reach(m)
+        copy(f.padded, m.corners.step, f.step)

@@ -1,0 +1,24 @@
+"""When energy books end a run on its way: the same for plain steps and for compiled loops."""
+
+from __future__ import annotations
+
+from flexctrl.kernels.native import seldom
+
+__all__ = ["ABSURD", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd"]
+
+OFTEN = 32
+"""Steps from one balance to the next; at first there is one after each."""
+ABSURD = 0.5
+"""Share of the energy turned over that no method makes of motion that it resolves."""
+VISIBLE = 1e-3
+"""Share of the machine's size that is seen to move."""
+ROUND_OFF = 1e-6
+"""Share of the energy at the start that may be lost in the last digits of places."""
+
+
+@seldom
+def absurd(entered: int, made: float, turnover: float, moved: float, start: float) -> bool:
+    """Tell whether a method makes energy from nothing, a large share of all, in motion that is seen."""
+    if entered < OFTEN or moved < VISIBLE:
+        return False
+    return made > ABSURD * turnover and made >= ROUND_OFF * abs(start)
