@@ -179,8 +179,9 @@ class Ride:
         watch, m = self.journey.watch, self.marcher.march
         corner = watch.corner(m.corners.which, m.corners.when, bool(m.corners.sides[m.corners.which] > 0.0))
         watch.cross(corner)
-        if self.weaver is not None:  # as a ride that begins here does
-            self.weaver.set_out(self.stepper.leave(self.supply).state)
+        self.last = self.stepper.leave(self.supply).state  # as a ride that begins here does
+        if self.weaver is not None:
+            self.weaver.set_out(self.last)
         self.journey.tell(watch.named(corner, self.marcher.rows[m.done - 1, 1:], self.supply.u))
         return corner
 
