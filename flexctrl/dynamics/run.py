@@ -128,7 +128,8 @@ class Report:
     closure_error : float
         How far conditions that close rigid loops were violated [rad, or shares of what they span].
     drift : float
-        What errors of steps may have added up to, over the largest motion; 0 for steps that are not chosen by them.
+        What errors of steps may have added up to, over the largest motion (at most a radian or the machine's size); 0
+        for steps that are not chosen by them.
     drifted : str
         The degree of freedom in which that is most.
     message : str

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import flexctrl as fc
 from flexctrl.design import MinimumJerk, pd
@@ -151,6 +152,28 @@ def test_compiled_steps_tell_what_plain_ones_do():
         assert run.report.drifted == theirs[name].report.drifted
         assert run.report.drift == pytest.approx(theirs[name].report.drift, rel=1e-5)
         assert run.report.drift > 0.0
+
+
+@pytest.mark.parametrize(("speed", "until"), [(12.0, 20.0), (30.0, 15.0)])
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.ExplicitRungeKutta()], ids=str)
+def test_what_goes_round_runs_off_with_its_speed(speed, until, method):
+    """A body of 2 kg, 0.3 m from its hinge, that goes round under gravity: I φ̈ = −m g r cos φ."""
+    body = fc.RigidBody("body", (0.3, 0, 0), 2.0, (0.01, 0.02, 0.03), {"hinge": (0, 0, 0)})
+    hinge = body.point("hinge")
+    held = [fc.Support(hinge, "u v w rx ry")]
+    model = fc.assemble(
+        fc.Structure([body], held, outputs=[fc.Rotation("angle", hinge, "z")]),
+        [fc.LargeRotation(), fc.Gravity((0, -9.81, 0))],
+    )
+    pull = 2.0 * 9.81 * 0.3 / (0.03 + 2.0 * 0.3**2)
+    found = solve_ivp(
+        lambda t, y: [y[1], -pull * np.cos(y[0])], (0.0, until), [0.0, speed], "DOP853", rtol=1e-11, atol=1e-11
+    )
+    run = fc.simulate(model, start=model.rest.with_(v=np.array([speed])), until=until, method=method)
+    error = abs(run["angle"][-1] - found.y[0, -1])
+    assert run.report.drift > 0.7 * error > 1e-4
+    assert run.report.drift < 10.0 * error or method.order > 2
+    assert bool(told(run)) == (run.report.drift > 0.03)
 
 
 @pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.Richardson(fc.AdaptiveAlpha()), fc.ExplicitRungeKutta()])
