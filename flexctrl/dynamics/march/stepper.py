@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -131,7 +130,7 @@ class MarchingStepper:
         march = self.marcher.march
         march.exact = 1
         try:
-            return self._taken(point, h, self.plain.exactly)
+            return self.step(point, h)
         finally:
             march.exact = 0
 
@@ -143,13 +142,10 @@ class MarchingStepper:
         StepError
             If Newton's method does not converge, even with a fresh tangent.
         """
-        return self._taken(point, h, self.plain.step)
-
-    def _taken(self, point: AlphaPoint, h: float, plainly: Callable[[AlphaPoint, float], AlphaPoint]) -> AlphaPoint:
         self.enter(point)
         done = self.marcher.fixed(h, 1) == DONE
         self.count()
-        return self.leave(point.supply) if done else plainly(point, h)
+        return self.leave(point.supply) if done else self.plain.step(point, h)
 
     def error(self, before: AlphaPoint, after: AlphaPoint, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error of the step just taken over what is allowed."""
