@@ -115,7 +115,7 @@ def test_a_stiff_flank_is_met_when_it_is(damping, step, plainly):
 @pytest.mark.parametrize("controlled", [False, True])
 def test_a_run_whose_method_makes_energy_ends_at_a_balance(controlled, plainly):
     """Which comes after so many steps, however many are taken at once: here after 32, in the damped flank's throes."""
-    model = geared(stiffness=1e6, damping=30.0)
+    model = geared(stiffness=1e6, damping=20.0)
     asked = sampled(model) if controlled else {"model": model, "until": 0.5, "inputs": {"torque": 6.0}}
     runs = [take(**asked, method=fc.GeneralizedAlpha(1e-3)) for take in (fc.simulate, plainly)]
     for run in runs:

@@ -8,7 +8,7 @@ from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import chosen, follow, lean, miss, tighten
 from flexctrl.dynamics.march.record import DONE, LOOKED_AT, March
 from flexctrl.dynamics.march.step import blended
-from flexctrl.dynamics.records.absurd import OFTEN, absurd
+from flexctrl.dynamics.records.absurd import OFTEN, absurd, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
@@ -103,10 +103,44 @@ def enter(m: March) -> None:
     if m.leaping == 1:
         m.lost += m.leap.lost
     elif m.losing == 1:
-        m.lost += 0.5 * m.h * (m.power + f.books[2])
+        lost = 0.5 * m.h * (m.power + f.books[2])
         m.power = f.books[2]
+        m.lost += lost if lost <= unlooked(m.unseen, m.turnover) else looked_at(m, lost)
     if due:
         draw(m)
+
+
+@seldom
+def looked_at(m: March, lost: float) -> float:
+    """Return what a step has dissipated, of which quadrature says so much; as `Books` does."""
+    f = m.flat
+    energy(f)
+    gap = f.books[0] + f.books[1] - m.begun - m.gained + m.lost
+    mix(m, 1.0)
+    swing = f.books[0]
+    drag = f.books[2]
+    mix(m, -1.0)
+    drag = min(drag, f.books[2])
+    told = lost
+    if m.h * drag > swing:
+        mix(m, 0.0)
+        told = min(lost, max(m.h * f.books[2], m.made - gap))
+        m.unseen += min(told, lost - told)
+    copy(f.padded, m.v, f.v)
+    drive(f)
+    energy(f)
+    return told
+
+
+@seldom
+def mix(m: March, beside: float) -> None:
+    """Work out energies at what rates have beside the mean ones, at its reverse, or at the mean ones (0)."""
+    f = m.flat
+    for i in range(0, f.padded, 8):
+        mean = eight(f.step[i:]) * (1.0 / m.h)
+        put(f.v[i:], beside * (eight(m.v[i:]) - mean) if beside != 0.0 else mean)
+    drive(f)
+    energy(f)
 
 
 def drawn_now(m: March) -> bool:

@@ -173,7 +173,7 @@ class Marcher(Loops):
         """Go on with books: what is summed up does not depend on where marches begin and end."""
         m, F = self.march, self.flattened
         m.drawing, m.absurd, m.entered = 1, int(sums.absurd), sums.entered
-        m.gained, m.lost = sums.work, sums.lost
+        m.gained, m.lost, m.unseen = sums.work, sums.lost, sums.unseen
         m.begun, m.moving, m.turnover, m.gap, m.made = sums.start, sums.moving, sums.turnover, sums.gap, sums.made
         m.ahead[:], m.swept[:], m.path[:] = F.ordered(sums.ahead), F.ordered(sums.swept), F.ordered(sums.path)
         m.closing.open = sums.closure
@@ -315,6 +315,7 @@ class Marcher(Loops):
             sums,
             work=m.gained,
             lost=m.lost,
+            unseen=m.unseen,
             gap=m.gap,
             turnover=m.turnover,
             made=m.made,

@@ -216,8 +216,8 @@ class March:
         Energy at the run's start and what of it was kinetic; see `flexctrl.dynamics.records.books.Sums`.
     lawful, absurd : int
         Whether energy is kept but for what is dissipated; whether the method makes so much of it that the run ends.
-    power, gained, lost : float
-        Dissipated power; work of the inputs and energy dissipated.
+    power, gained, lost, unseen : float
+        Dissipated power; work of the inputs, energy dissipated, and that by rates that are over within a step.
     v, rate, algorithmic, trend : Reals
         At the start of the step; see `AlphaPoint`.
     pulled : Reals
@@ -366,3 +366,4 @@ class March:
     power: float = 0.0
     gained: float = 0.0
     lost: float = 0.0
+    unseen: float = 0.0

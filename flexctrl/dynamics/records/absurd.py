@@ -1,10 +1,10 @@
-"""When energy books end a run on its way: the same for plain steps and for compiled loops."""
+"""When energy books end a run on its way, or look closely: the same for plain steps and for compiled loops."""
 
 from __future__ import annotations
 
 from flexctrl.kernels.native import seldom
 
-__all__ = ["ABSURD", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd"]
+__all__ = ["ABSURD", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "unlooked"]
 
 OFTEN = 32
 """Steps from one balance to the next; at first there is one after each."""
@@ -14,6 +14,7 @@ VISIBLE = 1e-3
 """Share of the machine's size that is seen to move."""
 ROUND_OFF = 1e-6
 """Share of the energy at the start that may be lost in the last digits of places."""
+_MUCH, _LITTLE = 1e-2, 1e-6
 
 
 @seldom
@@ -22,3 +23,11 @@ def absurd(entered: int, made: float, turnover: float, moved: float, start: floa
     if entered < OFTEN or moved < VISIBLE:
         return False
     return made > ABSURD * turnover and made >= ROUND_OFF * abs(start)
+
+
+def unlooked(unseen: float, turnover: float) -> float:
+    """Return the energy that a step may dissipate without a close look [J].
+
+    Rates that damping should have ended within a step may swing on for many.
+    """
+    return (_LITTLE if unseen > _MUCH * turnover else _MUCH) * turnover

@@ -11,7 +11,7 @@ from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.march.record import LOOKED_AT
 from flexctrl.dynamics.methods.local import Local
-from flexctrl.dynamics.records.absurd import ABSURD, OFTEN, ROUND_OFF, VISIBLE, absurd
+from flexctrl.dynamics.records.absurd import ABSURD, OFTEN, ROUND_OFF, VISIBLE, absurd, unlooked
 from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
@@ -50,6 +50,8 @@ class Sums:
         Energy − start − work + lost when the balance was drawn last [J].
     power : float
         Dissipated now [W].
+    unseen : float
+        Energy dissipated by rates that are over within a step [J].
     closure : float
         Largest violation of conditions that close rigid loops.
     entered : int
@@ -72,6 +74,7 @@ class Sums:
     turnover: float = 0.0
     made: float = 0.0
     power: float = 0.0
+    unseen: float = 0.0
     closure: float = 0.0
     entered: int = 0
     absurd: bool = False
@@ -154,7 +157,8 @@ class Books:
         self.sums.work += 0.5 * float(forces @ step)
         if self.dissipates:
             power = self.model.energy(after.state)[2]
-            self.sums.lost += 0.5 * (self.sums.power + power) * (after.state.t - before.state.t)
+            lost = 0.5 * (self.sums.power + power) * (after.state.t - before.state.t)
+            self.sums.lost += self._dissipated(lost, before.state, after.state)
             self.sums.power = power
 
     def _integrate(self, before: Point, after: Point, curve: Curve) -> None:
@@ -179,8 +183,33 @@ class Books:
             calm = Hermite(Local(self.model), before.state, after.state)
             total = within(0.5, calm.secant()) if total[1] > _OVERSHOT * mean(calm)[1] else total
         self.sums.work += h * float(total[0])
-        self.sums.lost += h * float(total[1])
+        self.sums.lost += self._dissipated(h * float(total[1]), before.state, after.state)
         self.sums.power = float(last[1])
+
+    def _dissipated(self, lost: float, before: State, after: State) -> float:
+        """What a step has dissipated, of which quadrature says so much.
+
+        That goes by rates at the ends. Where drag takes within the step what they have beside the mean rates, it is
+        the most; what is lost at the mean rates is the least, and between the two the balance tells. What drives one
+        way, as wind does, is no drag.
+        """
+        s = self.sums
+        if lost <= unlooked(s.unseen, s.turnover):
+            return lost
+        h = after.t - before.t
+        mean = (after.q - before.q) / h
+        beside = after.v - mean
+        (swing, _, there), (_, _, back), (_, _, least) = (self._energy(after, v) for v in (beside, -beside, mean))
+        if h * min(there, back) <= swing:
+            return lost
+        kinetic, stored, _ = self.model.energy(after)
+        gap = kinetic + stored - s.start - s.work + s.lost
+        told = min(lost, max(h * least, s.made - gap))
+        s.unseen += min(told, lost - told)
+        return told
+
+    def _energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
+        return self.model.energy(state.with_(v=v))
 
     def _powers(self, state: State, u: np.ndarray) -> np.ndarray:
         lost = settled_power(self.model, state, u) if self.dissipates else 0.0
@@ -228,10 +257,11 @@ class Books:
     def doubts(self) -> tuple[str, ...]:
         """What the books say against a motion that goes on: they miss a visible share of what was turned over."""
         s = self.sums
+        said = (*self._stiff, *self._swift)
         if not self._doubtful(_DOUBTFUL):
-            return (*self._stiff, *self._small)
+            return (*said, *self._small)
         return (
-            *self._stiff,
+            *said,
             f"the energy books miss {s.gap:.3g} J of {s.turnover:.3g} J turned over: the motion is "
             f"{'not' if self.residual > _UNRESOLVED else 'poorly'} resolved; take smaller steps or a smaller Tolerance",
         )
@@ -250,6 +280,17 @@ class Books:
             f"{name} is so stiff ({stiffness:.3g} N/m) that the last digits of places make forces of {unsure:.2g} N in "
             f"it, beside about {self.sums.turnover / way:.2g} N that move the machine: its tension is no better than "
             "that, nor whether it is slack; make it softer, or rigid",
+        )
+
+    @property
+    def _swift(self) -> tuple[str, ...]:
+        """What is to be said of damping that takes a visible share of all energy within steps."""
+        s = self.sums
+        if not self.lawful or s.unseen <= _DOUBTFUL * s.turnover or (s.moved < self.slight).all():
+            return ()
+        return (
+            f"damping took about {s.unseen:.3g} J of {s.turnover:.3g} J turned over faster than steps see: rates that "
+            "it ends so fast are not resolved; take smaller steps or a smaller Tolerance if they count",
         )
 
     @property
