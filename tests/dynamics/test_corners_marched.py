@@ -151,3 +151,25 @@ def test_a_speed_that_stays_the_same_up_to_a_corner_is_not_zero_there(method):
     run = fc.simulate(model, events=[fc.Event("turns", "v")], **how)
     assert [event.name for event in run.events] == ["spring", "turns"]
     assert [event.t for event in run.events] == pytest.approx([0.01, 0.01 + np.pi / 20.0], abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_model_runs_as_often_as_one_likes_through_damped_play(seed):
+    """A rigid pendulum is solved with its mass alone: no tangent of a run before has a say in where its steps end."""
+    gap, stiffness, damping, speed = np.random.default_rng(seed).uniform((0.05, 1e3, 0.2, 0.5), (0.2, 1e4, 20.0, 2.0))
+    body = fc.RigidBody("body", (0, 0, -0.5), 3.0, (0.2, 0.2, 0.1), {"hinge": (0, 0, 0), "tip": (0, 0, -1)})
+    spring = fc.Spring("spring", (0.8, 0, -1), (0, 0, -1), stiffness=stiffness, damping=damping)
+    joints = [fc.Support(body.point("hinge"), "u v w rx rz"), fc.Support(spring.start)]
+    joints += [fc.Pin(spring.end, body.point("tip"))]
+    structure = fc.Structure([body, spring], joints, outputs=[fc.Rotation("angle", body.node, "y")])
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.Backlash({"spring": gap})])
+    start = model.rest.with_(v=np.array([speed]))
+    runs = [
+        fc.simulate(model, until=0.5, start=start, tolerance=fc.Tolerance(t, 1e-3 * t))
+        for t in (1e-5, 1e-4, 1e-6, 1e-5)
+    ]
+    assert [run.status for run in runs] == [fc.Status.FINISHED] * 4
+    assert all(run.events for run in runs)
+    first, _, finer, last = (run["angle"] for run in runs)
+    assert first.tolist() == last.tolist()
+    assert first[-1] == pytest.approx(finer[-1], abs=2e-3)

@@ -1,6 +1,7 @@
 """Steps that end on the other side of a corner than their tangent was made on, in compiled loops; see `alpha.steps`.
 
-What a correction by a stiff flank's tangent leaves in the gap beside it is small, and says nothing.
+What a correction by a stiff flank's tangent leaves in the gap beside it is small, and says nothing. Steps solved with
+the mass alone have no tangent.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def decided(m: March) -> int:
     Nodes are where the step ends.
     """
     status = DONE
-    while status == DONE and over_a_jump(m.corners, m.flat):
+    while status == DONE and m.swift != 1 and over_a_jump(m.corners, m.flat):
         set_back(m)
         m.attempt = 1
         m.phase = EVALUATE
@@ -38,8 +39,8 @@ def decided(m: March) -> int:
 
 @seldom
 def set_back(m: March) -> None:
-    """Put nodes where the step starts; forces of whole machines and the mass alone are those of a step from there."""
-    if m.whole == 1 or m.swift == 1:
+    """Put nodes where the step starts; forces of whole machines are those of a step from there."""
+    if m.whole == 1:
         f = m.flat
         copy(f.padded, f.step, m.corners.step)
         clear(f.padded, f.step)
