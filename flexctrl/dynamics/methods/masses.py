@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Counts
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.plant import Plant
@@ -38,9 +39,10 @@ class Masses:
     _solve: Solve | None = None
     _plan: Plan | None = None
     _still: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    _weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        self._still = np.zeros(self.model.n)
+        self._still, self._weight = np.zeros(self.model.n), 1.0 / yardsticks(self.model)
         if self.made_at is not None:
             self.make(self.made_at)
 
@@ -90,7 +92,7 @@ class Masses:
         residual, direction, power = -start, np.zeros_like(guess), np.inf
         for _ in range(sweeps):
             change = -self._solve(residual)
-            if float(np.abs(change).max(initial=0.0)) <= _EXACT * float(np.abs(value + change).max(initial=0.0)):
+            if self._size(change) <= _EXACT * self._size(value + change):
                 return value + change, True
             with np.errstate(over="ignore", invalid="ignore"):  # a trial far too long: it is turned down below
                 before, power = power, float(residual @ change)
@@ -102,3 +104,6 @@ class Masses:
             share = power / curvature
             value, residual = value + share * direction, residual - share * pushed
         return value, False
+
+    def _size(self, a: np.ndarray) -> float:
+        return float(np.abs(a * self._weight).max(initial=0.0))
