@@ -27,6 +27,7 @@ __all__ = [
     "firmness",
     "held_up",
     "may_switch",
+    "mobility",
     "overcome",
     "sticks",
     "take_up",
@@ -55,6 +56,8 @@ class Contacts:
         Where the phases stand in the workspace.
     anchors, most : Reals
         Where each that sticks is held, and what it bears.
+    ease : Reals
+        How easily each degree of freedom moves [1/kg or 1/(kg m²)].
     rows, answers : Reals
         Slip speeds from the rates of the degrees of freedom, for those that stick; what a force along each moves.
     matrix, sums : Reals
@@ -81,6 +84,7 @@ class Contacts:
     phases: Wholes
     anchors: Reals
     most: Reals
+    ease: Reals
     rows: Reals
     answers: Reals
     matrix: Reals
@@ -106,6 +110,8 @@ def contacts_of(F: Flattened) -> Contacts:
     phases = f.drive_base + DRIVE_SLOT * (f.drives + order) + 3
     rows, answers = np.zeros((2, count * f.padded))
     anchors, sums, bearing, speeds, changes, borne = np.zeros((6, count))
+    ease = np.zeros(f.padded)
+    ease[F.plan.position] = switches.ease if count else 0.0
     return Contacts(
         count=count,
         width=width,
@@ -115,6 +121,7 @@ def contacts_of(F: Flattened) -> Contacts:
         phases=phases.astype(np.int64),
         anchors=anchors,
         most=switches.static,
+        ease=ease,
         rows=rows,
         answers=answers,
         matrix=np.zeros(count * count),
@@ -174,6 +181,15 @@ def along(n: int, a: Reals, b: Reals) -> float:
     found = 0.0 * eight(a)
     for i in range(0, n, 8):
         found = found + eight(a[i:]) * eight(b[i:])
+    return total(found)
+
+
+def mobility(c: Contacts, k: int) -> float:
+    """Return what a unit force along a contact that sticks moves of it where each degree of freedom is by itself."""
+    row = c.rows[c.padded * k :]
+    found = 0.0 * eight(row)
+    for i in range(0, c.padded, 8):
+        found = found + eight(row[i:]) * eight(row[i:]) * eight(c.ease[i:])
     return total(found)
 
 

@@ -6,7 +6,16 @@ The forces that hold it are found beside each Newton correction: the tangent is 
 from __future__ import annotations
 
 from flexctrl.dynamics.march.axes import solved
-from flexctrl.dynamics.march.contacts import Contacts, feel, held_up, may_switch, overcome, sticks, take_up
+from flexctrl.dynamics.march.contacts import (
+    Contacts,
+    feel,
+    held_up,
+    may_switch,
+    mobility,
+    overcome,
+    sticks,
+    take_up,
+)
 from flexctrl.dynamics.march.record import Factors, March
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
@@ -73,9 +82,11 @@ def begun(m: March) -> None:
     drive(f)
     feel(c, f)
     push(f)
+    for i in range(0, f.padded, 8):
+        put(f.force[i:], eight(c.ease[i:]) * eight(f.force[i:]))
     flatly(m, 0.0)
     for k in range(c.count):
-        c.bearing[k] = c.sums[k]
+        c.bearing[k] = c.sums[k] / mobility(c, k) if sticks(c, f, k) else 0.0
     take_up(c)
     c.known = 1
 
@@ -92,12 +103,20 @@ def settled_lead(m: March) -> None:
 
 
 def flatly(m: March, ease: float) -> bool:
-    """Do as `held` with the degrees of freedom as they are, as if each had the same mass."""
+    """Do as `held` as if each degree of freedom moved by itself, for forces measured by what each contact moves.
+
+    That is exact where a contact holds a degree of freedom.
+    """
     c = m.contacts
     f = m.flat
     f.force[f.n] = 0.0
-    for i in range(c.count * c.padded):
-        c.answers[i] = c.rows[i]
+    for k in range(c.count):
+        if sticks(c, f, k):
+            row = c.rows[c.padded * k :]
+            answer = c.answers[c.padded * k :]
+            felt = mobility(c, k)
+            for i in range(0, c.padded, 8):
+                put(answer[i:], eight(c.ease[i:]) * eight(row[i:]) / felt)
     return prevented(c, f, ease)
 
 

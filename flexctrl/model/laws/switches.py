@@ -1,8 +1,8 @@
 """Laws of force that switch: dry friction sticks, breaks loose, slides, and stops.
 
 What sticks is held without a multiplier: the equations of motion lose their components along the slip
-directions W of the contacts that stick, and s̈ + κ ṡ + ¼ κ² (s − s₀) = 0 takes their place, with s the angle or
-travel of a contact and s₀ where it stuck. The force that holds is read off the components lost. Phases belong to
+directions W of the contacts that stick (`holds`), and s̈ + κ ṡ + ¼ κ² (s − s₀) = 0 takes their place, with s the angle
+or travel of a contact and s₀ where it stuck. The force that holds is read off the components lost. Phases belong to
 the state; where they end is told by gaps, which are positive while they last. Speeds, forces and κ are measured by
 what the contacts themselves do (`slip_scales`), so that nothing hangs on the units of a machine.
 """
@@ -21,6 +21,7 @@ from flexctrl.effects.coulomb_friction import CoulombFriction
 from flexctrl.errors import StructureError
 from flexctrl.model.flows import flowing
 from flexctrl.model.laws.friction_kinds import STUCK
+from flexctrl.model.laws.holds import Hold, easiness, hold
 from flexctrl.model.laws.slip_scales import SlipScales, slip_scales
 from flexctrl.model.laws.slips import Slips
 from flexctrl.model.solve import factorise
@@ -37,7 +38,6 @@ T = TypeVar("T")
 _FADING = 1e4
 _STILL = 1e-10
 _SLACK = 1e-9
-_DEPENDENT = 1e12
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +78,11 @@ class Switches:
         return slip_scales(self.model, self.slips.rows(self.model.rest), self.static)
 
     @cached_property
+    def ease(self) -> np.ndarray:
+        """How easily each degree of freedom moves [1/kg or 1/(kg m²)]."""
+        return easiness(self.model)
+
+    @cached_property
     def fading(self) -> float:
         """κ: how fast what is astray of a contact that sticks fades [1/s]."""
         return _FADING * self.scales.rate
@@ -106,19 +111,16 @@ class Switches:
         -------
         numpy.ndarray, shape (n,)
         """
-        W, back = self._hold(state)
+        hold = self._hold(state)
         speeds, rates, places = self.slips.at(state, v, a)
         astray = places - state.dry.anchor[self.slips.order]
         astray -= 2.0 * np.pi * np.rint(astray / (2.0 * np.pi))
         slip = rates + self.fading * speeds + 0.25 * self.fading**2 * astray
-        return force - back @ (W @ force + self._weight * slip[self.phases(state) == STUCK])
+        return hold.freed(force) - hold.against(slip[self.phases(state) == STUCK])
 
     def freed(self, state: State, force: Force) -> Force:
         """Return forces, or their slopes, without their components along the slips that stick."""
-        W, back = self._hold(state)
-        if isinstance(force, np.ndarray):
-            return force - back @ (W @ force)
-        return sp.csr_matrix(force - sp.csr_matrix(back) @ sp.csr_matrix(W @ force))
+        return self._hold(state).freed(force)
 
     def unheld(self, state: State) -> State:
         """Return a state in which what sticks is taken to be without friction, and what slides is not."""
@@ -127,17 +129,15 @@ class Switches:
 
     def held_slope(self, state: State, slope: sp.csr_matrix, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return the slope of `held` from that of the balance without."""
-        W, back = self._hold(state)
-        hold = seeds[2] + self.fading * seeds[1] + 0.25 * self.fading**2 * seeds[0]
-        rows = W @ slope + hold * self._weight * W
-        return sp.csr_matrix(slope - sp.csr_matrix(back) @ sp.csr_matrix(rows))
+        hold = self._hold(state)
+        firmness = seeds[2] + self.fading * seeds[1] + 0.25 * self.fading**2 * seeds[0]
+        return sp.csr_matrix(hold.freed(slope) - firmness * hold.against_slope())
 
     def still(self, state: State, motion: np.ndarray) -> np.ndarray:
         """Return what is left of a motion of the degrees of freedom when what sticks does not move."""
         if not self.sticks(state):
             return motion
-        W, back = self._hold(state)
-        return motion - back @ (W @ motion)
+        return self._hold(state).still(motion)
 
     def at_rest(self, state: State) -> State:
         """Return a state in which what sticks does not move and is held where it is: nothing of it is to fade.
@@ -157,13 +157,12 @@ class Switches:
         anchor[order] = np.where(self.phases(state) == STUCK, places, anchor[order])
         return state.with_(v=self.still(state, state.v), dry=Dry(state.dry.phase, anchor))
 
-    def _hold(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Return W of the contacts that stick, and its pseudo-inverse."""
-        return self._once("hold", state, lambda: self._holds(state))
+    def _hold(self, state: State) -> Hold:
+        """Return what holds the contacts that stick."""
+        return self._once("hold", state, lambda: hold(self._stuck_rows(state), self.ease))
 
-    def _holds(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        W = self.slips.rows(state)[self.phases(state) == STUCK]
-        return W, _inverse(W)
+    def _stuck_rows(self, state: State) -> np.ndarray:
+        return self.slips.rows(state)[self.phases(state) == STUCK]
 
     def _once(self, what: str, state: State, make: Callable[[], T]) -> T:
         """Return what is made of a state, once while nothing else is asked for."""
@@ -171,11 +170,6 @@ class Switches:
         if kept is None or kept[0] is not state:
             self._kept[what] = kept = (state, make())
         return kept[1]
-
-    @cached_property
-    def _weight(self) -> float:
-        """About the mass of the machine, so that equations of held contacts are of the size of the others."""
-        return float(self.model.mass().diagonal().max(initial=0.0)) or 1.0
 
     # -- where phases end, and what comes then
 
@@ -229,13 +223,12 @@ class Switches:
         force = model.balance(loose, state.v, a) + model.loads(loose, u)
         M = -model.slope(loose, state.v, a, (0.0, 0.0, 1.0), u)
         heavy = np.flatnonzero(M.diagonal() > model.dust)
-        solve = factorise(M if heavy.size == model.n else M[heavy][:, heavy])
-        W = self._hold(state)[0][:, heavy]
-        pushed, free = np.array([solve(row) for row in W]).reshape(W.shape).T, solve(force[heavy])
+        M = M if heavy.size == model.n else M[heavy][:, heavy]
+        held = hold(self._stuck_rows(state)[:, heavy], self.ease[heavy])
         _, turning, _ = self.slips.at(state, state.v, a)
-        held = np.linalg.pinv(W @ pushed) @ -(W @ free + turning[stuck])
-        a[heavy] = free + pushed @ held
-        return held, a
+        solve = factorise(sp.csr_matrix(held.freed(M) + held.against_slope()))
+        a[heavy] = solve(held.freed(force[heavy]) - held.against(turning[stuck]))
+        return held.borne(M @ a[heavy] - force[heavy]), a
 
     def begin(self, state: State, u: np.ndarray) -> State:
         """Return a state with the phases it must have: what stands still sticks if it can.
@@ -310,7 +303,7 @@ class Switches:
             phases[contact] = -np.sign(held)
         else:
             speed, W = self.slips.speeds(state), self.slips.rows(state)
-            state = state.with_(v=state.v - _inverse(W[[contact]]) @ speed[[contact]])
+            state = state.with_(v=state.v - hold(W[[contact]], self.ease).back @ speed[[contact]])
             phases[contact] = STUCK
         return self._settled(state, u, phases)
 
@@ -375,13 +368,3 @@ class Switches:
                 f"CoulombFriction: nothing with mass moves at {self.names[bad[0]]!r}; give the motor its inertia, or "
                 "the part mass"
             )
-
-
-def _inverse(W: np.ndarray) -> np.ndarray:
-    """The pseudo-inverse; exact where rows are unit vectors."""
-    square = W @ W.T
-    if len(W) == 1 and square[0, 0] > 0.0:
-        return np.asarray(W.T / square[0, 0])
-    if len(W) and np.linalg.cond(square) < _DEPENDENT:
-        return np.asarray(np.linalg.solve(square, W).T)
-    return np.linalg.pinv(W)
