@@ -24,7 +24,7 @@ from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
 from flexctrl.dynamics.notes.growing import growth
-from flexctrl.dynamics.notes.straying import astray
+from flexctrl.dynamics.notes.straying import thrown
 from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track
@@ -247,13 +247,11 @@ class Journey:
 
     def _look_back(self) -> None:
         """Raise StepError where a loop has thrown the machine away: chosen steps would be ever more and shorter."""
-        if self.plan.feed.controller is None or not isinstance(self.plan.method.pace, Controlled):
-            return
-        if (worst := astray(self)) is not None:
-            gone = f"at t = {self.point.state.t:.6g} s a part has gone a million times the size of the machine"
+        if isinstance(self.plan.method.pace, Controlled) and (worst := thrown(self)) is not None:
             raise StepError(
                 worst,
-                f"the loop is not stable: {gone}; look at signs and gains of the controller, or end the run before",
+                f"the loop is not stable: at t = {self.point.state.t:.6g} s a part has gone a million times the size "
+                "of the machine, ever faster; look at signs and gains of the controller, or end the run before",
             )
 
     def _pause(self) -> None:

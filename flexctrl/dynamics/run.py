@@ -46,7 +46,8 @@ class Tolerance:
         coupled to it; it counts as a radian or the size of the machine at most, or what spins or travels would
         excuse errors of all else.
     absolute : float
-        Local error per step below which nothing is asked [rad, and m over the size of the machine].
+        Local error per step below which nothing is asked [rad, and m over the size of the machine; over one unit of
+        length where nothing in it has any: a point that no drive moves].
 
     Raises
     ------

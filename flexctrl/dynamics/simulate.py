@@ -21,6 +21,7 @@ from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.notes.adding import Drift, drifted
 from flexctrl.dynamics.notes.straying import strayed
+from flexctrl.dynamics.notes.unsized import unsized
 from flexctrl.dynamics.notes.unsure import unsure
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track, curves_of
@@ -287,7 +288,7 @@ def _result(journey: Journey) -> Run:
         rows = journey.rows.recorder.table()
     width = len(plan.model.outputs)
     drift = drifted(journey)
-    journey.notes += strayed(journey) + unsure(journey, rows[:, 1 : 1 + width])
+    journey.notes += strayed(journey) + unsized(journey) + unsure(journey, rows[:, 1 : 1 + width])
     if drift.note and journey.status is not Status.FAILED:
         journey.notes += (drift.note,)
     return Run(

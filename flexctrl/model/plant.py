@@ -15,13 +15,16 @@ __all__ = ["Kinked", "Machine", "Moving", "Plant", "Signalled", "Switching"]
 
 
 class Machine(Protocol):
-    """A name, how large it is [m], and its drives."""
+    """A name, how large it is [m] if anything in it has a length, and its drives."""
 
     @property
     def name(self) -> str: ...
 
     @property
     def size(self) -> float: ...
+
+    @property
+    def sized(self) -> bool: ...
 
     @property
     def drives(self) -> Sequence[Any]: ...

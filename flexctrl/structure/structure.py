@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError, did_you_mean, shortened
-from flexctrl.structure.bodies import RigidBody
-from flexctrl.structure.drives import Drive
+from flexctrl.structure.bodies import PointMass, RigidBody
+from flexctrl.structure.drives import Drive, LinearDrive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import FREEDOMS, TRAVEL, check_name, listed, parse_direction
 from flexctrl.structure.inputs import Input
@@ -187,10 +187,33 @@ class Structure:
 
     @cached_property
     def size(self) -> float:
-        """Largest extent of the structure [m], the yardstick for coincidence; a metre for what is but a point."""
+        """Largest extent of the structure [m], the yardstick for coincidence; or what else of it has a length.
+
+        Where all is at one place, the greater of the radius of gyration of all bodies and the travel by which a wheel
+        or pinion turns by a radian. A point that no such drive moves has no length: a metre, or whatever the unit is.
+        """
+        return self._extent or self._own_length or 1.0
+
+    @property
+    def sized(self) -> bool:
+        """Whether anything in the structure has a length."""
+        return (self._extent or self._own_length) > 0.0
+
+    @cached_property
+    def _extent(self) -> float:
+        """How far nodes are apart along the axes at most; 0 where that is but rounding."""
         lows, highs = zip(*((min(c), max(c)) for c in zip(*(n.position for n in self.nodes), strict=True)), strict=True)
         extent = max(b - a for a, b in zip(lows, highs, strict=True))
-        return extent if extent > 1e-12 * max(map(abs, (*lows, *highs))) else 1.0
+        return extent if extent > 1e-12 * max(map(abs, (*lows, *highs))) else 0.0
+
+    @cached_property
+    def _own_length(self) -> float:
+        """The longest length that parts at one place have of their own [m], 0 if none."""
+        bodies = [e for e in self.elements if isinstance(e, RigidBody)]
+        mass = sum(e.mass for e in self.elements if isinstance(e, PointMass | RigidBody))
+        turned = 0.5 * sum(body.inertia[i][i] for body in bodies for i in range(3))  # Σ m r², whatever the axes
+        radii = [drive.radius for drive in self.drives if isinstance(drive, LinearDrive)]
+        return max([math.sqrt(turned / mass) if mass > 0.0 else 0.0, *radii])
 
     @cached_property
     def _places(self) -> dict[tuple[str, int], int]:

@@ -66,3 +66,79 @@ def test_chosen_steps_end_where_a_loop_has_thrown_the_machine_away(sampled):
     assert run.t[-1] < 2.9
     grown = run["x"][8] - 1.0, run["x"][6] - 1.0
     assert grown[0] / grown[1] == pytest.approx(np.exp(0.1 * np.sqrt(1200.0)), rel=0.01)
+
+
+def satellite(radius: float, thrust: float) -> tuple[fc.Model, fc.Controller]:
+    """A body in free flight with a stable loop of its attitude, pushed by a force beside; its mass is one."""
+    points = {"antenna": (radius, 0, 0)} if radius else {}
+    body = fc.RigidBody("body", (0, 0, 0), 1.0, (0.1, 0.12, 0.05), points)
+    structure = fc.Structure(
+        [body],
+        inputs=[fc.Torque("torque", body.node, "z"), fc.Force("thrust", body.node, "x")],
+        outputs=[
+            fc.Position("x", body.node, "x"),
+            fc.Rotation("turn", body.node, "z"),
+            fc.AngularVelocity("rate", body.node, "z"),
+        ],
+    )
+
+    class Attitude:
+        inputs, outputs, sample_time = ("turn", "rate"), ("torque", "thrust"), 0.1
+
+        def initial(self):
+            return np.zeros(0)
+
+        def command(self, t, x, y):
+            return np.array([-0.005 * (y[0] - 1.0) - 0.02 * y[1], thrust])
+
+    return fc.assemble(structure, [fc.LargeRotation()]), Attitude()
+
+
+METHODS = [None, fc.GeneralizedAlpha(0.1), fc.ExplicitRungeKutta(), fc.Richardson(fc.AdaptiveAlpha())]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize(("radius", "speed", "thrust"), [(0.5, 1e6, 0.0), (0.0, 1e6, 0.0), (0.5, 0.0, 1e6)])
+def test_what_flies_far_under_a_stable_loop_has_not_failed(method, radius, speed, thrust):
+    model, law = satellite(radius, thrust)
+    rates = np.zeros(model.n)
+    rates[model.coordinate("body_0_u")] = speed
+    run = fc.simulate(model, law, until=3.0, start=model.rest.with_(v=rates), method=method, every=0.5)
+    assert run.status is fc.Status.FINISHED
+    assert run["x"][-1] == pytest.approx(speed * 3.0 + 0.5 * thrust * 9.0, rel=1e-9)
+    assert any("as if nothing holds it" in note for note in run.report.notes)
+
+
+LAWS = {
+    "away": (lambda x, v: 100.0 * (x + 1.0), 0.2, 6.0),
+    "to and fro": (lambda x, v: 1.0 - 60.0 * v, 0.1, 5.0),
+    "in ever wider swings": (lambda x, v: -400.0 * (x - 1.0) + 25.0 * v, 0.01, 3.0),
+}
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("name", LAWS)
+def test_loops_that_grow_in_whatever_way_are_named(name, method):
+    force, sample, until = LAWS[name]
+    mass = fc.RigidBody("mass", (0, 0, 0), 1.0, (0.1, 0.1, 0.1))
+    structure = fc.Structure(
+        [mass],
+        [fc.Support(mass.node, "v w rx ry rz")],
+        inputs=[fc.Force("force", mass.node, "x")],
+        outputs=[fc.Position("x", mass.node, "x"), fc.Velocity("v", mass.node, "x")],
+    )
+
+    class Law:
+        inputs, outputs, sample_time = ("x", "v"), ("force",), sample
+
+        def initial(self):
+            return np.zeros(0)
+
+        def command(self, t, x, y):
+            return np.array([force(*y)])
+
+    run = fc.simulate(fc.assemble(structure, [fc.LargeRotation()]), Law(), until=until, method=method, every=0.1)
+    chosen = not isinstance(method, fc.GeneralizedAlpha)
+    assert run.status is (fc.Status.FAILED if chosen else fc.Status.FINISHED)
+    assert ("the loop is not stable" in run.report.message) is chosen
+    assert any("as if the loop is not stable" in note for note in run.report.notes)

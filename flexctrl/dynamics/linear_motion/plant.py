@@ -25,6 +25,7 @@ class _Machine:
 
     name: str
     size: float = 1.0
+    sized: bool = True
     drives: tuple[Any, ...] = ()
 
 

@@ -12,9 +12,12 @@ from flexctrl.model.plant import Plant
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["astray", "strayed"]
+__all__ = ["strayed", "thrown"]
 
 _FAR = 1e6
+_TIMES, _PUSHED = 10.0, 0.2
+"""What grows as e^λt has λt > ln 10⁶ and x a/v² of 1: in samples, which end in a push, 1/4 at least. A power tⁿ has
+n and (n − 1)/n, what flies freely 1 and 0."""
 
 
 def strayed(journey: Journey) -> tuple[str, ...]:
@@ -28,21 +31,45 @@ def strayed(journey: Journey) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Empty while no freedom that travels has gone a million times the size of the machine.
+        Empty while no freedom that travels has gone a million times the size of the machine; and for a machine
+        without any, but under a loop that grows.
     """
-    worst = astray(journey)
-    if worst is None:
+    model, times = journey.plan.model, _times(journey)
+    worst, grows = int(np.argmax(times)) if times.size else 0, thrown(journey) is not None
+    sized = model.structure.sized
+    if not (times > 1.0).any() or not (grows or sized):
         return ()
-    model, moved = journey.plan.model, journey.books.sums.moved
-    blame = "nothing holds it" if journey.plan.feed.controller is None else "the loop is not stable"
-    times = _FAR * moved[worst] / once(model, _far)[worst]
-    return (f"{model.coordinates[worst]} has gone {times:.1g} times the size of the machine, as if {blame}",)
+    doubted = "" if journey.plan.feed.controller is None else ", or the loop is not stable"
+    blame = "the loop is not stable" if grows else f"nothing holds it{doubted}"
+    size = "the size of the machine" if sized else "a unit of length"
+    return (f"{model.coordinates[worst]} has gone {_FAR * times[worst]:.1g} times {size}, as if {blame}",)
 
 
-def astray(journey: Journey) -> int | None:
-    """Return the freedom that has gone farthest beyond a million times the size of the machine, None if none has."""
-    far, moved = once(journey.plan.model, _far), journey.books.sums.moved
-    return int(np.argmax(moved / far)) if (moved > far).any() else None
+def thrown(journey: Journey) -> int | None:
+    """Return the freedom that a loop has thrown farthest, None if all it has done is to go far.
+
+    What flies away, or is pushed away by forces that do not grow, has a speed of no more than a few times its distance
+    over the time; a loop that is not stable has it grow by orders, and goes on to push.
+
+    Parameters
+    ----------
+    journey : Journey
+
+    Returns
+    -------
+    int or None
+    """
+    if journey.plan.feed.controller is None or not (far := (times := _times(journey)) > 1.0).any():
+        return None
+    moved, state, push = journey.books.sums.moved, journey.point.state, np.abs(journey.point.rate)
+    speed = np.abs(state.v)
+    grown = far & (speed * state.t > _TIMES * moved) & (push * moved > _PUSHED * speed**2)
+    return int(np.argmax(np.where(grown, times, 0.0))) if grown.any() else None
+
+
+def _times(journey: Journey) -> np.ndarray:
+    """How far each freedom that travels has gone, in millions of sizes of the machine."""
+    return np.asarray(journey.books.sums.moved / once(journey.plan.model, _far))
 
 
 def _far(model: Plant) -> np.ndarray:
