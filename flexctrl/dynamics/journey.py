@@ -24,7 +24,7 @@ from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
 from flexctrl.dynamics.notes.growing import growth
-from flexctrl.dynamics.notes.straying import thrown
+from flexctrl.dynamics.notes.straying import lost, thrown
 from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track
@@ -247,12 +247,13 @@ class Journey:
 
     def _look_back(self) -> None:
         """Raise StepError where a loop has thrown the machine away: chosen steps would be ever more and shorter."""
+        where, remedy = f"at t = {self.point.state.t:.6g} s", "look at signs and gains of the controller"
+        if lost(self):
+            gone = f"{where} a part has gone so far that no number tells the shape of the machine any more"
+            raise StepError(self.stepper.counts.worst, f"the loop is not stable: {gone}; {remedy}")
         if isinstance(self.plan.method.pace, Controlled) and (worst := thrown(self)) is not None:
-            raise StepError(
-                worst,
-                f"the loop is not stable: at t = {self.point.state.t:.6g} s a part has gone a million times the size "
-                "of the machine, ever faster; look at signs and gains of the controller, or end the run before",
-            )
+            gone = f"{where} a part has gone a million times the size of the machine, ever faster"
+            raise StepError(worst, f"the loop is not stable: {gone}; {remedy}, or end the run before")
 
     def _pause(self) -> None:
         """Take note of what later steps depend on, and what they have cost so far."""

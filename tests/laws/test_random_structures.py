@@ -119,7 +119,7 @@ def power_is_accounted_for(seed):
 def test_the_energy_books_close_with_the_square_of_the_step(seed):
     case, model = subject(seed)
     gaps = []
-    for step in (STEP, 0.25 * STEP):
+    for step in (0.5 * STEP, 0.125 * STEP):
         found = run(case, model, step)
         assert found.status is fc.Status.FINISHED, found.report.message
         gaps.append(found.report.energy_residual)

@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.scales import once, turning, yardsticks
+from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["strayed", "thrown"]
+__all__ = ["lost", "strayed", "thrown"]
 
 _FAR = 1e6
+_LOST = 1e15 / _FAR
+"""So far out, two ends of a machine are one double number."""
 _TIMES, _PUSHED = 10.0, 0.2
 """What grows as e^λt has λt > ln 10⁶ and x a/v² of 1: in samples, which end in a push, 1/4 at least. A power tⁿ has
 n and (n − 1)/n, what flies freely 1 and 0."""
@@ -65,6 +68,25 @@ def thrown(journey: Journey) -> int | None:
     speed = np.abs(state.v)
     grown = far & (speed * state.t > _TIMES * moved) & (push * moved > _PUSHED * speed**2)
     return int(np.argmax(np.where(grown, times, 0.0))) if grown.any() else None
+
+
+def lost(journey: Journey) -> bool:
+    """Tell whether a loop has thrown a part so far that no number tells the shape of the machine any more.
+
+    Nor does a law that reads where it is. Where nothing is read, what flies there is right; numbers of a linear model
+    tell its shape however large they are.
+
+    Parameters
+    ----------
+    journey : Journey
+
+    Returns
+    -------
+    bool
+    """
+    plan = journey.plan
+    looped = plan.feed.controller is not None and isinstance(plan.model, Model)
+    return looped and bool((_times(journey) > _LOST).any())
 
 
 def _times(journey: Journey) -> np.ndarray:
