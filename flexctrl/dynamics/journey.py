@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -411,8 +411,8 @@ class Journey:
                 self.point = after if corner is None else beyond(self, after, corner)
                 return
         curve = self.track.curve(before, after)
-        if isinstance(self.plan.method.pace, Controlled) and self.books.looking:
-            missed = cast("Judging[Any]", self.stepper).missed(before, after)
+        if self.books.looking and isinstance(self.stepper, Judging):
+            missed = self.stepper.missed(before, after)
             self.books.miss(missed, after.state.v, after.state.t - before.state.t)
         self.books.enter(before, after, curve)
         self.point = after

@@ -224,8 +224,9 @@ class Stepper(Protocol[P]):
         """
 
 
+@runtime_checkable
 class Judging(Stepper[P], Protocol[P]):
-    """A stepper of steps of controlled error: it tells the local error by degrees of freedom."""
+    """A stepper that tells the local error of its steps by degrees of freedom."""
 
     def missed(self, before: P, after: P) -> np.ndarray:
         """Return by how much a step is beyond where it should be, shape (n,)."""

@@ -117,10 +117,53 @@ def test_what_has_come_to_rest_adds_nothing():
     assert 0.0 < long < 1.1 * short < 0.03
 
 
-def test_steps_of_one_length_tell_nothing():
-    run = swing(until=20.0, method=fc.GeneralizedAlpha(5e-3))
+FIXED = {
+    "alpha": (fc.GeneralizedAlpha, 0.8, 1.6),
+    "undamped": (lambda h: fc.GeneralizedAlpha(h, rho=1.0), 0.9, 1.1),
+    "midpoint": (fc.ConservingMidpoint, 0.9, 1.1),
+    "Richardson": (lambda h: fc.Richardson(fc.GeneralizedAlpha(3.0 * h)), 0.5, 5.0),
+}
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_steps_of_one_length_tell_what_a_swing_is_off_by(name):
+    make, least, most = FIXED[name]
+    for step in (2e-3, 5e-3):
+        run = swing(method=make(step), until=20.0)
+        assert least < run.report.drift / off(run) < most
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_the_step_that_is_told_leaves_little(name):
+    make, _, _ = FIXED[name]
+    run = swing(method=make(8e-3), until=20.0)
+    step = float(told(run)[0].partition("take steps of ")[2].partition(" s")[0])
+    assert off(run) > 0.03
+    finer = swing(method=make(step if name != "Richardson" else step / 3.0), until=20.0)
+    assert not told(finer)
+    assert off(finer) < 0.02
+
+
+def test_a_linear_model_that_is_integrated_exactly_adds_up_nothing():
+    linear = fc.linearize(chain(3, 1e4))
+    start = LinearPlant(linear).rest
+    run = fc.simulate(linear, until=20.0, start=replace(start, q=np.full(start.q.size, 0.01)))
     assert run.report.drift == 0.0
     assert "add up" not in str(run.report)
+
+
+@pytest.mark.parametrize("amplitude", [0.5, 1.5, 2.0, 2.5, 2.9])
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(0.02), fc.ExplicitRungeKutta()], ids=str)
+def test_a_pendulum_whose_energy_is_wrong_swings_in_another_time(amplitude, method):
+    """Its period grows with its amplitude: θ̈ = −g m r sin θ / I."""
+    model, pull = pendulum((9.81, 0, 0))
+    times = np.linspace(0.0, 20.0, 2001)
+    exact = {"method": "DOP853", "t_eval": times, "rtol": 1e-11, "atol": 1e-11}
+    true = solve_ivp(lambda t, y: [y[1], -pull * np.sin(y[0])], (0.0, 20.0), [amplitude, 0.0], **exact).y[0]
+    run = fc.simulate(model, until=20.0, start=model.displace([amplitude]), method=method, every=0.01)
+    error = float(np.abs(run["angle"] - true).max()) / min(1.0, 2.0 * amplitude)
+    assert 0.5 * min(error, 1.0) < run.report.drift
+    assert run.report.drift < max(10.0 * error, 2e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -136,12 +179,15 @@ def test_stiff_linear_chains_against_the_exponential(seed):
 
 
 def runs(backend: Backend | None) -> dict[str, fc.Run]:
-    hanging, moving = chain(3, 1e4, backend=backend), arm(backend)
+    hanging, moving, sampled = chain(3, 1e4, backend=backend), arm(backend), fc.Sampled(law(), 0.01)
     return {
         "chain": fc.simulate(hanging, until=1.0),
         "Richardson": fc.simulate(hanging, until=1.0, method=fc.Richardson(fc.AdaptiveAlpha())),
-        "sampled": fc.simulate(moving, fc.Sampled(law(), 0.01), until=0.2),
+        "sampled": fc.simulate(moving, sampled, until=0.2),
         "continuous": fc.simulate(moving, law(), until=0.2),
+        "one length": fc.simulate(hanging, until=1.0, method=fc.GeneralizedAlpha(2e-3)),
+        "one length, undamped": fc.simulate(hanging, until=1.0, method=fc.GeneralizedAlpha(2e-3, rho=1.0)),
+        "one length, sampled": fc.simulate(moving, sampled, until=0.2, method=fc.GeneralizedAlpha(1e-3)),
     }
 
 
@@ -150,22 +196,24 @@ def test_compiled_steps_tell_what_plain_ones_do():
     for name, run in ours.items():
         assert run.report.steps == theirs[name].report.steps
         assert run.report.drifted == theirs[name].report.drifted
-        assert run.report.drift == pytest.approx(theirs[name].report.drift, rel=1e-5)
+        assert run.report.drift == pytest.approx(theirs[name].report.drift, rel=1e-5, abs=1e-6)
         assert run.report.drift > 0.0
+
+
+def pendulum(gravity: tuple[float, float, float]) -> tuple[fc.Model, float]:
+    """A body of 2 kg, 0.3 m from its hinge, and what gravity does to its angle [1/s²]."""
+    body = fc.RigidBody("body", (0.3, 0, 0), 2.0, (0.01, 0.02, 0.03), {"hinge": (0, 0, 0)})
+    hinge = body.point("hinge")
+    outputs = [fc.Rotation("angle", hinge, "z")]
+    structure = fc.Structure([body], [fc.Support(hinge, "u v w rx ry")], outputs=outputs)
+    return fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(gravity)]), 2.0 * 9.81 * 0.3 / (0.03 + 2.0 * 0.3**2)
 
 
 @pytest.mark.parametrize(("speed", "until"), [(12.0, 20.0), (30.0, 15.0)])
 @pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.ExplicitRungeKutta()], ids=str)
 def test_what_goes_round_runs_off_with_its_speed(speed, until, method):
-    """A body of 2 kg, 0.3 m from its hinge, that goes round under gravity: I φ̈ = −m g r cos φ."""
-    body = fc.RigidBody("body", (0.3, 0, 0), 2.0, (0.01, 0.02, 0.03), {"hinge": (0, 0, 0)})
-    hinge = body.point("hinge")
-    held = [fc.Support(hinge, "u v w rx ry")]
-    model = fc.assemble(
-        fc.Structure([body], held, outputs=[fc.Rotation("angle", hinge, "z")]),
-        [fc.LargeRotation(), fc.Gravity((0, -9.81, 0))],
-    )
-    pull = 2.0 * 9.81 * 0.3 / (0.03 + 2.0 * 0.3**2)
+    """A body on a hinge that goes round under gravity: I φ̈ = −m g r cos φ."""
+    model, pull = pendulum((0, -9.81, 0))
     found = solve_ivp(
         lambda t, y: [y[1], -pull * np.cos(y[0])], (0.0, until), [0.0, speed], "DOP853", rtol=1e-11, atol=1e-11
     )
@@ -176,7 +224,17 @@ def test_what_goes_round_runs_off_with_its_speed(speed, until, method):
     assert bool(told(run)) == (run.report.drift > 0.03)
 
 
-@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.Richardson(fc.AdaptiveAlpha()), fc.ExplicitRungeKutta()])
+@pytest.mark.parametrize(
+    "method",
+    [
+        fc.AdaptiveAlpha(),
+        fc.Richardson(fc.AdaptiveAlpha()),
+        fc.ExplicitRungeKutta(),
+        fc.GeneralizedAlpha(2e-3),
+        fc.ConservingMidpoint(5e-3),
+        fc.Richardson(fc.GeneralizedAlpha(2e-3)),
+    ],
+)
 def test_resumed_runs_tell_the_same_to_the_bit(method, tmp_path):
     model = chain(3, 1e3)
     whole = fc.simulate(model, until=4.0, method=method)

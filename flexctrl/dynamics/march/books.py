@@ -5,7 +5,7 @@ from __future__ import annotations
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import settled
 from flexctrl.dynamics.march.holding import begun
-from flexctrl.dynamics.march.judging import chosen, follow, lean, miss, tighten
+from flexctrl.dynamics.march.judging import follow, lean, miss, tighten
 from flexctrl.dynamics.march.record import DONE, LOOKED_AT, March
 from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import OFTEN, absurd, unlooked
@@ -23,7 +23,7 @@ def accept(m: March) -> None:
     """Go on to the end of the step, where the nodes have been placed; enter it in the books and records."""
     f = m.flat
     keep(f)
-    if m.paced == 1 and m.entered % LOOKED_AT == 0 and chosen(m):
+    if m.leaping == 0 and m.entered % LOOKED_AT == 0:
         miss(m)
     zero = 0.0 * eight(m.weight)
     one = zero + 1.0

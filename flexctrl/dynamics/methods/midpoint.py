@@ -295,6 +295,15 @@ class _Stepper:
             state = state.with_(v=self._rates(state, momenta, motors))
         return _Point(state, 2.0 * (state.v - mean) / h, self.feed.at(state, point.supply, h), momenta, motors)
 
+    def missed(self, before: _Point, after: _Point) -> np.ndarray:
+        """Return the local error of a step, h²/12 Δa."""
+        h = after.state.t - before.state.t
+        return h * h / 12.0 * (after.rate - before.rate)
+
+    def remains(self, share: float) -> float:
+        """Return what a run is off by: as much as its errors add up to."""
+        return share
+
     def _rates(self, state: State, momenta: np.ndarray, motors: np.ndarray) -> np.ndarray:
         """The rates of some momenta."""
         if not motors.size:

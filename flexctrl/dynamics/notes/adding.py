@@ -1,14 +1,14 @@
-"""Local errors of steps of controlled error that all go one way: what they may have added up to."""
+"""Local errors of steps that all go one way: what they may have added up to."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from flexctrl.dynamics.scales import farthest, yardsticks
-from flexctrl.dynamics.steps import Controlled, Judging
+from flexctrl.dynamics.steps import Controlled, Fixed, Judging
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -17,6 +17,8 @@ __all__ = ["Drift", "drifted"]
 
 _TOLD, _AIM = 0.03, 0.01
 _REST = 10.0
+_MOST = 10.0
+"""Nearer to where it stands on its head a pendulum's period grows by more than its energy tells."""
 
 
 class Drift(NamedTuple):
@@ -25,8 +27,8 @@ class Drift(NamedTuple):
     Attributes
     ----------
     share : float
-        Of the largest motion in that part of the machine, at most of a radian or the machine's size; 0 where steps are
-        not of controlled error.
+        Of the largest motion in that part of the machine, at most of a radian or the machine's size; 0 where a linear
+        model is integrated exactly.
     freedom : str
         The worst degree of freedom.
     note : str
@@ -43,9 +45,8 @@ def drifted(journey: Journey) -> Drift:
 
     Of a local error counts what is along the motion: a share κ = Σ e v / Σ h v² of the time that goes by. Over a way
     Σ h |v| to and fro that is up to π/2 κ Σ h |v|. What is across, or turns round as the motion does, does not add up.
-    No more is told than how far the freedom has moved; that growth makes errors larger is not seen. What goes round or
-    away, farther than a radian or the machine's size, and is led by no law, runs off with its speed, too: that is wrong
-    by half the share of energy that the books miss.
+    No more is told than how far the freedom has moved; that growth makes errors larger is not seen. What no law leads
+    runs off with its speed, too, where a method takes or makes energy: see `_run_off`.
 
     Parameters
     ----------
@@ -56,38 +57,50 @@ def drifted(journey: Journey) -> Drift:
     -------
     Drift
     """
-    plan, sums, model = journey.plan, journey.books.sums, journey.plan.model
-    if not (isinstance(plan.method.pace, Controlled) and sums.swept.any()):
+    plan, sums, model, stepper = journey.plan, journey.books.sums, journey.plan.model, journey.stepper
+    if not (isinstance(stepper, Judging) and sums.swept.any()):
         return Drift()
-    stepper = cast("Judging[Any]", journey.stepper)
     went = (sums.swept > 0.0) & np.isfinite(sums.ahead * sums.path / sums.swept)
     late = 0.5 * math.pi * np.abs(sums.ahead[went]) * sums.path[went] / sums.swept[went]
     off = np.zeros(model.n)
     off[went] = np.minimum(late, sums.moved[went])
-    off = off / yardsticks(model) / np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.absolute)
-    shares = np.maximum([stepper.remains(lag) for lag in off.tolist()], _run_off(journey))
+    most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.absolute)
+    off = off / yardsticks(model) / most
+    shares = np.maximum([stepper.remains(lag) for lag in off.tolist()], _run_off(journey) / most)
     worst = int(np.argmax(shares))
     share, freedom = float(shares[worst]), model.coordinates[worst]
-    if share <= _TOLD:
-        return Drift(share, freedom)
-    power = math.log2(stepper.remains(2.0) / stepper.remains(1.0))
-    less = (_AIM / share) ** (1.0 / (power * (1.0 - 1.0 / plan.method.pace.steepness)))
-    return Drift(share, freedom, _note(journey, share, freedom, less))
+    return Drift(share, freedom, _note(journey, stepper, share, freedom) if share > _TOLD else "")
 
 
 def _run_off(journey: Journey) -> np.ndarray:
-    """Return by how much a wrong speed may have led astray what goes far, in yardsticks, shape (n,)."""
-    books, way = journey.books, journey.books.sums.moved / yardsticks(journey.plan.model)
-    free = books.lawful and journey.plan.feed.controller is None
-    return np.where(way > 1.0, 0.5 * books.residual * way, 0.0) if free else np.zeros_like(way)
+    """Return by how much a wrong speed may have led motion astray, in yardsticks, shape (n,).
+
+    What goes round or away, farther than a radian or the machine's size, is wrong by half the share of energy that
+    the books miss at the end. What swings by θ has a period that grows by tan²(θ/2)/8 of that share, as pendulums do. Energies
+    that steps of one length keep come back, and so do speeds.
+    """
+    books, sums, method = journey.books, journey.books.sums, journey.plan.method
+    yard = yardsticks(journey.plan.model)
+    way = sums.moved / yard
+    kept = method.symmetric and isinstance(method.pace, Fixed)
+    if kept or not (books.lawful and sums.turnover) or journey.plan.feed.controller is not None:
+        return np.zeros_like(way)
+    rounds = np.where(way > 1.0, 0.5 * way, 0.0)
+    swings = np.where(way < 2.0 * math.pi, np.minimum(np.tan(0.25 * way) ** 2 / 8.0, _MOST) * sums.path / yard, 0.0)
+    return np.asarray(np.minimum(abs(sums.made) / sums.turnover * np.maximum(rounds, swings), way))
 
 
-def _note(journey: Journey, share: float, freedom: str, less: float) -> str:
-    """What is to be said, with the share of the tolerance that would leave little."""
-    plan, asked = journey.plan, journey.plan.tolerance
-    most = f"{100.0 * share:.2g} %" if share < 1.0 else "all (or a radian, or the machine's size)"
-    remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
+def _note(journey: Journey, stepper: Judging[Any], share: float, freedom: str) -> str:
+    """What is to be said, with the tolerance or the step that would leave little."""
+    plan = journey.plan
+    pace, power = plan.method.pace, math.log2(stepper.remains(2.0) / stepper.remains(1.0))
+    if isinstance(pace, Controlled):
+        less, asked = (_AIM / share) ** (1.0 / (power * (1.0 - 1.0 / pace.steepness))), plan.tolerance
+        remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
+    else:
+        finer = pace.step * (_AIM / share) ** (1.0 / max(2.0 * power, plan.method.order))
+        remedy = f"take steps of {finer:.1g} s"
     if plan.method.order == 2:
         remedy += ", or take Richardson of the method"
-    steps = journey.mark.steps
-    return f"the errors of {steps} steps may have added up to {most} of the motion of {freedom}: {remedy}"
+    most = f"{100.0 * share:.2g} %" if share < 1.0 else "all (or a radian, or the machine's size)"
+    return f"the errors of {journey.mark.steps} steps may have added up to {most} of the motion of {freedom}: {remedy}"
