@@ -130,7 +130,7 @@ class Report:
         How far conditions that close rigid loops were violated [rad, or shares of what they span].
     drift : float
         What errors of steps may have added up to, over the largest motion (at most a radian or the machine's size); 0
-        for steps that are not chosen by them.
+        where a linear model is integrated exactly.
     drifted : str
         The degree of freedom in which that is most.
     message : str

@@ -6,9 +6,9 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import settled
 from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import follow, lean, miss, tighten
-from flexctrl.dynamics.march.record import DONE, LOOKED_AT, March
+from flexctrl.dynamics.march.record import DONE, March
 from flexctrl.dynamics.march.step import blended
-from flexctrl.dynamics.records.absurd import OFTEN, absurd, unlooked
+from flexctrl.dynamics.records.absurd import OFTEN, absurd, looking, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
@@ -23,7 +23,7 @@ def accept(m: March) -> None:
     """Go on to the end of the step, where the nodes have been placed; enter it in the books and records."""
     f = m.flat
     keep(f)
-    if m.leaping == 0 and m.entered % LOOKED_AT == 0:
+    if m.leaping == 0 and looking(m.entered):
         miss(m)
     zero = 0.0 * eight(m.weight)
     one = zero + 1.0

@@ -29,9 +29,6 @@ law does not say numbers; beyond a corner, anew, or where that is to be done."""
 FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED, START = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 """What to do."""
 
-LOOKED_AT = 4
-"""Steps of controlled error of which the error of one is added up: of more, it could be told from the clock."""
-
 FRESH, EVALUATE, CORRECT = 0, 1, 2
 """Where in a step it is: before it, before an iteration, or with the forces of one known."""
 

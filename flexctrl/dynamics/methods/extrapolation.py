@@ -41,10 +41,11 @@ class Richardson:
     """A method of lower order run with steps h and h/2, and extrapolated.
 
     Two more orders for a method that is symmetric in time (`ConservingMidpoint`, ``GeneralizedAlpha(h, rho=1.0)``),
-    one more for others, at three times the cost of the coarser run. As damped and as stable as the method itself.
-    Errors of both runs grow with time, so this is for runs in which the coarser one still follows the motion. Beyond a
-    corner of a law of force both go on from where the finer one is. Steps of `AdaptiveAlpha` are those that it takes by
-    itself: a tolerance is kept by the coarser run, and what is extrapolated is as much better as with fixed steps.
+    one more for others, at three steps for one, taken one by one in Python (some 0.4 ms beside what they cost: below a
+    hundred elements smaller steps of the method are faster). As damped and as stable as the method itself. Errors of
+    both runs grow with time, so this is for runs in which the coarser one still follows the motion. Beyond a corner of
+    a law of force both go on from where the finer one is. Steps of `AdaptiveAlpha` are those that it takes by itself: a
+    tolerance is kept by the coarser run, and what is extrapolated is as much better as with fixed steps.
 
     Parameters
     ----------

@@ -76,8 +76,8 @@ def _run_off(journey: Journey) -> np.ndarray:
     """Return by how much a wrong speed may have led motion astray, in yardsticks, shape (n,).
 
     What goes round or away, farther than a radian or the machine's size, is wrong by half the share of energy that
-    the books miss at the end. What swings by θ has a period that grows by tan²(θ/2)/8 of that share, as pendulums do. Energies
-    that steps of one length keep come back, and so do speeds.
+    the books miss at the end. What swings by θ has a period that grows by tan²(θ/2)/8 of that share, as pendulums do.
+    Energies that steps of one length keep come back, and so do speeds.
     """
     books, sums, method = journey.books, journey.books.sums, journey.plan.method
     yard = yardsticks(journey.plan.model)

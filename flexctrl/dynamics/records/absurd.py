@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flexctrl.kernels.native import seldom
 
-__all__ = ["ABSURD", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "unlooked"]
+__all__ = ["ABSURD", "LOOKED_AT", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "looking", "unlooked"]
 
 OFTEN = 32
 """Steps from one balance to the next; at first there is one after each."""
@@ -14,7 +14,17 @@ VISIBLE = 1e-3
 """Share of the machine's size that is seen to move."""
 ROUND_OFF = 1e-6
 """Share of the energy at the start that may be lost in the last digits of places."""
+LOOKED_AT = 4
+"""Steps of which the error of one is added up: of more, it could be told from the clock."""
 _MUCH, _LITTLE = 1e-2, 1e-6
+
+
+def looking(entered: int) -> bool:
+    """Tell whether the error of a step is added up: one of four, in golden shares of the count.
+
+    Of every fourth, what comes again every so many steps might be seen always or never.
+    """
+    return entered * 40503 % 65536 < 65536 // LOOKED_AT
 
 
 @seldom

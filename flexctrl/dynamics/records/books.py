@@ -9,9 +9,8 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
-from flexctrl.dynamics.march.record import LOOKED_AT
 from flexctrl.dynamics.methods.local import Local
-from flexctrl.dynamics.records.absurd import ABSURD, OFTEN, ROUND_OFF, VISIBLE, absurd, unlooked
+from flexctrl.dynamics.records.absurd import ABSURD, LOOKED_AT, OFTEN, ROUND_OFF, VISIBLE, absurd, looking, unlooked
 from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
@@ -121,7 +120,7 @@ class Books:
     @property
     def looking(self) -> bool:
         """Whether the error of the step about to be entered is added up."""
-        return self.sums.entered % LOOKED_AT == 0
+        return looking(self.sums.entered)
 
     def miss(self, error: np.ndarray, v: np.ndarray, h: float) -> None:
         """Add up the local error of a step that ends at some rates."""
