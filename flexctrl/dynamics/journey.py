@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,12 @@ class Journey:
         self._judge()
         if self.status in (Status.FINISHED, Status.STOPPED):
             self._look_for_growth(began)
+
+    @cached_property
+    def judging(self) -> Judging[Any] | None:
+        """What tells local errors of steps; None where a linear model is integrated exactly."""
+        plain = self.stepper.plain if isinstance(self.stepper, MarchingStepper) else self.stepper
+        return plain if isinstance(plain, Judging) else None
 
     def step(self, point: Any, h: float) -> Any:
         """Return the point a step later.
@@ -411,8 +418,8 @@ class Journey:
                 self.point = after if corner is None else beyond(self, after, corner)
                 return
         curve = self.track.curve(before, after)
-        if self.books.looking and isinstance(self.stepper, Judging):
-            missed = self.stepper.missed(before, after)
+        if self.books.looking and self.judging is not None:
+            missed = self.judging.missed(before, after)
             self.books.miss(missed, after.state.v, after.state.t - before.state.t)
         self.books.enter(before, after, curve)
         self.point = after

@@ -185,7 +185,7 @@ def test_what_the_methods_own_damping_takes_is_noted(model):
     assert run.report.energy_residual > 0.5
     assert run.report.energy.gap < 0.0
     assert run.status is fc.Status.FINISHED
-    assert "the motion is not resolved" in run.report.notes[-1]
+    assert any("the motion is not resolved" in note for note in run.report.notes)
 
 
 @pytest.mark.parametrize("backend", [fc.CasadiVM(), None], ids=["plain", "compiled"])
@@ -196,7 +196,7 @@ def test_what_a_method_without_damping_loses_is_not_resolved(backend):
     model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation()], backend)
     start = model.rest.with_(v=np.array([4.0]))
     coarse, fine = (
-        fc.simulate(model, until=20.0, start=start, method=fc.GeneralizedAlpha(step, rho=1.0)) for step in (0.6, 0.06)
+        fc.simulate(model, until=20.0, start=start, method=fc.GeneralizedAlpha(step, rho=1.0)) for step in (0.6, 0.01)
     )
     assert coarse.report.energy.gap < -0.2 * coarse.report.energy.start
     assert coarse.status is fc.Status.FAILED

@@ -151,14 +151,6 @@ class MarchingStepper:
         """Return the local error of the step just taken over what is allowed."""
         return self.plain.error(before, after, h, moved, tolerance)
 
-    def missed(self, before: AlphaPoint, after: AlphaPoint) -> np.ndarray:
-        """Return the local error of a step."""
-        return self.plain.missed(before, after)
-
-    def remains(self, share: float) -> float:
-        """Return what a run is off by whose local errors add up to a share of the motion."""
-        return self.plain.remains(share)
-
     def enter(self, point: AlphaPoint) -> None:
         """Put the march at a point, unless it is there."""
         if point is not self._here:

@@ -212,7 +212,8 @@ class _Stepper:
 
     def missed(self, before: _Point, after: _Point) -> np.ndarray:
         """Return the local error of the coarser run."""
-        return cast("Judging[Any]", self.coarse).missed(before.coarse, after.coarse)
+        plain = self.coarse.plain if isinstance(self.coarse, MarchingStepper) else self.coarse
+        return cast("Judging[Any]", plain).missed(before.coarse, after.coarse)
 
     def remains(self, share: float) -> float:
         """Return what a run is off by: of second order in the lag of the coarser one."""

@@ -57,8 +57,8 @@ def drifted(journey: Journey) -> Drift:
     -------
     Drift
     """
-    plan, sums, model, stepper = journey.plan, journey.books.sums, journey.plan.model, journey.stepper
-    if not (isinstance(stepper, Judging) and sums.swept.any()):
+    plan, sums, model, stepper = journey.plan, journey.books.sums, journey.plan.model, journey.judging
+    if stepper is None or not sums.swept.any():
         return Drift()
     went = (sums.swept > 0.0) & np.isfinite(sums.ahead * sums.path / sums.swept)
     late = 0.5 * math.pi * np.abs(sums.ahead[went]) * sums.path[went] / sums.swept[went]
