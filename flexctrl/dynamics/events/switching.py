@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexctrl.dynamics.events.impact import LASTING, lasts
+from flexctrl.dynamics.events.impact import lasts
 from flexctrl.dynamics.events.landing import Missed
 from flexctrl.dynamics.events.nearing import LEAST, NUDGES
 from flexctrl.dynamics.events.watch import Crossing
@@ -102,5 +101,5 @@ def _follow(journey: Journey, before: State, after: State, u: np.ndarray) -> Non
     if not isinstance(journey.plan.method.pace, Controlled):
         return
     sums = journey.books.sums
-    cap = lasts(journey.plan.model, before, after, u, (journey.plan.tolerance, sums.moved, sums.turnover))
-    journey.mark.follow, journey.mark.cap = (LASTING, cap) if math.isfinite(cap) else (0, 0.0)
+    how = journey.plan.tolerance, sums.moved, sums.turnover
+    journey.mark.follow, journey.mark.cap = lasts(journey.plan.model, before, after, u, how)

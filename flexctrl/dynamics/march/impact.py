@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.events.impact import LASTING, SEEN, SMALL, STEPS
+from flexctrl.dynamics.events.impact import DAMPED, LASTING, SEEN, SMALL, STEPS, finer
 from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.record import March
 from flexctrl.dynamics.march.step import press_all
@@ -12,7 +12,7 @@ from flexctrl.kernels.eights import eight, put, total
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear
 
-__all__ = ["follow_impact", "stiffness"]
+__all__ = ["follow_impact", "pushed", "stiffness"]
 
 
 @seldom
@@ -47,9 +47,19 @@ def along_rates(m: March, t: float, share: float) -> float:
 
 
 @seldom
-def follow_impact(m: March, stiffer: float) -> None:
-    """Follow an impact by short steps, where these would not see it; see `flexctrl.dynamics.events.impact.lasts`."""
-    mass = along_rates(m, 0.0, 0.0) - along_rates(m, 0.0, 1.0)
+def pushed(m: March) -> float:
+    """Return the power of all forces here."""
+    power = along_rates(m, 0.0, 0.0)
+    clear(m.flat.padded, m.flat.step)
+    reach(m)
+    return power
+
+
+@seldom
+def follow_impact(m: March, stiffer: float, power: float) -> None:
+    """Follow an impact by short steps; before it forces had some power; see `events.impact.lasts`."""
+    here = along_rates(m, 0.0, 0.0)
+    mass = here - along_rates(m, 0.0, 1.0)
     clear(m.flat.padded, m.flat.step)
     reach(m)
     m.follow = 0
@@ -57,6 +67,11 @@ def follow_impact(m: March, stiffer: float) -> None:
     if not (stiffer > 0.0 and mass > 2.0 * SMALL * m.turnover):
         return
     period = math.sqrt(mass / stiffer)
+    if (power - here) * period > DAMPED * mass:
+        times = finer(m.relative + m.absolute / max(m.reached, m.absolute))
+        m.follow = int(LASTING * times)
+        m.cap = period / (STEPS * times)
+        return
     deep = False
     for i in range(m.flat.n):
         allowed = m.absolute + m.relative * (m.reached if m.parts == 1 else m.farthest[m.part[i]])

@@ -10,7 +10,7 @@ from flexctrl.dynamics.events.nearing import LEAST, NUDGES
 from flexctrl.dynamics.march.books import accept, copy, reach
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import comes_through, value
-from flexctrl.dynamics.march.impact import follow_impact, stiffness
+from flexctrl.dynamics.march.impact import follow_impact, pushed, stiffness
 from flexctrl.dynamics.march.joining import start_anew
 from flexctrl.dynamics.march.judging import chosen
 from flexctrl.dynamics.march.landing import shortened
@@ -48,10 +48,11 @@ def turn_corner(m: March, size: float) -> int:
         m.size = size
         m.follow = max(0, m.follow - 1)
     before = stiffness(m, -_SHARE * size) if controlled else 0.0
+    power = pushed(m) if controlled else 0.0
     if not nudged(m):
         return TURN
     if controlled:
-        follow_impact(m, stiffness(m, _SHARE * size) - before)
+        follow_impact(m, stiffness(m, _SHARE * size) - before, power)
         m.h = min(size, m.cap) if m.follow > 0 else size
         m.led = m.h
     return TURNED if start_anew(m) == DONE else TURN
