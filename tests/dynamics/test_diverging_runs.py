@@ -177,3 +177,24 @@ def test_what_is_no_error_of_arithmetic_is_not_taken_for_one(monkeypatch):
     monkeypatch.setattr(Model, "loads", broken)
     with pytest.raises(AttributeError):
         fc.simulate(machine, law(1.0, 0.1), until=0.1, method=METHODS["alpha"])
+
+
+@pytest.mark.parametrize("method", [fc.ExplicitRungeKutta(), fc.ConservingMidpoint(2e-3), None], ids=str)
+@pytest.mark.parametrize("torque", [1e160, 1e200, 1e290])
+def test_a_torque_too_large_to_be_squared_is_not_left_out(torque, method):
+    """What accelerations are found by squares forces: where these overflowed, the arm went on as if nothing pushed."""
+
+    class Pushing:
+        inputs, outputs, sample_time = (), ("torque",), 0.01
+
+        def initial(self):
+            return np.zeros(0)
+
+        def command(self, t, x, y):
+            return np.array([torque if t > 0.05 else 1.0])
+
+    model = arm("plain", 4e-3, fc.ShaftElasticity(), fc.LargeRotation())
+    run = fc.simulate(model, Pushing(), until=0.1, method=method, every=1e-3)
+    assert run.status is fc.Status.FAILED
+    assert run.t[-1] == pytest.approx(0.06, abs=2e-3)
+    assert np.isfinite(run.y).all()

@@ -99,6 +99,8 @@ class Masses:
                 direction = change + (power / before) * direction
                 pushed = gap(guess + direction) - start
                 curvature = float(direction @ pushed)
+            if not np.isfinite(curvature) and np.isfinite(change).all():
+                return value + change, False  # too large to be squared
             if not curvature > 0.0:
                 break
             share = power / curvature
