@@ -31,12 +31,15 @@ class Inner:
         Whether it stays as it is in equilibria and linear models.
     order : int
         Of its equation: 1 for one without inertia, 2 for one that has it.
+    unit : float
+        What one of it is in the units of the machine, where no error of it is judged.
     """
 
     name: str
     scale: float = math.inf
     frozen: bool = False
     order: int = 1
+    unit: float = 1.0
 
 
 class Effect:

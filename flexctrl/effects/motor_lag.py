@@ -47,5 +47,6 @@ class MotorLag(Effect):
         return tuple((name, T) for name, T in self.time_constants if T)
 
     def inner(self, structure: Structure) -> tuple[Inner, ...]:
-        """A torque each."""
-        return tuple(Inner(f"{name}_lag") for name, _ in self.acting)
+        """A torque each; one is what turns the motor's shaft by a radian."""
+        stiffness = {drive.name: drive.stiffness for drive in structure.drives}
+        return tuple(Inner(f"{name}_lag", unit=stiffness[name]) for name, _ in self.acting)

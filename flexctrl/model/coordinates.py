@@ -98,6 +98,11 @@ class Coordinates:
         """What an error of 1 is in each inner degree of freedom."""
         return {i.name: i.scale for i in self.effects if i.name}
 
+    @property
+    def unjudged(self) -> dict[str, float]:
+        """What one is in each inner degree of freedom in which no error is judged."""
+        return {i.name: i.unit for i in self.effects if i.name and np.isinf(i.scale)}
+
     @cached_property
     def flows(self) -> np.ndarray:
         """Inner degrees of freedom of first order."""

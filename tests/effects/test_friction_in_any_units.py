@@ -166,3 +166,77 @@ def test_a_start_under_a_command_that_lags_tears_nothing_loose():
     run = fc.simulate(lagging(fc.CasadiVM()), inputs={"torque": 2.0}, until=0.1, method=fc.GeneralizedAlpha(1e-3))
     assert [(e.name, e.rising) for e in run.events] == [("drive", True)]
     assert run.events[0].t == pytest.approx(0.02 * np.log(4.0), rel=1e-3)  # 2 (1 − e^(−t/T)) = 1.5
+
+
+def travelling(u: Units) -> tuple[fc.Model, float]:
+    """A trolley with dry friction, moved through play by a motor whose torque lags; a body's lever hangs from it."""
+    turned, torque = u.mass * u.length**2, u.force * u.length
+    trolley = fc.PointMass("trolley", (0, 0, 0), 80.0 * u.mass)
+    load = fc.PointMass("load", (0.3 * u.length, 0, -2.7 * u.length), 35.0 * u.mass)
+    hook = fc.RigidBody(
+        "hook", (1.5 * u.length, 0, 0), 6.0 * u.mass, (0.4 * turned,) * 3, {"eye": (1.2 * u.length, 0, 0)}
+    )
+    spring = fc.Spring(
+        "spring",
+        (0, 0, 0),
+        (1.2 * u.length, 0, 0),
+        stiffness=2000.0 * u.force / u.length,
+        damping=20.0 * u.force * u.time / u.length,
+        length=1.25 * u.length,
+    )
+    drive = fc.LinearDrive(
+        "drive",
+        trolley.node,
+        direction="x",
+        radius=0.09 * u.length,
+        ratio=12.0,
+        stiffness=30.0 * torque,
+        inertia=2e-3 * turned,
+        damping=0.02 * torque * u.time,
+    )
+    winch = fc.Winch(
+        "winch",
+        load.node,
+        trolley.node,
+        EA=4e5 * u.force,
+        damping=300.0 * u.force * u.time / u.length,
+        radius=0.1 * u.length,
+        ratio=8.0,
+        inertia=0.05 * turned,
+    )
+    structure = fc.Structure(
+        [trolley, load, hook, spring],
+        [
+            fc.Support(trolley.node, "v w"),
+            fc.Support(load.node, "v"),
+            fc.Support(hook.nodes[0], "v w rx rz"),
+            fc.Pin(trolley.node, spring.start),
+            fc.Pin(spring.end, hook.point("eye")),
+        ],
+        drives=[drive, winch],
+        inputs=[fc.MotorTorque("push", drive), fc.MotorTorque("lift", winch)],
+        outputs=[fc.Position("x", trolley.node, "x"), fc.DriveAngle("angle", drive)],
+    )
+    dry = fc.Coulomb(20.0 * u.force, 30.0 * u.force, 0.05 * u.length / u.time)
+    effects = [
+        fc.Gravity((0, 0, -9.81 * u.length / u.time**2)),
+        fc.LargeRotation(),
+        fc.ShaftElasticity(),
+        fc.RopeStretch(),
+        fc.Backlash({"drive": 0.2}),
+        fc.MotorLag({"drive": 0.01 * u.time}),
+        fc.CoulombFriction({"trolley.u": dry, "drive": 0.05 * torque}),
+    ]
+    return fc.assemble(structure, effects), torque
+
+
+def test_levers_beside_a_torque_that_lags_are_solved_alike_in_any_units() -> None:
+    runs = []
+    for u in (SI, Units(1e6, 1e9, 1.0)):
+        model, torque = travelling(u)
+        sine, inputs = Sine(1.5 * torque, 6.0 / u.time, 0.01 * u.time), {"lift": -4.3 * torque}
+        run = fc.simulate(model, sine, until=0.5 * u.time, every=0.01 * u.time, inputs=inputs)
+        runs.append((run.report.steps, run.report.newton_iterations, run.y / [u.length, 1.0]))
+    (steps, iterations, y), (others, other_iterations, z) = runs
+    assert (steps, iterations) == (others, other_iterations)
+    assert np.abs(y - z).max() < 1e-8

@@ -73,7 +73,9 @@ def probes_of(F: Flattened, weight: np.ndarray) -> Probes:
     groups, starts, columns, firsts, rows, cells = found
     base, step, v, rate = np.zeros((4, F.flat.padded))
     # what has no yardstick only adds to the forces
-    far, driven = np.divide(1.0, weight, out=np.full_like(weight, 1.0 / _STEP), where=weight > 0.0), F.flat.driven
+    units, driven = F.model.motion.unjudged, F.flat.driven
+    plain = np.array([units.get(name, 1.0) for name in F.model.coordinates]) / _STEP
+    far = np.divide(1.0, weight, out=plain, where=weight > 0.0)
     size, driven = F.ordered(far), np.zeros_like(driven)
     return Probes(groups, starts, columns, firsts, rows, cells, size, base, step, v, rate, driven)
 
