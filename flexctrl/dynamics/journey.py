@@ -420,7 +420,7 @@ class Journey:
         curve = self.track.curve(before, after)
         if self.books.looking and self.judging is not None:
             missed = self.judging.missed(before, after)
-            self.books.miss(missed, after.state.v, after.state.t - before.state.t)
+            self.books.miss(missed, after, after.state.t - before.state.t)
         self.books.enter(before, after, curve)
         self.point = after
         self.mark.steps += 1

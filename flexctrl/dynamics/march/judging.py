@@ -59,8 +59,10 @@ def miss(m: March) -> None:
         own = eight(m.algorithmic[i:])
         lead = blended(m, eight(f.rate[i:]), eight(m.rate[i:]), own)
         v = eight(f.v[i:])
+        a = eight(f.rate[i:])
         put(m.ahead[i:], eight(m.ahead[i:]) + scale * (lead - own) * v)
         put(m.swept[i:], eight(m.swept[i:]) + m.h * v * v)
+        put(m.bent[i:], eight(m.bent[i:]) + m.h * a * a)
         put(m.path[i:], eight(m.path[i:]) + way * abs(v))
 
 

@@ -175,7 +175,8 @@ class Marcher(Loops):
         m.drawing, m.absurd, m.entered = 1, int(sums.absurd), sums.entered
         m.gained, m.lost, m.unseen = sums.work, sums.lost, sums.unseen
         m.begun, m.moving, m.turnover, m.gap, m.made = sums.start, sums.moving, sums.turnover, sums.gap, sums.made
-        m.ahead[:], m.swept[:], m.path[:] = F.ordered(sums.ahead), F.ordered(sums.swept), F.ordered(sums.path)
+        m.ahead[:], m.path[:] = F.ordered(sums.ahead), F.ordered(sums.path)
+        m.swept[:], m.bent[:] = F.ordered(sums.swept), F.ordered(sums.bent)
         m.closing.open = sums.closure
         if m.losing and self.model.motion.flows.size:  # which may be over within the step: their state does not tell
             m.power = sums.power
@@ -326,6 +327,7 @@ class Marcher(Loops):
             moved=F.own(m.reach),
             ahead=F.own(m.ahead),
             swept=F.own(m.swept),
+            bent=F.own(m.bent),
             path=F.own(m.path),
         )
 

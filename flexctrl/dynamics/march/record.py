@@ -231,7 +231,7 @@ class March:
         The farthest that anything has turned within a step since this was set to zero [rad].
     reach, first : Reals
         Largest distance of each degree of freedom from where it was first.
-    ahead, swept, path : Reals
+    ahead, swept, bent, path : Reals
         Sums of local errors of steps of controlled error; see `flexctrl.dynamics.records.books.Sums`.
     rows : Reals
         Time and outputs after each step.
@@ -272,6 +272,7 @@ class March:
     first: Reals
     ahead: Reals
     swept: Reals
+    bent: Reals
     path: Reals
     rows: Reals
     states: Reals

@@ -45,8 +45,10 @@ def drifted(journey: Journey) -> Drift:
 
     Of a local error counts what is along the motion: a share κ = Σ e v / Σ h v² of the time that goes by. Over a way
     Σ h |v| to and fro that is up to π/2 κ Σ h |v|. What is across, or turns round as the motion does, does not add up.
-    No more is told than how far the freedom has moved; that growth makes errors larger is not seen. What no law leads
-    runs off with its speed, too, where a method takes or makes energy: see `_run_off`.
+    No more is told than how far the freedom has moved, nor than twice the width 2 V/ω of what is late, V = 4/π Σ h v² /
+    Σ h |v| and ω² = Σ h a² / Σ h v²: fast ripples on a slow motion are only as late as they are wide. That growth makes
+    errors larger is not seen. What no law leads runs off with its speed, too, where a method takes or makes energy: see
+    `_run_off`.
 
     Parameters
     ----------
@@ -62,18 +64,25 @@ def drifted(journey: Journey) -> Drift:
         return Drift()
     went = (sums.swept > 0.0) & np.isfinite(sums.ahead * sums.path / sums.swept)
     late = 0.5 * math.pi * np.abs(sums.ahead[went]) * sums.path[went] / sums.swept[went]
-    off = np.zeros(model.n)
+    off, width = np.zeros(model.n), np.zeros(model.n)
     off[went] = np.minimum(late, sums.moved[went])
-    most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.absolute)
-    off = off / yardsticks(model) / most
-    shares = np.maximum([stepper.remains(lag) for lag in off.tolist()], _run_off(journey) / most)
+    width[went] = _width(sums.swept[went], sums.bent[went], sums.path[went])
+    most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.absolute) * yardsticks(model)
+    lags = np.minimum([stepper.remains(lag) for lag in (off / most).tolist()], width / most)
+    shares = np.maximum(lags, _run_off(journey) / most)
     worst = int(np.argmax(shares))
     share, freedom = float(shares[worst]), model.coordinates[worst]
     return Drift(share, freedom, _note(journey, stepper, share, freedom) if share > _TOLD else "")
 
 
+def _width(swept: np.ndarray, bent: np.ndarray, path: np.ndarray) -> np.ndarray:
+    """Twice how far what is fast in a motion goes to and fro; of several frequencies that is less than the widest."""
+    with np.errstate(divide="ignore", over="ignore"):
+        return np.asarray(16.0 / math.pi * swept**1.5 / (path * np.sqrt(bent)))
+
+
 def _run_off(journey: Journey) -> np.ndarray:
-    """Return by how much a wrong speed may have led motion astray, in yardsticks, shape (n,).
+    """Return by how much a wrong speed may have led motion astray, shape (n,).
 
     What goes round or away, farther than a radian or the machine's size, is wrong by half the share of energy that
     the books miss at the end. What swings by θ has a period that grows by tan²(θ/2)/8 of that share, as pendulums do.
@@ -87,7 +96,7 @@ def _run_off(journey: Journey) -> np.ndarray:
         return np.zeros_like(way)
     rounds = np.where(way > 1.0, 0.5 * way, 0.0)
     swings = np.where(way < 2.0 * math.pi, np.minimum(np.tan(0.25 * way) ** 2 / 8.0, _MOST) * sums.path / yard, 0.0)
-    return np.asarray(np.minimum(abs(sums.made) / sums.turnover * np.maximum(rounds, swings), way))
+    return np.asarray(yard * np.minimum(abs(sums.made) / sums.turnover * np.maximum(rounds, swings), way))
 
 
 def _note(journey: Journey, stepper: Judging[Any], share: float, freedom: str) -> str:

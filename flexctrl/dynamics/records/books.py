@@ -59,8 +59,8 @@ class Sums:
         Whether the method makes so much energy that the run ends.
     moved : numpy.ndarray, shape (n,)
         How far each degree of freedom has been from its start.
-    ahead, swept, path : numpy.ndarray, shape (n,)
-        Of every few steps of controlled error, local errors e and rates v: Σ e v, Σ h v², and Σ h |v| of all.
+    ahead, swept, bent, path : numpy.ndarray, shape (n,)
+        Of one step of a few, local errors e, rates v and accelerations a: Σ e v, Σ h v², Σ h a², and Σ h |v| of all.
     """
 
     start: float = 0.0
@@ -80,6 +80,7 @@ class Sums:
     moved: np.ndarray = field(default_factory=lambda: np.zeros(0))
     ahead: np.ndarray = field(default_factory=lambda: np.zeros(0))
     swept: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    bent: np.ndarray = field(default_factory=lambda: np.zeros(0))
     path: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
@@ -98,7 +99,7 @@ class Books:
         self.loses = self.dissipates or not method.symmetric  # steps that lead back in time take nothing for good
         kinetic, stored, power = self.model.energy(state)
         self.sums = Sums(kinetic + stored, kinetic, kinetic=kinetic, stored=stored, power=power)
-        for name in ("moved", "ahead", "swept", "path"):
+        for name in ("moved", "ahead", "swept", "bent", "path"):
             setattr(self.sums, name, np.zeros(self.model.n))
 
     def enter(self, before: Point, after: Point, curve: Curve) -> None:
@@ -122,11 +123,12 @@ class Books:
         """Whether the error of the step about to be entered is added up."""
         return looking(self.sums.entered)
 
-    def miss(self, error: np.ndarray, v: np.ndarray, h: float) -> None:
-        """Add up the local error of a step that ends at some rates."""
-        sums = self.sums
+    def miss(self, error: np.ndarray, after: Point, h: float) -> None:
+        """Add up the local error of a step that ends at a point."""
+        sums, v, a = self.sums, after.state.v, after.rate
         sums.ahead = sums.ahead + error * v
         sums.swept = sums.swept + h * v * v
+        sums.bent = sums.bent + h * a * a
         sums.path = sums.path + LOOKED_AT * h * np.abs(v)
 
     def jump(self, before: Point, after: Point, step: float) -> None:
