@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import time
+from dataclasses import astuple
 from functools import cache
 from typing import Any
 
@@ -191,7 +192,7 @@ def test_a_run_of_a_lagging_motor_stopped_at_a_sample_goes_on_with_the_same_book
     for cut in (PERIOD, 6 * PERIOD):
         half = fc.simulate(model, servo, until=cut, **how)
         rest = fc.simulate(model, servo, until=END, method=METHODS[method], start=half.checkpoint)
-        assert rest.report.energy == whole
+        assert astuple(rest.report.energy) == pytest.approx(astuple(whole), rel=1e-12)  # a last digit may differ
 
 
 def happened(run: fc.Run, until: float = np.inf) -> tuple[list[Any], list[float]]:
