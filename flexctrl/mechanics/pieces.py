@@ -10,6 +10,8 @@ from flexctrl.mechanics.beam import NodeMotion, reach
 if TYPE_CHECKING:
     import casadi as ca
 
+SLIGHT = 1e-14
+"""Share of a rope's length that it may lack and still count as taut."""
 LINE_PARAMETERS = ("stiffness", "length", "damping")
 BODY_PARAMETERS = ("mass", "xx", "yy", "zz", "xy", "xz", "yz")
 DRIVE_PARAMETERS = (
@@ -83,7 +85,7 @@ def unilateral(m: LineMotion, pull: ca.SX) -> ca.SX:
     """
     import casadi as ca
 
-    slight = 1e-14 * m.p["length"]
+    slight = SLIGHT * m.p["length"]
     return ca.if_else(m.length > m.p["length"] - slight, ca.fmax(pull, -slight * m.p["stiffness"]), 0.0)
 
 

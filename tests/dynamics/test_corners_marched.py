@@ -112,6 +112,15 @@ def test_a_stiff_flank_is_met_when_it_is(damping, step, plainly):
         assert run.events[0].t == pytest.approx((0.1 * 0.05 / 1.9) ** 0.5, abs=1e-9)
 
 
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e3, 0.3), (3.2e3, 0.71), (2.7e4, 1.3)])
+def test_a_step_onto_a_flank_that_uses_up_its_iterations_is_tried_again(stiffness, damping, plainly):
+    """With the tangent of the gap, and with ones made anew: whether it is too long is for its error to say."""
+    asked = sampled(geared(stiffness=stiffness, damping=damping))
+    run, plain = (take(**asked) for take in (fc.simulate, plainly))
+    assert (run.report.steps, run.report.rejected_steps) == (plain.report.steps, plain.report.rejected_steps)
+    assert run.final.v == pytest.approx(plain.final.v, abs=1e-6 * np.abs(plain.final.v).max())
+
+
 @pytest.mark.parametrize("controlled", [False, True])
 def test_a_run_whose_method_makes_energy_ends_at_a_balance(controlled, plainly):
     """Which comes after so many steps, however many are taken at once: here after 32, in the damped flank's throes."""

@@ -60,6 +60,52 @@ def test_fixed_steps_without_damping_keep_the_energy_of_an_impact_they_do_not_re
     assert run.report.energy_residual < 1e-2
 
 
+def hung(mass: float, EA: float, up: float, backend: object) -> tuple[fc.Model, fc.State]:
+    """A load on a rope of 2 m, let go higher up than where that is taut."""
+    load, length = fc.PointMass("load", (0, 0, up - 2.0), mass), 2.0
+    rope = fc.Rope("rope", (0, 0, 0), load.node, EA=EA, length=length)
+    joints = [fc.Support(load.node, "u v"), fc.Support(rope.start, "u v w"), fc.Pin(rope.end, load.node)]
+    structure = fc.Structure([load, rope], joints, outputs=[fc.Velocity("v", load.node, "z")])
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()], backend)
+    return model, model.rest
+
+
+def hoisted(mass: float, EA: float, up: float, backend: object) -> tuple[fc.Model, fc.State]:
+    """The same on the rope of a winch, from whose drum most of it has been paid out."""
+    load, top, out = fc.PointMass("load", (0, 0, -1.0), mass), fc.PointMass("top", (0, 0, 0), 1.0), 12.0
+    winch = fc.Winch("rope", load.node, top.node, EA=EA, radius=0.1, ratio=10.0, inertia=1e6 * mass)
+    structure = fc.Structure(
+        [load, top],
+        [fc.Support(top.node), fc.Support(load.node, "u v")],
+        drives=[winch],
+        outputs=[fc.Velocity("v", load.node, "z")],
+    )
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()], backend)
+    move = np.where(np.array(model.coordinates) == "load_0_w", 1.0 - out + up, (out - 1.0) / 0.01)
+    return model, model.advance(model.rest, move, np.zeros(model.n), 0.0)
+
+
+LET_GO = {
+    "rope": (hung, 1.088, 1302915.77344, 0.7816, 0.45, fc.GeneralizedAlpha(1e-3)),
+    "heavy": (hung, 357.0, 382264811.46, 0.08641, 0.2, fc.GeneralizedAlpha(1e-3)),
+    "chosen steps": (hung, 188.8, 3813854.4, 0.8509, 0.6, None),
+    "winch": (hoisted, 19.4980233300813, 117776848.58, 0.2674981284508647, 0.36, fc.GeneralizedAlpha(1e-3)),
+}
+
+
+@pytest.mark.parametrize("backend", [fc.Compiled(), fc.CasadiVM()], ids=["compiled", "plain"])
+@pytest.mark.parametrize("case", LET_GO.values(), ids=LET_GO)
+def test_what_a_rope_throws_back_falls_freely(case, backend):
+    """From the first step on, wherever within the last digits of places that sets out from the corner."""
+    make, mass, EA, up, until, method = case
+    model, start = make(mass, EA, up, backend)
+    run = fc.simulate(model, until=until, start=start, method=method)
+    leaves = next(event.t for event in run.events if not event.rising)
+    flying = run.t > leaves + 1e-9
+    assert flying.sum() > 3
+    assert np.diff(run["v"][flying]) == pytest.approx(-G * np.diff(run.t[flying]), abs=1e-6)
+
+
 @pytest.mark.parametrize("stiffness", [1e4, 1e8, 1e12])
 def test_a_block_between_stops_of_any_stiffness(stiffness):
     """2π/ω + 2 b/v, thirty contacts of 30 ms to 3 µs."""

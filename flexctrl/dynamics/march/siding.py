@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from flexctrl.dynamics.march.books import copy, reach
 from flexctrl.dynamics.march.corners import over_a_jump
-from flexctrl.dynamics.march.record import DONE, EVALUATE, FRESH, WANTS_TANGENT, March
-from flexctrl.dynamics.march.step import newton
+from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
+from flexctrl.dynamics.march.step import newton, step
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear
 
@@ -20,8 +20,22 @@ __all__ = ["decided"]
 def decided(m: March) -> int:
     """Iterate on, with tangents made anew, in a step that is solved while forces jump between these and its end.
 
-    Nodes are where the step ends.
+    Where that fails, the step is tried from its start with such tangents, as any other that fails. Nodes are where it
+    ends.
     """
+    status = iterated(m)
+    if status == FAILED and m.asking == 0:
+        m.attempt = 1
+        status = step(m)
+        if status == DONE:
+            reach(m)
+            status = iterated(m)
+    return status
+
+
+@seldom
+def iterated(m: March) -> int:
+    """Iterate on until forces do not jump between where the last tangent was made and where the step ends."""
     status = DONE
     while status == DONE and m.swift != 1 and over_a_jump(m.corners, m.flat):
         set_back(m)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.effects.backlash import gaps_of
+from flexctrl.mechanics.pieces import SLIGHT
 from flexctrl.model.laws.loose_kinds import loose_names
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
@@ -32,6 +33,7 @@ _ROUND_OFF = 1e-12
 _DIGITS = 16.0 * float(np.finfo(float).eps)
 _BESIDE = 0.05
 _TINY = 1e-300
+_Size = TypeVar("_Size", float, np.ndarray)
 
 
 @dataclass(frozen=True)
@@ -149,8 +151,8 @@ class Kinks:
     def _winch(self, i: int, d: Winch) -> list[Turn]:
         """Where a rope that stretches goes slack, and where there is hardly any left."""
         least, dust = d.shortest - d.length, _ROUND_OFF * d.length
-        dust_here = _DIGITS * (d.length + self._reach)
-        slack = Turn(i, 1.0, -1.0 / d.effective_ratio, 0.0, dust_here, jumps=d.damping > 0.0)
+        out, limp = (1.0 - SLIGHT) / d.effective_ratio, -SLIGHT * d.length  # just short of taut counts as taut
+        slack = Turn(i, 1.0, -out, limp, self._digits(d.length), jumps=d.damping > 0.0)
         end = Turn(i, 0.0, 1.0 / d.effective_ratio, least, dust, _down(d))
         return [slack, end] if self.model.large else [end]
 
@@ -232,9 +234,12 @@ class Kinks:
 
     @cached_property
     def dust(self) -> np.ndarray:
-        """Values below these are zero but for round-off: a stiff rope that is taut by more bears a load."""
+        """Values below these are zero but for round-off: a stiff rope that is taut by more bears a load.
+
+        One that is slack by more bears none: its law takes it for taut until it is short of that by `SLIGHT`.
+        """
         longest = [_ROUND_OFF * track.places[-1] for track in self.model.structure.tracks for _ in range(2)]
-        return np.concatenate([_DIGITS * (self.lines[1] + self._reach), [turn.dust for turn in self._turns], longest])
+        return np.concatenate([self._digits(self.lines[1]), [turn.dust for turn in self._turns], longest])
 
     @cached_property
     def jumps(self) -> np.ndarray:
@@ -248,6 +253,10 @@ class Kinks:
             return np.zeros(0)
         values = self.values(state, state)[self.jumps]
         return np.where(np.abs(values) > self.dust[self.jumps], np.sign(values), 0.0)
+
+    def _digits(self, length: _Size) -> _Size:
+        """What is zero but for round-off of the stretch of lines."""
+        return SLIGHT * length + _DIGITS * (length + self._reach)
 
     @cached_property
     def _reach(self) -> float:
