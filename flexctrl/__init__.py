@@ -87,6 +87,7 @@ _HOMES = {
         "RelativeError",
     ),
     "flexctrl.dynamics.alpha.method": ("AdaptiveAlpha", "GeneralizedAlpha"),
+    "flexctrl.dynamics.methods.checked": ("Checked", "Unchecked"),
     "flexctrl.dynamics.methods.extrapolation": ("Richardson",),
     "flexctrl.dynamics.methods.midpoint": ("ConservingMidpoint",),
     "flexctrl.dynamics.methods.explicit": ("ExplicitRungeKutta",),

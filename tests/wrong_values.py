@@ -189,6 +189,8 @@ RUNS: dict[str, Call] = {
     ),
     "GeneralizedAlpha": (fc.GeneralizedAlpha, {"step": 1e-3, "rho": 0.5}),
     "Richardson": (fc.Richardson, {"method": fc.GeneralizedAlpha(0.01)}),
+    "Checked": (fc.Checked, {"method": fc.GeneralizedAlpha(0.01)}),
+    "Unchecked": (fc.Unchecked, {"method": fc.AdaptiveAlpha()}),
     "ConservingMidpoint": (fc.ConservingMidpoint, {"step": 1e-3}),
     "ExplicitRungeKutta": (
         fc.ExplicitRungeKutta,

@@ -19,9 +19,9 @@ from flexctrl.structure.freedoms import listed, numbers
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Constant", "PiecewisePolynomial", "Sum", "Trajectory", "simplified"]
+__all__ = ["ROUND_OFF", "Constant", "PiecewisePolynomial", "Sum", "Trajectory", "simplified"]
 
-_ROUND_OFF = 1e-12  # a sample instant this near a break (relative) counts as past it, not a sample early
+ROUND_OFF = 1e-12  # a sample instant this near a break (relative) counts as past it, not a sample early
 
 
 class Trajectory(ABC):
@@ -152,7 +152,7 @@ class PiecewisePolynomial(Trajectory):
 
     @cached_property
     def _reached(self) -> tuple[float, ...]:
-        return tuple(knot - _ROUND_OFF * (1.0 + abs(knot)) for knot in self.knots)
+        return tuple(knot - ROUND_OFF * (1.0 + abs(knot)) for knot in self.knots)
 
     @cached_property
     def _descending(self) -> tuple[tuple[float, ...], ...]:
@@ -320,7 +320,7 @@ def distinct(instants: Iterable[float]) -> tuple[float, ...]:
     """Return instants in order, those that differ by round-off only once."""
     kept: list[float] = []
     for instant in sorted(instants):
-        if not kept or instant - kept[-1] > _ROUND_OFF * (1.0 + abs(instant)):
+        if not kept or instant - kept[-1] > ROUND_OFF * (1.0 + abs(instant)):
             kept.append(instant)
     return tuple(kept)
 

@@ -24,7 +24,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "check_same", "load_checkpoint", "machine_of"]
 
-_FORMAT = 10
+_FORMAT = 11
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
@@ -47,12 +47,16 @@ class Checkpoint:
         That of the run.
     base : numpy.ndarray, shape (inputs,)
         Constant inputs under the controller's.
+    law : str
+        What its controller reads and commands, and when.
     point : Point
         State of the machine, its accelerations, state of the controller.
     memory : object
         What the stepper goes on from.
     passed : int
         Sample instants or breaks that are over.
+    found : float
+        The next instant found at which a law changes with time alone [s]; infinity if none is.
     mark : Mark
         Step length, and what is left to the next stop.
     rows : int
@@ -79,9 +83,11 @@ class Checkpoint:
     pace: Pace
     tolerance: Tolerance
     base: np.ndarray
+    law: str
     point: Point
     memory: Any
     passed: int
+    found: float
     mark: Mark
     rows: int
     every: float | None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.design.controller import Controller, as_controller
+from flexctrl.design.piecewise import ROUND_OFF
 from flexctrl.dynamics.said import CommandError, blamed, reals, state_of
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import FLOAT, Compiled
@@ -45,11 +46,14 @@ class Feed:
     base : numpy.ndarray, shape (inputs,)
         Constant inputs under the controller's.
     controller : Controller or None
+    met : list of float
+        The last instant at which a run has found the controller to jump [s].
     """
 
     model: Plant
     base: np.ndarray
     controller: Controller | None
+    met: list[float] = field(default_factory=list, compare=False)
 
     @property
     def sample_time(self) -> float:
@@ -65,6 +69,14 @@ class Feed:
     def breaks(self) -> tuple[float, ...]:
         """Instants at which a continuous command jumps."""
         return tuple(getattr(self.controller, "breaks", ())) if self.continuous else ()
+
+    @property
+    def told_law(self) -> str:
+        """What the controller reads and commands, and when, in words."""
+        if (c := self.controller) is None:
+            return "none"
+        when = "continuous" if self.continuous else f"sampled every {c.sample_time:.12g} s"
+        return f"{when}: {', '.join(c.inputs) or 'nothing'} to {', '.join(c.outputs)}"
 
     @cached_property
     def reads(self) -> np.ndarray:
@@ -218,8 +230,8 @@ class Feed:
 
     def _short_of_break(self, t: float) -> float:
         """Return t, or just before where the command jumps there: a step that ends at a jump does not feel it."""
-        near = _NEAR * abs(t)
-        return t - near if any(abs(t - b) < near for b in self.breaks) else t
+        near = _NEAR * abs(t) + 2.0 * ROUND_OFF  # what a trajectory takes for its break is a part of a second, too
+        return t - near if any(abs(t - b) < near for b in (*self.breaks, *self.met)) else t
 
     def _answer(self, t: float, y: np.ndarray, before: Supply, h: float) -> Supply:
         c = self.controller

@@ -19,11 +19,13 @@ from flexctrl.dynamics.events.watch import Crossing, Watch
 from flexctrl.dynamics.events.watching import watched
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.interrupt import Interruption
+from flexctrl.dynamics.lookahead import look_ahead
 from flexctrl.dynamics.march.ride import ride, rides
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
+from flexctrl.dynamics.notes.adding import Drift
 from flexctrl.dynamics.notes.growing import growth
 from flexctrl.dynamics.notes.straying import lost, thrown
 from flexctrl.dynamics.pacing import controlled, fixed
@@ -56,6 +58,7 @@ __all__ = ["Journey", "Plan"]
 
 _FORESEEN = 20_000
 _SECONDS = 0.1
+_NONE = Drift()
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,8 @@ class Journey:
         Events up to this time have been told by the run that this one goes on from [s].
     balked : bool
         Whether many steps at once have just ended before one that is to be taken by itself.
+    horizon : float
+        Until when the law is known to follow a line, with what it reads held [s]; infinity if nothing is in sight.
     """
 
     plan: Plan
@@ -121,8 +126,10 @@ class Journey:
     message: str = ""
     fault: BaseException | None = None
     notes: tuple[str, ...] = ()
+    drift: Drift = _NONE
     told: float = -math.inf
     balked: bool = False
+    horizon: float = math.inf
     saved: Checkpoint | None = None
     _memory: Any = None
     _counts: Counts = field(default_factory=Counts)
@@ -232,7 +239,8 @@ class Journey:
                 self._renew(stop)
                 self._pause()
                 continue
-            self.go(stop, self.plan.until)
+            look_ahead(self)
+            self.go(self.stops.next, self.plan.until)
             self._pause()
             if apart := self.plan.model.apart(self.point.state):
                 raise StepError(self.stepper.counts.worst, f"{apart} (t = {self.point.state.t:.6g} s)")
@@ -330,9 +338,11 @@ class Journey:
             self.plan.method.pace,
             self.plan.tolerance,
             self.plan.feed.base,
+            self.plan.feed.told_law,
             self.point,
             self._memory,
             self.stops.passed,
+            self.stops.found,
             replace(self.mark),
             self.rows.count,
             self.rows.every,
@@ -350,7 +360,7 @@ class Journey:
         """New inputs at a sample instant or break; accelerations jump with them."""
         if self.point.state.t != stop:
             self.point = replace(self.point, state=self.point.state.with_(t=stop))
-        self.stops.passed += 1
+        self.stops.go_by(stop)
         self.mark.left = 0
         feed, before, state = self.plan.feed, self.point.supply, self.point.state
         fresh = feed.restart(state, before) if feed.continuous else feed.sample(state, before)

@@ -46,6 +46,7 @@ def controlled(journey: Journey, stop: float, until: float) -> None:
     h = min(mark.size, pace.largest)
     h = min(h, mark.cap) if mark.follow else h
     h = left if h > 0.99 * left else 0.5 * left if h > 0.5 * left else h
+    h = min(h, journey.horizon - t)
     if t + h > until + journey.tick:
         if ends_before(journey, stop):
             return

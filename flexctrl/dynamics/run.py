@@ -133,6 +133,9 @@ class Report:
         where a linear model is integrated exactly.
     drifted : str
         The degree of freedom in which that is most.
+    error : float
+        By how much the run is off, over the largest motion, growth of small differences included: by a coarser run laid
+        beside it (`Checked`); ``drift`` where there is none.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str
@@ -154,6 +157,7 @@ class Report:
     closure_error: float
     drift: float
     drifted: str
+    error: float
     message: str
     notes: tuple[str, ...]
 
@@ -169,6 +173,7 @@ class Report:
             f"converged last: {self.worst or 'none'}",
             *([f"loops of rigid parts closed to {self.closure_error:.2g}"] if self.closure_error else []),
             *([f"errors of steps add up to {self.drift:.2g} of the motion of {self.drifted}"] if self.drift else []),
+            *([f"off by {self.error:.2g} of the motion, by a coarser run"] if self.error != self.drift else []),
             *([self.message] if self.message else []),
             *self.notes,
         ]

@@ -19,21 +19,20 @@ from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply, feed_of
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
-from flexctrl.dynamics.notes.adding import Drift, drifted
-from flexctrl.dynamics.notes.straying import strayed
-from flexctrl.dynamics.notes.unsized import unsized
-from flexctrl.dynamics.notes.unsure import unsure
+from flexctrl.dynamics.methods.checked import Checked, checked
+from flexctrl.dynamics.notes.beside import may_grow, told_beside
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track, curves_of
-from flexctrl.dynamics.records.record import InMemory, Record, Unwritten
+from flexctrl.dynamics.records.record import InMemory, Record
 from flexctrl.dynamics.records.rows import Rows
-from flexctrl.dynamics.run import EnergyBalance, Report, Run, Status, Tolerance
+from flexctrl.dynamics.result import result
+from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.swift.layers import beyond_layers
 from flexctrl.dynamics.swift.settling import quasistatic
 from flexctrl.dynamics.unbegun import UNASKED, unbegun
-from flexctrl.errors import MechanismError, SingularMatrixError, StructureError
+from flexctrl.errors import FlexctrlError, MechanismError, SingularMatrixError, StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest
@@ -43,6 +42,7 @@ from flexctrl.model.state import State
 from flexctrl.structure.freedoms import HUGE
 
 _ROWS = 1000
+_LONGER, _SECONDS = 2.0, 0.2
 
 
 def simulate(
@@ -77,10 +77,12 @@ def simulate(
         tolerance, events and ``every`` must be those of the run it was taken from. Beyond an event that ended that run
         it goes on until one happens again.
     inputs : mapping of str to float, optional
-        Constant inputs, applied as a step at the start; a controller's commands add to them.
+        Constant inputs, applied as a step at the start; a controller's commands add to them. A `Checkpoint` brings its
+        own along, and takes no others.
     method : Integrator, optional
-        Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``; for a linear model `Exact`, with a state at
-        every row, or at the steps of the run that it goes on from.
+        Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``, with a coarser run laid beside where small
+        differences may grow (`Checked`); for a linear model `Exact`, with a state at every row, or at the steps of the
+        run that it goes on from.
     tolerance : Tolerance, optional
         For error-controlled methods.
     every : float, optional
@@ -129,24 +131,66 @@ def simulate(
             check_state(model, start, "simulate: start")
             model.__dict__["_begun"] = start
     feed = feed_of(plant, controller, _base(plant, start, inputs))
-    tell = progress or _untold
+    method, check = checked(method or AdaptiveAlpha())
     plan = Plan(
-        plant, feed, method or AdaptiveAlpha(), tolerance or Tolerance(), until, tell, autosave, time.perf_counter()
+        plant,
+        feed,
+        method,
+        tolerance or Tolerance(),
+        until,
+        progress or _untold,
+        autosave,
+        time.perf_counter(),
     )
-    watch = _watch(plan, events_of(events))
+    with np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
+        journey, run = _travelled(plan, start, events_of(events), record, spacing)
+        if check is not None and not isinstance(start, Checkpoint) and may_grow(journey):
+            return _laid_beside(run, journey, check, start)
+    return run
+
+
+def _travelled(
+    plan: Plan,
+    start: State | Rest | Checkpoint | None,
+    events: tuple[Event, ...],
+    record: Record,
+    spacing: float | None,
+) -> tuple[Journey, Run]:
+    """A run from its start to where it ends, and what it leaves."""
+    model, feed = plan.model, plan.feed
+    watch = _watch(plan, events)
     if isinstance(start, Checkpoint):
         _check_going_on(plan, start, watch, spacing)
-    stepper = plan.method.stepper(plant, feed, plan.tolerance)
-    curve = curves_of(plant, stepper)
-    recorder = record.start((*plant.outputs, *plant.inputs), start.rows if isinstance(start, Checkpoint) else 0)
+    stepper = plan.method.stepper(model, feed, plan.tolerance)
+    curve = curves_of(model, stepper)
+    recorder = record.start((*model.outputs, *model.inputs), start.rows if isinstance(start, Checkpoint) else 0)
     try:
-        rows = Rows(feed, spacing, until, recorder, curve)
+        rows = Rows(feed, spacing, plan.until, recorder, curve)
         track = Track(feed, record.states, curve)
-        return _run(plan, stepper, start, watch, rows, track)
+        journey = _run(plan, stepper, start, watch, rows, track)
+        return journey, result(journey)
     finally:
         recorder.close()
         if isinstance(stepper, Reusable):
             stepper.done()
+
+
+def _laid_beside(run: Run, journey: Journey, method: Checked, start: State | Rest | None) -> Run:
+    """The run with what a coarser one tells of it; that is ended where it takes far longer."""
+    plan, end = journey.plan, run.final.t
+    coarser, tolerance = method.coarser(plan.tolerance)
+    latest = time.perf_counter() + _LONGER * run.report.wall_s + _SECONDS
+
+    def ended(share: float) -> None:
+        if time.perf_counter() > latest:
+            raise KeyboardInterrupt
+
+    beside = replace(plan, method=coarser, tolerance=tolerance, until=end, tell=ended, autosave=None)
+    try:
+        _, coarse = _travelled(beside, start, (), InMemory(), end)
+    except (FlexctrlError, KeyboardInterrupt):
+        return run
+    return told_beside(run, coarse, journey, method.longer)
 
 
 def _plant(linear: LinearModel, method: Integrator | None, step: float) -> tuple[LinearPlant, Integrator]:
@@ -172,10 +216,12 @@ def _untold(share: float) -> None:
 
 
 def _base(model: Plant, start: State | Rest | Checkpoint | None, inputs: Mapping[str, float] | None) -> np.ndarray:
+    if isinstance(start, Checkpoint):
+        if inputs:
+            check_same("set of inputs", model.input_vector(inputs).tolist(), start.base.tolist())
+        return start.base
     if inputs is not None:
         return model.input_vector(inputs)
-    if isinstance(start, Checkpoint):
-        return start.base
     return start.inputs if isinstance(start, Rest) else model.input_vector({})
 
 
@@ -186,17 +232,16 @@ def _run(
     watch: Watch,
     rows: Rows,
     track: Track,
-) -> Run:
+) -> Journey:
     try:
         if isinstance(start, Checkpoint):
             journey = _resumed(plan, stepper, start, watch, rows, track)
         else:
             journey = _begun(plan, stepper, start, watch, rows, track)
     except KeyboardInterrupt:
-        return _result(unbegun(plan, stepper, start, watch, rows, track))
-    with np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
-        journey.travel()
-        return _result(journey)
+        return unbegun(plan, stepper, start, watch, rows, track)
+    journey.travel()
+    return journey
 
 
 def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:
@@ -255,6 +300,7 @@ def _check_going_on(plan: Plan, start: Checkpoint, watch: Watch, every: float | 
     check_same("tolerance", plan.tolerance, start.tolerance)
     check_same("number of events", watch.count if start.passed != UNASKED else 0, len(start.sides))
     check_same("spacing of rows (every)", every, start.every)
+    check_same("controller", plan.feed.told_law, start.law)
 
 
 def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch, rows: Rows, track: Track) -> Journey:
@@ -267,70 +313,12 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span
     books = Books(plan.feed, start.point.state, plan.method, plan.tolerance)
     books.sums, books.first = replace(start.sums), start.first
-    stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed)
+    stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed, start.found)
+    plan.feed.met[:] = [start.found]
     rows.count = start.rows
     journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, replace(start.mark))
     journey.told, journey.balked = start.told, start.balked
     return journey
-
-
-def _result(journey: Journey) -> Run:
-    plan, state, supply = journey.plan, journey.point.state, journey.point.supply
-    checkpoint = journey.saved
-    assert checkpoint is not None
-    if abs(state.t - plan.until) <= 1e-9 * plan.until:
-        state = state.with_(t=plan.until)
-    try:
-        rows = journey.rows.finish(state, supply.u)
-        journey.rows.recorder.flush()
-    except Unwritten as error:
-        journey.fail(error)
-        rows = journey.rows.recorder.table()
-    width = len(plan.model.outputs)
-    drift = drifted(journey)
-    journey.notes += strayed(journey) + unsized(journey) + unsure(journey, rows[:, 1 : 1 + width])
-    if drift.note and journey.status is not Status.FAILED:
-        journey.notes += (drift.note,)
-    return Run(
-        rows[:, 0],
-        plan.model.outputs,
-        plan.model.inputs,
-        rows[:, 1 : 1 + width],
-        rows[:, 1 + width :],
-        state,
-        journey.rows.frames,
-        journey.status,
-        _report(journey, drift),
-        plan.model.structure.name,
-        tuple(journey.events),
-        checkpoint,
-        journey.track,
-        journey.fault,
-    )
-
-
-def _report(journey: Journey, drift: Drift) -> Report:
-    plan, mark, counts, sums = journey.plan, journey.mark, journey.stepper.counts, journey.books.sums
-    model = plan.model
-    return Report(
-        method=repr(plan.method),
-        order=plan.method.order,
-        damping=plan.method.damping,
-        steps=mark.steps,
-        rejected_steps=mark.rejected,
-        newton_iterations=counts.newton,
-        factorisations=counts.factorisations,
-        wall_s=time.perf_counter() - plan.began,
-        dofs=model.n,
-        energy=EnergyBalance(sums.start, sums.work, sums.lost, sums.kinetic, sums.stored),
-        energy_residual=journey.books.residual,
-        worst=model.coordinates[counts.worst] if model.n else "",
-        closure_error=sums.closure,
-        drift=drift.share,
-        drifted=drift.freedom,
-        message=journey.message,
-        notes=(*model.notes, *journey.notes),
-    )
 
 
 __all__ = ["simulate"]

@@ -89,6 +89,8 @@ class Mark:
         The step [s] that the method's own accelerations were made for at a corner; 0 once it has been taken.
     taken : float
         Of steps of one length, the last [s], or the one that accelerations were made for since; 0 before the first.
+    swings : tuple of float
+        By how much a law has changed with time alone within a step, at most, and its states' rates; empty if not asked.
     """
 
     size: float
@@ -100,6 +102,7 @@ class Mark:
     cap: float = 0.0
     led: float = 0.0
     taken: float = 0.0
+    swings: tuple[float, ...] = ()
 
 
 class StepError(ArithmeticError):

@@ -20,18 +20,28 @@ class Stops:
         In order.
     passed : int
         How many are over.
+    found : float
+        An instant beside these at which a law was found to change with time [s]; infinity if there is none.
     """
 
     sample: float
     breaks: tuple[float, ...]
     passed: int = 0
+    found: float = math.inf
 
     @property
     def next(self) -> float:
         """The next instant; infinity if there is none."""
         if self.sample:
             return (self.passed + 1) * self.sample
-        return self.breaks[self.passed] if self.passed < len(self.breaks) else math.inf
+        return min(self.found, self.breaks[self.passed] if self.passed < len(self.breaks) else math.inf)
+
+    def go_by(self, t: float) -> None:
+        """Leave an instant behind."""
+        if t == self.found:
+            self.found = math.inf
+        else:
+            self.passed += 1
 
     def skip(self, t: float) -> None:
         """Leave out the breaks up to a time."""

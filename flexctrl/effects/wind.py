@@ -85,6 +85,19 @@ class Wind(Effect):
                     "let the wind blow along the axis, or describe the machine in axes that do not turn"
                 )
 
+    def acts(self, structure: Structure) -> bool:
+        """Tell whether there is any drag: neither area nor density is zero.
+
+        Parameters
+        ----------
+        structure : Structure
+
+        Returns
+        -------
+        bool
+        """
+        return bool(self.density and self.shares(structure))
+
     def shares(self, structure: Structure) -> list[tuple[Node, float]]:
         """Return the nodes that have a drag area, and how much of it [m²].
 

@@ -62,7 +62,7 @@ def without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:
     kinds = (FollowerForce, FollowerTorque, Torque)
     signals = model.structure.inputs if model.large else ()
     turning = any(isinstance(e, RotatingFrame) and any(e.rate) for e in model.effects)
-    drag = tuple("Wind" for e in model.effects if turning and isinstance(e, Wind))
+    drag = tuple("Wind" for e in model.effects if turning and isinstance(e, Wind) and e.acts(model.structure))
     return tuple(s.name for s, value in zip(signals, u, strict=False) if value and isinstance(s, kinds)) + drag
 
 

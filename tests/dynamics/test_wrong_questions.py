@@ -10,6 +10,7 @@ import pytest
 from long_running import Servo, arm
 
 import flexctrl as fc
+from flexctrl.design import pd
 from flexctrl.errors import MechanismError, StructureError
 
 
@@ -127,6 +128,31 @@ def test_a_run_goes_on_as_it_was_asked_for_and_not_backwards(model):
     with pytest.raises(StructureError, match=r"another spacing of rows \(every\) \(None there, 0.05 here\)"):
         fc.simulate(model, until=0.2, start=stopped, every=0.05)
     assert fc.simulate(model, until=0.2, start=stopped).status is fc.Status.FINISHED
+
+
+def test_a_run_goes_on_under_the_law_and_the_inputs_that_it_had():
+    """Told by where the run stops: what it commands is not looked at."""
+    spring, mass = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=100.0), fc.PointMass("mass", (1, 0, 0), 1.0)
+    structure = fc.Structure(
+        [spring, mass],
+        [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")],
+        inputs=[fc.Force("force", mass.node, "x"), fc.Force("load", mass.node, "x")],
+        outputs=[fc.Position("x", mass.node, "x"), fc.Velocity("v", mass.node, "x")],
+    )
+    model = fc.assemble(structure, [fc.LargeRotation()])
+    law = pd(kp=5.0, kd=1.0, measured="x", rate="v", command="force")
+    laws = [None, fc.Sampled(law, 0.01), fc.Sampled(law, 0.02), law]
+    for controller in laws:
+        half = fc.simulate(model, controller, until=0.1, inputs={"load": 1.0}).checkpoint
+        runs = [fc.simulate(model, controller, until=0.2, start=half, inputs=u) for u in (None, {}, {"load": 1.0})]
+        assert all(np.array_equal(run.y, runs[0].y) for run in runs)
+        assert runs[0]["load"][-1] == 1.0
+        with pytest.raises(StructureError, match=r"the checkpoint is of another set of inputs .*50.0"):
+            fc.simulate(model, controller, until=0.2, start=half, inputs={"load": 50.0})
+        for other in laws:
+            if other is not controller:
+                with pytest.raises(StructureError, match="the checkpoint is of another controller"):
+                    fc.simulate(model, other, until=0.2, start=half)
 
 
 class Unasked(Servo):

@@ -93,6 +93,26 @@ def test_no_area_is_no_wind():
     assert plain.n == calm.n
 
 
+@pytest.mark.parametrize("wind", [{}, {"sm": 0.0}, {"big": 0.0}])
+@pytest.mark.parametrize("density", [0.0, 1.25])
+def test_wind_of_no_strength_changes_no_bit(wind, density):
+    """Nor how a light part on a stiff spring sets out, which is another matter where drag acts."""
+    big, small = fc.PointMass("big", (0, 0, 0), 1.0), fc.PointMass("sm", (1, 0, 0), 1e-3)
+    spring = fc.Spring("sp", (0, 0, 0), (1, 0, 0), stiffness=1e8)
+    joints = [fc.Pin(big.node, spring.start), fc.Pin(spring.end, small.node)]
+    joints += [fc.Support(big.node, "u v w"), fc.Support(small.node, "v w")]
+    push, seen = fc.Force("f", small.node, "x"), fc.Position("x", small.node, "x")
+    structure = fc.Structure([big, small, spring], joints, inputs=[push], outputs=[seen])
+    how = {"until": 0.5, "inputs": {"f": 100.0}, "method": fc.GeneralizedAlpha(0.01)}
+    without = fc.simulate(fc.assemble(structure, [LARGE]), **how)
+    blown = fc.simulate(fc.assemble(structure, [LARGE, fc.Wind(wind, density=density)]), **how)
+    assert blown.status is fc.Status.FINISHED
+    assert np.array_equal(blown.y, without.y)
+    if wind and not density:
+        felt = fc.assemble(structure, [LARGE, fc.Wind({"sm": 1.0}, density=0.0)])
+        assert np.array_equal(fc.simulate(felt, **how).y, without.y)
+
+
 def test_the_wind_frame_is_the_machines():
     """Blown at speed w at rest, or moving at −w in still air: the same force."""
     still, a = blown(drop=True), np.zeros(1)

@@ -83,8 +83,10 @@ class Weaver:
         """
         w, found, drawn = self.weave, np.zeros((len(times), self.columns)), []
         w.due, w.spacing = due, spacing
-        for start in range(0, len(times), _ROOM):
-            part = slice(start, start + _ROOM)
+        few = len(times) > 0 and times[-1] - times[0] < (_FRAMES - 2) * spacing
+        room = _ROOM if few else _FRAMES  # in a step far beyond the end of a run, each row may be due for drawing
+        for start in range(0, len(times), room):
+            part = slice(start, start + room)
             count = w.wanted = len(times[part])
             w.steps[:count], w.times[:count], w.ends[:count] = steps[part], times[part], ends[part]
             self._run()

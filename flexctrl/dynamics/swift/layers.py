@@ -63,7 +63,7 @@ def beyond_layers(
     tuple of State, Supply and tuple of str
     """
     model = feed.model
-    if not isinstance(model, Model) or not any(isinstance(e, Wind) and e.areas for e in model.effects):
+    if not isinstance(model, Model) or not any(isinstance(e, Wind) and e.acts(model.structure) for e in model.effects):
         return state, supply, ()
     span = pace.step if isinstance(pace, Fixed) else unseen(feed, state, supply, tolerance)
     layers = _Layers(feed, supply, span)

@@ -18,6 +18,7 @@ from flexctrl.dynamics.scales import once
 from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.effects.wind import Wind
 from flexctrl.errors import SingularMatrixError
+from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
 
@@ -50,7 +51,7 @@ def may_throw(model: Plant) -> bool:
     -------
     bool
     """
-    windy = any(isinstance(e, Wind) and e.areas for e in model.effects)
+    windy = isinstance(model, Model) and any(isinstance(e, Wind) and e.acts(model.structure) for e in model.effects)
     return not (model.switches.names or model.motion.flows.size or windy or weightless(model).size)
 
 

@@ -54,7 +54,7 @@ def wind_families(structure: Structure, effects: Sequence[Effect]) -> tuple[Fami
     tuple of Family
     """
     frames = tuple(e for e in effects if isinstance(e, RotatingFrame))
-    winds = (e for e in effects if isinstance(e, Wind) and e.density and e.shares(structure))
+    winds = (e for e in effects if isinstance(e, Wind) and e.acts(structure))
     return tuple(_family(structure, e, frames) for e in winds)
 
 

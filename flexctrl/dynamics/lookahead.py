@@ -1,0 +1,139 @@
+"""Continuous laws that change with time as nobody has told: looked at before each step, so that none passes a pulse.
+
+A trajectory knows its breaks; of any other function of time, or a law of one's own, nothing is known but what it says.
+With what it reads held, it is asked at instants of no rhythm all over the step to come. Where it leaves the straight
+line between the ends of the step by more than a share of how much it has changed so far within any step, the step is
+ended before; a jump is found by bisection, and steps end there as at a break.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from flexctrl.design.controller import LinearController
+from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.steps import Controlled
+from flexctrl.errors import ControllerError
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["look_ahead"]
+
+_FEWEST, _OF_RUN = 32, 4096
+"""Instants in a step, and in as much as the whole run."""
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_BENT, _MISSED = 0.02, 0.5
+"""What steps chosen by their error may leave the line by, and steps of one length: what they would not see at all."""
+_ENOUGH = 8
+_TOUCH = 1e-9
+_DEEPEST, _SMALLEST = 40, 1e-12
+_ROUND_OFF = 1e-12
+
+
+class _Course(NamedTuple):
+    """What a law says from the start of a step on: times (k,), values (k, signals), and the swings that count."""
+
+    times: np.ndarray
+    values: np.ndarray
+    swings: np.ndarray
+
+    def bends(self, end: int) -> float:
+        """By how much it leaves the line to an instant, at most."""
+        share = (self.times[: end + 1] - self.times[0]) / (self.times[end] - self.times[0])
+        line = self.values[0] + share[:, None] * (self.values[end] - self.values[0])
+        return float((np.abs(self.values[: end + 1] - line) / self.swings).max())
+
+
+def look_ahead(journey: Journey) -> None:
+    """Have the next step end where the law's own course in time bends, or jumps.
+
+    Parameters
+    ----------
+    journey : Journey
+        Its horizon is set, and its next stop where there is a jump before the others.
+    """
+    journey.horizon = math.inf
+    plan, mark, stops, t = journey.plan, journey.mark, journey.stops, journey.point.state.t
+    if not _untold(plan.feed) or stops.found < math.inf:
+        return
+    chosen = isinstance(plan.method.pace, Controlled)
+    span = min(mark.size if chosen else plan.method.pace.step, stops.next - t, plan.until - t)  # type: ignore[union-attr]
+    try:
+        end, jumps = _clear(journey, span, _BENT if chosen else _MISSED)
+    except ControllerError:  # what it says when it is asked in earnest is told then
+        return
+    if jumps or (end < math.inf and not chosen):
+        stops.found = max(
+            end, t + 0.5 * journey.tick
+        )  # just behind here is here: the law is asked again, no step taken
+        plan.feed.met[:] = [stops.found]
+        mark.left = 0
+    else:
+        journey.horizon = end
+
+
+def _untold(feed: Feed) -> bool:
+    """Whether the law may change with time as nobody knows beforehand."""
+    return feed.continuous and feed.answering is None and not isinstance(feed.controller, LinearController)
+
+
+def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
+    """Until when the law may be taken for a line in time, infinity if all along a span; and whether it jumps there."""
+    t, until = journey.point.state.t, journey.plan.until
+    for tried in range(_DEEPEST):
+        course = _course(journey, span)
+        last = len(course.times) - 1
+        if course.bends(last) <= limit:
+            return (float(course.times[last]) if tried else math.inf), False
+        bent = next(end for end in range(2, last + 1) if course.bends(end) > limit)
+        if (jump := _jump(journey, course, bent, limit)) is not None:
+            return jump, True
+        if bent > _ENOUGH:
+            return float(course.times[bent - 1]), False
+        span = float(course.times[bent]) - t
+        if span < _SMALLEST * until:
+            break
+    return t + span, False
+
+
+def _course(journey: Journey, span: float) -> _Course:
+    """Ask the law over a span from here."""
+    plan, t, mark = journey.plan, journey.point.state.t, journey.mark
+    count = max(_FEWEST, math.ceil(_OF_RUN * span / plan.until))
+    k = np.arange(count)
+    beyond = span < journey.stops.next - t and span < plan.until - t  # what jumps right at the end is seen, too
+    shares = np.concatenate([[0.0], (k + (_GOLDEN * k + 0.5) % 1.0) / count, [1.0 + (_TOUCH if beyond else -_TOUCH)]])
+    times = t + span * np.sort(shares)
+    values = np.array([_said(journey, s) for s in times.tolist()])
+    swing = np.ptp(values, axis=0)
+    swing[swing <= _ROUND_OFF * np.abs(values).max(axis=0)] = 0.0
+    before = np.array(mark.swings) if mark.swings else np.zeros(swing.size)
+    mark.swings = tuple(np.maximum(swing, before).tolist())
+    return _Course(times, values, np.where(np.array(mark.swings) > 0.0, mark.swings, math.inf))
+
+
+def _said(journey: Journey, t: float) -> np.ndarray:
+    """What the law would say at a time, if it read what it does here."""
+    feed, point = journey.plan.feed, journey.point
+    said = feed.renewed(t, feed.measured(point.state), point.supply)
+    return np.append(said.u, said.rate)
+
+
+def _jump(journey: Journey, course: _Course, bent: int, limit: float) -> float | None:
+    """The first instant after a jump just before one at which the course has left its line; None if it is none."""
+    steps = np.abs(np.diff(course.values[: bent + 1], axis=0)) / course.swings
+    at = int(np.argmax(steps.max(axis=1)))
+    if (whole := float(steps[at].max())) <= limit:
+        return None
+    (a, b), (low, high) = course.times[at : at + 2].tolist(), course.values[at : at + 2]
+    while a < (middle := 0.5 * (a + b)) < b:
+        said = _said(journey, middle)
+        if np.max(np.abs(said - low) / course.swings) > np.max(np.abs(high - said) / course.swings):
+            b, high = middle, said
+        else:
+            a, low = middle, said
+    return b if np.max(np.abs(high - low) / course.swings) > 0.5 * whole else None

@@ -1,0 +1,152 @@
+"""How far a run is off, by a coarser one laid beside it: growth of small differences included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.dynamics.run import Run, Status
+from flexctrl.dynamics.scales import farthest, yardsticks
+from flexctrl.dynamics.steps import Controlled
+from flexctrl.model.model import Model
+from flexctrl.model.state import State
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["may_grow", "told_beside"]
+
+_FAR = 1.0
+_INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
+_TOLD, _AIM = 0.03, 0.01
+_LEAST = 0.1
+"""Where fewer steps than that could be longer, both runs are about the same but for what grows."""
+_PARTED = 0.5
+
+
+def may_grow(journey: Journey) -> bool:
+    """Tell whether small differences may have grown of themselves, and whether that can be found out.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    bool
+        Whether something has swung by more than a radian, gone farther than the machine is large, met corners, or
+        followed a continuous law, which may have corners of its own.
+    """
+    plan, sums = journey.plan, journey.books.sums
+    feed, model, watch = plan.feed, plan.model, journey.watch
+    remembers = feed.controller is not None and not feed.continuous and feed.lowered is None
+    ended = journey.status in (Status.FINISHED, Status.STOPPED)
+    if not ended or remembers or not isinstance(model, Model) or not journey.track.stretches:
+        return False
+    own = {*watch.names, *watch.corner_names}
+    swung = bool((sums.moved > _FAR * yardsticks(model)).any())
+    led = feed.continuous and feed.reads.size > 0
+    return model.large and (swung or led or any(event.name in own for event in journey.events))
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """How far two runs are apart.
+
+    Attributes
+    ----------
+    t : numpy.ndarray, shape (instants,)
+    size : numpy.ndarray, shape (instants,)
+        The most so far, over the largest motion of the run.
+    where : str
+        The node, or the motor's angle, at which that is most.
+    """
+
+    t: np.ndarray
+    size: np.ndarray
+    where: str
+
+
+def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
+    """Return a run with what a coarser one tells of its error.
+
+    Where nothing else keeps them short, steps of the coarser run are longer by a factor r and its errors by rᵖ. Samples
+    and impacts do keep steps short: a share φ of steps that could be longer makes n/m = 1 − φ (1 − 1/r) of the n steps,
+    and is taken to have made that share of the errors. Of what the runs are apart, 1/(rᵖ − 1) φ is left.
+
+    Parameters
+    ----------
+    run : Run
+    coarse : Run
+        The same to a larger tolerance, or in longer steps.
+    journey : Journey
+        How the finer one went.
+    longer : float
+        By how much steps of the coarser one are longer.
+
+    Returns
+    -------
+    Run
+        As it is where the coarser one tells nothing: it took no step, or nearly all its steps are the same.
+    """
+    if not coarse.track.stretches:
+        return run
+    fewer, report = coarse.report.steps / run.report.steps, run.report
+    free = (1.0 - fewer) / (1.0 - 1.0 / longer)
+    gap = _gap(run, coarse, journey)
+    left = min(max(free, _LEAST), 1.0) * (longer**report.order - 1.0)
+    error = float(gap.size[-1]) / left
+    if error < report.drift and free < _LEAST:
+        return run
+    notes = tuple(note for note in report.notes if note != journey.drift.note)
+    if error > _TOLD:
+        notes += (_note(journey, gap, left),)
+    return replace(run, report=replace(report, error=error, notes=notes))
+
+
+def _gap(run: Run, coarse: Run, journey: Journey) -> _Gap:
+    """Places and turns of nodes and angles of motors, in yardsticks, at instants of no rhythm."""
+    model, begin, end = journey.plan.model, run.track.starts[0], min(run.final.t, coarse.final.t)
+    assert isinstance(model, Model)
+    shares = (np.arange(1, _INSTANTS) + (_GOLDEN * np.arange(1, _INSTANTS)) % 1.0) / _INSTANTS
+    t = np.append(begin + (end - begin) * shares, end)
+    apart = np.array([_apart(model, run.track.state(s)[0], coarse.track.state(s)[0]) for s in t])
+    most = max(float(farthest(model, journey.books.sums.moved).max()), 1e3 * journey.plan.tolerance.absolute)
+    names = (*map(str, model.structure.nodes), *(model.coordinates[i] for i in _sources(model)))
+    worst = int(np.argmax(apart.max(axis=0)))
+    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / most, names[worst])
+
+
+def _apart(model: Model, one: State, other: State) -> np.ndarray:
+    """How far each node and motor is from where it is in another run; without the ground, that comes last of nodes."""
+    way = np.linalg.norm(one.x - other.x, axis=1) / model.structure.size
+    chord = np.linalg.norm(one.R - other.R, axis=(1, 2)) / np.sqrt(8.0)
+    nodes = np.maximum(way, 2.0 * np.arcsin(np.minimum(chord, 1.0)))[:-1]
+    sources = _sources(model)
+    return np.append(nodes, np.abs(one.q - other.q)[sources] / yardsticks(model)[sources])
+
+
+def _sources(model: Model) -> np.ndarray:
+    """Which degrees of freedom are angles of motors."""
+    return np.unique(model.motion.sources[model.motion.sources < model.n])
+
+
+def _note(journey: Journey, gap: _Gap, left: float) -> str:
+    """What is to be said: how far off, until when all is well, and what would leave little."""
+    plan = journey.plan
+    error, pace = float(gap.size[-1]) / left, plan.method.pace
+    until = float(np.append(0.0, gap.t)[int(np.argmax(gap.size > _TOLD * left))])
+    far = f"{100.0 * error:.2g} % of the motion" if error < 1.0 else "all of the motion"
+    said = f"by a coarser run, {gap.where} is off by {far}"
+    if gap.size[-1] > _PARTED:
+        said += " or more, as small differences grow"
+    finer = (_AIM / error) ** (1.0 / plan.method.order)
+    if isinstance(pace, Controlled):
+        less, asked = finer**pace.steepness, plan.tolerance
+        remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
+    else:
+        remedy = f"take steps of {finer * pace.step:.1g} s"
+    return f"{said}; right to {_TOLD:.0%} until t = {until:.3g} s: {remedy}"

@@ -1,0 +1,86 @@
+"""What a run that has ended leaves behind."""
+
+from __future__ import annotations
+
+import time
+
+from flexctrl.dynamics.journey import Journey
+from flexctrl.dynamics.notes.adding import drifted
+from flexctrl.dynamics.notes.straying import strayed
+from flexctrl.dynamics.notes.unsized import unsized
+from flexctrl.dynamics.notes.unsure import unsure
+from flexctrl.dynamics.records.record import Unwritten
+from flexctrl.dynamics.run import EnergyBalance, Report, Run, Status
+
+__all__ = ["result"]
+
+
+def result(journey: Journey) -> Run:
+    """Return the curves and the report of a run.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    Run
+    """
+    plan, state, supply = journey.plan, journey.point.state, journey.point.supply
+    checkpoint = journey.saved
+    assert checkpoint is not None
+    if abs(state.t - plan.until) <= 1e-9 * plan.until:
+        state = state.with_(t=plan.until)
+    try:
+        rows = journey.rows.finish(state, supply.u)
+        journey.rows.recorder.flush()
+    except Unwritten as error:
+        journey.fail(error)
+        rows = journey.rows.recorder.table()
+    width = len(plan.model.outputs)
+    journey.drift = drift = drifted(journey)
+    journey.notes += strayed(journey) + unsized(journey) + unsure(journey, rows[:, 1 : 1 + width])
+    if drift.note and journey.status is not Status.FAILED:
+        journey.notes += (drift.note,)
+    return Run(
+        rows[:, 0],
+        plan.model.outputs,
+        plan.model.inputs,
+        rows[:, 1 : 1 + width],
+        rows[:, 1 + width :],
+        state,
+        journey.rows.frames,
+        journey.status,
+        _report(journey),
+        plan.model.structure.name,
+        tuple(journey.events),
+        checkpoint,
+        journey.track,
+        journey.fault,
+    )
+
+
+def _report(journey: Journey) -> Report:
+    plan, mark, counts, sums = journey.plan, journey.mark, journey.stepper.counts, journey.books.sums
+    model, drift = plan.model, journey.drift
+    return Report(
+        method=repr(plan.method),
+        order=plan.method.order,
+        damping=plan.method.damping,
+        steps=mark.steps,
+        rejected_steps=mark.rejected,
+        newton_iterations=counts.newton,
+        factorisations=counts.factorisations,
+        wall_s=time.perf_counter() - plan.began,
+        dofs=model.n,
+        energy=EnergyBalance(sums.start, sums.work, sums.lost, sums.kinetic, sums.stored),
+        energy_residual=journey.books.residual,
+        worst=model.coordinates[counts.worst] if model.n else "",
+        closure_error=sums.closure,
+        drift=drift.share,
+        drifted=drift.freedom,
+        error=drift.share,
+        message=journey.message,
+        notes=(*model.notes, *journey.notes),
+    )

@@ -1,0 +1,212 @@
+"""Runs laid beside coarser ones: what they tell of their error, against the explicit method to twelve digits."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.design import pd
+from flexctrl.dynamics import simulate as running
+
+GROW = "small differences grow"
+BESIDE = "by a coarser run"
+EXACT = {"method": fc.Unchecked(fc.ExplicitRungeKutta()), "tolerance": fc.Tolerance(0.0, 1e-12)}
+
+
+def chain(count: int, speed: float, seed: int) -> tuple[fc.Model, fc.State]:
+    """Bodies on hinges, one below the other, that set out at random speeds."""
+    rng = np.random.default_rng(seed)
+    bodies = [
+        fc.RigidBody(f"b{i}", (0, 0, -i - 0.5), m, (0.05,) * 3, {"top": (0, 0, -i), "end": (0, 0, -i - 1)})
+        for i, m in enumerate(rng.uniform(0.5, 2.0, count))
+    ]
+    ends = [(body.point("top"), body.point("end")) for body in bodies]
+    joints = [fc.Support(ends[0][0], "u v w rx rz")]
+    joints += [fc.Hinge(a[1], b[0], axis="y") for a, b in pairwise(ends)]
+    outputs = [fc.Position(axis, end, axis) for axis in "xz" for end in [ends[-1][1]]]
+    model = fc.assemble(fc.Structure(bodies, joints, outputs=outputs), [fc.Gravity(), fc.LargeRotation()])
+    return model, model.rest.with_(v=rng.uniform(-speed, speed, model.n))
+
+
+def turned(run: fc.Run, true: fc.Run) -> float:
+    """By how much bodies are turned away from where they belong, or are off, at worst [rad, sizes of the machine]."""
+    times = np.linspace(0.0, min(run.final.t, true.final.t), 100)
+    states = [(run.track.state(t)[0], true.track.state(t)[0]) for t in times]
+    return max(float(np.linalg.norm(a.R - b.R, axis=(1, 2)).max()) / np.sqrt(2.0) for a, b in states)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_where_nothing_grows_it_is_about_right(count, seed):
+    model, start = chain(count, 5.0 if count == 1 else 3.0, seed)
+    how = {"until": 3.0, "start": start}
+    run, true = fc.simulate(model, **how), fc.simulate(model, **how, **EXACT)
+    off = turned(run, true) / min(1.0, np.abs(run.final.q).max() + 1e-9)
+    if run.report.error != run.report.drift and off < 0.05:
+        assert 0.2 * off < run.report.error < 6.0 * off
+    assert (run.report.error > 0.03) == any(BESIDE in n or "added up" in n for n in run.report.notes)
+
+
+@pytest.mark.parametrize(("count", "speed", "seed"), [(2, 8.0, 1), (3, 8.0, 2), (4, 7.0, 3), (3, 9.0, 4)])
+def test_what_grows_is_told(count, speed, seed):
+    model, start = chain(count, speed, seed)
+    how = {"until": 8.0, "start": start}
+    run, true = fc.simulate(model, **how), fc.simulate(model, **how, **EXACT)
+    assert turned(run, true) > 0.1
+    [note] = [n for n in run.report.notes if BESIDE in n]
+    assert GROW in note
+    assert "give Tolerance(" in note
+    right = float(note.partition("right to 3% until t = ")[2].partition(" s")[0])
+    early = fc.simulate(model, until=0.9 * right, start=start)
+    assert turned(early, true) < 0.1
+    assert run.report.error > 0.03
+
+
+def test_a_flipping_body_is_told():
+    """Dzhanibekov's: 2e3 times what steps err by, after 20 s."""
+    body = fc.RigidBody("top", (0, 0, 0), 1.0, (1.0, 2.0, 3.0))
+    outputs = [fc.Rotation("turn", body.node, "z")]
+    model = fc.assemble(fc.Structure([body], [fc.Support(body.node, "u v w")], outputs=outputs), [fc.LargeRotation()])
+    start = model.rest.with_(v=np.array([1e-3, 2.0, 1e-3]))
+    how = {"until": 20.0, "start": start}
+    run, true = fc.simulate(model, **how), fc.simulate(model, **how, **EXACT)
+    assert turned(run, true) > 0.3
+    assert any(GROW in n for n in run.report.notes)
+    finer = fc.simulate(model, tolerance=fc.Tolerance(1e-10, 1e-13), **how)
+    assert turned(finer, true) < 0.05
+    assert not any(BESIDE in n for n in finer.report.notes)
+
+
+def test_the_run_is_that_of_the_method_to_the_bit():
+    model, start = chain(3, 8.0, 2)
+    run = fc.simulate(model, until=3.0, start=start)
+    bare = fc.simulate(model, until=3.0, start=start, method=fc.Unchecked(fc.AdaptiveAlpha()))
+    assert np.array_equal(run.y, bare.y)
+    assert np.array_equal(run.final.x, bare.final.x)
+    assert run.report.steps == bare.report.steps
+    assert bare.report.error == bare.report.drift
+    assert run.report.error != run.report.drift
+    resumed = fc.simulate(model, until=4.0, start=run.checkpoint, method=fc.AdaptiveAlpha())
+    assert resumed.report.error == resumed.report.drift
+
+
+@pytest.mark.parametrize(
+    "method",
+    [fc.GeneralizedAlpha(5e-3), fc.ConservingMidpoint(1e-2), fc.Richardson(fc.GeneralizedAlpha(1e-2))],
+    ids=lambda method: type(method).__name__,
+)
+def test_steps_of_one_length_are_checked_if_asked_for(method):
+    model, start = chain(2, 8.0, 1)
+    how = {"until": 6.0, "start": start}
+    run, true = fc.simulate(model, method=fc.Checked(method), **how), fc.simulate(model, **how, **EXACT)
+    plain = fc.simulate(model, method=method, **how)
+    assert np.array_equal(run.y, plain.y)
+    assert plain.report.error == plain.report.drift
+    off = turned(run, true)
+    assert 0.1 * off < run.report.error < 10.0 * off
+    assert any("take steps of" in n for n in run.report.notes if BESIDE in n) == (run.report.error > 0.03)
+
+
+def thrown(damping: float, speed: tuple[float, float, float]) -> tuple[fc.Model, fc.State]:
+    """A load between two ropes that go slack and catch it."""
+    ropes = [
+        fc.Rope(name, (x, 0, 0), (0, 0, -1), EA=1.8e4, damping=damping) for name, x in (("left", -1.0), ("right", 1.0))
+    ]
+    load = fc.PointMass("load", ropes[0].end, 1.0)
+    joints = [fc.Support(r.start, "u v w") for r in ropes] + [fc.Pin(r.end, load.node) for r in ropes]
+    outputs = [fc.Position(axis, load.node, axis) for axis in "xyz"]
+    model = fc.assemble(
+        fc.Structure([*ropes, load], joints, outputs=outputs), [fc.Gravity(), fc.LargeRotation(), fc.Flexible()]
+    )
+    return model, model.rest.with_(v=np.array(speed))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_loads_caught_by_ropes_are_told_where_they_are_off(seed):
+    rng = np.random.default_rng(seed)
+    model, start = thrown(rng.uniform(10.0, 60.0), tuple(rng.uniform(-5.0, 5.0, 3)))
+    how = {"until": 3.0, "start": start, "every": 0.02}
+    run, true = fc.simulate(model, **how), fc.simulate(model, tolerance=fc.Tolerance(1e-8, 1e-11), **how)
+    off = np.abs(run.y - true.y).max() / np.abs(true.y - true.y[0]).max()
+    assert off < 0.06 or run.report.error > 0.03
+    assert run.report.error > 0.1 * off
+
+
+class Stateful:
+    """A sampled law that remembers what it was asked."""
+
+    inputs, outputs, sample_time = ("angle",), ("torque",), 0.01
+
+    def __init__(self) -> None:
+        self.asked: list[float] = []
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        self.asked.append(t)
+        return np.array([-10.0 * y[0]])
+
+
+def driven() -> fc.Model:
+    body = fc.RigidBody("arm", (0.5, 0, 0), 1.0, (0.01, 0.1, 0.1), {"hinge": (0, 0, 0)})
+    hinge = body.point("hinge")
+    motor = fc.RotaryDrive("motor", hinge, axis="z", stiffness=200.0, inertia=0.05)
+    structure = fc.Structure(
+        [body],
+        [fc.Support(hinge, "u v w rx ry")],
+        [motor],
+        [fc.MotorTorque("torque", motor)],
+        [fc.DriveAngle("angle", motor), fc.DriveSpeed("speed", motor)],
+    )
+    return fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity()])
+
+
+def test_a_sampled_law_in_python_is_asked_once():
+    model, law = driven(), Stateful()
+    run = fc.simulate(model, law, until=1.0, start=model.displace([1.0, 1.0]))
+    assert law.asked == sorted(set(law.asked))
+    assert run.report.error == run.report.drift
+
+
+def test_a_run_is_kept_where_the_one_beside_it_is_ended(monkeypatch):
+    model, start = chain(3, 8.0, 2)
+    before = fc.simulate(model, until=3.0, start=start)
+
+    def interrupted(*given):
+        raise KeyboardInterrupt
+
+    travelled, calls = running._travelled, []
+
+    def once(*given):
+        calls.append(given)
+        return travelled(*given) if len(calls) == 1 else interrupted()
+
+    monkeypatch.setattr(running, "_travelled", once)
+    run = fc.simulate(model, until=3.0, start=start)
+    assert len(calls) == 2
+    assert run.status is fc.Status.FINISHED
+    assert np.array_equal(run.y, before.y)
+    assert run.report.error == run.report.drift
+
+
+def test_small_swings_cost_nothing_more(monkeypatch):
+    model, start = chain(2, 0.1, 1)
+    monkeypatch.setattr(running, "_laid_beside", None)
+    assert fc.simulate(model, until=3.0, start=start).status is fc.Status.FINISHED
+    law = pd(kp=5.0, kd=1.0, measured="angle", rate="speed", command="torque")
+    arm = driven()
+    assert (
+        fc.simulate(arm, fc.Sampled(law, 0.01), until=1.0, start=arm.displace([0.1, 0.1])).status is fc.Status.FINISHED
+    )
+
+
+@pytest.mark.parametrize("wrap", [fc.Checked, fc.Unchecked])
+def test_what_is_no_method_by_itself_is_refused(wrap):
+    with pytest.raises(fc.errors.StructureError, match="give a method by itself"):
+        wrap(fc.Checked(fc.AdaptiveAlpha()))
+    with pytest.raises(fc.errors.StructureError, match="give a method by itself"):
+        wrap(fc.AdaptiveAlpha)
