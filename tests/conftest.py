@@ -12,6 +12,42 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 pytest_plugins = ("recording",)
 
+LONG = (
+    "test_diverging_runs.py::test_loops_that_throw_an_arm_away[too high-chosen-plain]",
+    "test_diverging_runs.py::test_loops_that_throw_an_arm_away[wrong sign-chosen-plain]",
+    "test_diverging_runs.py::test_loops_with_friction_lag_and_play[Backlash-plain]",
+    "test_d18_redundant_loops.py::test_ten_seconds[40]",
+    "test_watched_and_resumed.py::test_events_that_are_only_watched_change_no_bit[dry-continuous-adaptive]",
+    "test_watched_and_resumed.py::test_events_that_are_only_watched_change_no_bit[lag-continuous-adaptive]",
+    "test_watched_and_resumed.py::test_events_that_are_only_watched_change_no_bit[dry-continuous-alpha]",
+    "test_watched_and_resumed.py::test_events_that_are_only_watched_change_no_bit[dry-none-alpha]",
+    "test_watched_and_resumed.py::test_a_run_stopped_anywhere_goes_on_with_the_same_bits[dry-continuous-adaptive-met]",
+    "test_watched_and_resumed.py::test_a_run_stopped_anywhere_goes_on_with_the_same_bits[lag-continuous-adaptive-met]",
+    "test_watched_and_resumed.py::test_a_run_stopped_anywhere_goes_on_with_the_same_bits[dry-continuous-alpha-met]",
+    "test_omissions.py::test_sampling_is_kept_under_what_counts_samples[rate_limited]",
+    "test_omissions.py::test_sampling_is_kept_under_what_counts_samples[delayed]",
+    "test_cli.py::test_a_cost_that_is_ended_leaves_nothing_running_and_goes_on[15]",
+    "test_long_linkages.py::test_hundreds_of_links_run_in_some_hundred_megabytes[rope-1000-900]",
+    "test_march_dry.py::test_a_lowered_law_is_asked_while_the_motor_sticks[fixed]",
+    "test_events_under_control.py::test_marched_and_plain_runs_tell_the_same[quarters-lowered]",
+    "test_random_structures.py::test_steps_end_where_a_damped_gap_closes[5]",
+    "test_random_structures.py::test_steps_end_where_a_damped_gap_closes[29]",
+    "test_motors_beside_loads.py::test_damped_steps_do_not_lose_it_later[0.005-1000000.0]",
+    "test_motors_beside_loads.py::test_damped_steps_do_not_lose_it_later[0.01-10000000.0]",
+    "test_friction_in_any_units.py::test_a_block_slips_alike_in_any_units_of_mass[extrapolated-stribeck]",
+    "test_friction_in_any_units.py::test_a_block_slips_alike_in_any_units_of_mass[explicit-stribeck]",
+    "test_accuracy.py::test_a_coarse_scene_is_judged_by_finer_runs[method1-None]",
+    "test_accuracy.py::test_a_ledger_does_not_hang_on_units[mm, t, s]",
+)
+"""Cases whose neighbours hold the same: run with -m long."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the long cases."""
+    for item in items:
+        if item.nodeid.endswith(LONG):
+            item.add_marker("long")
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that rewrites the pages of docs/validation; see tests/recorder.py."""
