@@ -21,7 +21,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.lookahead import look_ahead
 from flexctrl.dynamics.march.ride import ride, rides
-from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.march.stepper import MarchingStepper, plain_of
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
@@ -162,7 +162,7 @@ class Journey:
     @cached_property
     def judging(self) -> Judging[Any] | None:
         """What tells local errors of steps; None where a linear model is integrated exactly."""
-        plain = self.stepper.plain if isinstance(self.stepper, MarchingStepper) else self.stepper
+        plain = plain_of(self.stepper)
         return plain if isinstance(plain, Judging) else None
 
     def step(self, point: Any, h: float) -> Any:

@@ -11,7 +11,7 @@ from flexctrl.dynamics.events.impact import lasts
 from flexctrl.dynamics.events.landing import Missed
 from flexctrl.dynamics.events.nearing import LEAST, NUDGES
 from flexctrl.dynamics.events.watch import Crossing
-from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.march.stepper import plain_of
 from flexctrl.dynamics.scales import farthest
 from flexctrl.dynamics.steps import Controlled, Joining, Point, Stepper
 from flexctrl.dynamics.swift.thrown import AT_HAND
@@ -81,7 +81,7 @@ def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
 
 def lead(journey: Journey, h: float) -> None:
     """Start anew where the run stands, with a step about to be taken."""
-    stepper: Stepper[Any] = journey.stepper.plain if isinstance(journey.stepper, MarchingStepper) else journey.stepper
+    stepper: Stepper[Any] = plain_of(journey.stepper)
     joined = stepper.join if isinstance(stepper, Joining) else stepper.renew
     journey.point = joined(journey.point, journey.point.supply, h)
     journey.mark.led = h if isinstance(journey.plan.method.pace, Controlled) else 0.0
@@ -91,7 +91,7 @@ def lead(journey: Journey, h: float) -> None:
 def lengthen(journey: Journey, h: float) -> None:
     """Make accelerations anew where those of a far shorter step would throw parts over the one about to be taken."""
     if h > AT_HAND * journey.mark.taken > 0.0:
-        stepper: Any = journey.stepper.plain if isinstance(journey.stepper, MarchingStepper) else journey.stepper
+        stepper: Any = plain_of(journey.stepper)
         journey.point = stepper.lengthen(journey.point, h) if isinstance(stepper, Joining) else journey.point
     journey.mark.taken = h
 

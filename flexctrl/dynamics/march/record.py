@@ -232,7 +232,7 @@ class March:
     reach, first : Reals
         Largest distance of each degree of freedom from where it was first.
     ahead, swept, bent, path : Reals
-        Sums of local errors of steps of controlled error; see `flexctrl.dynamics.records.books.Sums`.
+        Sums of local errors of some of the steps; see `flexctrl.dynamics.records.books.Sums`.
     rows : Reals
         Time and outputs after each step.
     states : Reals

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
 from flexctrl.model.state import State
 
-__all__ = ["MarchingStepper", "Memory"]
+__all__ = ["MarchingStepper", "Memory", "plain_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,20 @@ class Memory:
 
     plain: alpha_steps.Tangent | None
     march: Remembered
+
+
+def plain_of(stepper: Any) -> Any:
+    """Return the plain steps of what may be marched.
+
+    Parameters
+    ----------
+    stepper : Stepper
+
+    Returns
+    -------
+    Stepper
+    """
+    return stepper.plain if isinstance(stepper, MarchingStepper) else stepper
 
 
 @dataclass

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics.feed import Feed, Supply
-from flexctrl.dynamics.march.stepper import MarchingStepper
+from flexctrl.dynamics.march.stepper import plain_of
 from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.dense import Hermite
 from flexctrl.dynamics.run import Tolerance
@@ -212,8 +212,7 @@ class _Stepper:
 
     def missed(self, before: _Point, after: _Point) -> np.ndarray:
         """Return the local error of the coarser run."""
-        plain = self.coarse.plain if isinstance(self.coarse, MarchingStepper) else self.coarse
-        return cast("Judging[Any]", plain).missed(before.coarse, after.coarse)
+        return cast("Judging[Any]", plain_of(self.coarse)).missed(before.coarse, after.coarse)
 
     def remains(self, share: float) -> float:
         """Return what a run is off by: of second order in the lag of the coarser one."""
@@ -222,12 +221,12 @@ class _Stepper:
 
 def _joined(stepper: Stepper[Any], run: Any, supply: Supply, step: float) -> Any:
     """Start a run anew, as the method by itself does beyond a corner."""
-    plain = stepper.plain if isinstance(stepper, MarchingStepper) else stepper
+    plain = plain_of(stepper)
     return plain.join(run, supply, step) if isinstance(plain, Joining) else plain.start(run.state, supply, step)
 
 
 def _longer(stepper: Stepper[Any], run: Any, step: float) -> Any:
-    plain = stepper.plain if isinstance(stepper, MarchingStepper) else stepper
+    plain = plain_of(stepper)
     return plain.lengthen(run, step) if isinstance(plain, Joining) else run
 
 
