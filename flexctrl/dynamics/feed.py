@@ -70,6 +70,15 @@ class Feed:
         """Instants at which a continuous command jumps."""
         return tuple(getattr(self.controller, "breaks", ())) if self.continuous else ()
 
+    @cached_property
+    def untold(self) -> bool:
+        """Whether inputs may change with time between breaks as nobody knows beforehand."""
+        if not self.continuous:
+            return False
+        from flexctrl.design.untold import untold  # all kinds of controllers: not for runs without any
+
+        return untold(self.controller)
+
     @property
     def told_law(self) -> str:
         """What the controller reads and commands, and when, in words."""

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from flexctrl.design.controller import LinearController
-from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.steps import Controlled
 from flexctrl.errors import ControllerError
 
@@ -58,7 +56,7 @@ def look_ahead(journey: Journey) -> None:
     """
     journey.horizon = math.inf
     plan, mark, stops, t = journey.plan, journey.mark, journey.stops, journey.point.state.t
-    if not _untold(plan.feed) or stops.found < math.inf:
+    if not plan.feed.untold or stops.found < math.inf:
         return
     chosen = isinstance(plan.method.pace, Controlled)
     span = min(mark.size if chosen else plan.method.pace.step, stops.next - t, plan.until - t)  # type: ignore[union-attr]
@@ -74,11 +72,6 @@ def look_ahead(journey: Journey) -> None:
         mark.left = 0
     else:
         journey.horizon = end
-
-
-def _untold(feed: Feed) -> bool:
-    """Whether the law may change with time as nobody knows beforehand."""
-    return feed.continuous and feed.answering is None and not isinstance(feed.controller, LinearController)
 
 
 def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:

@@ -77,7 +77,7 @@ def _double(journey: Journey) -> Journey:
         journey,
         books=books,
         watch=watch,
-        rows=Rows(rows.feed, None, rows.until, unread, rows.curve, rows.count),
+        rows=Rows(rows.feed, rows.every, rows.until, unread, rows.curve, rows.count),
         track=Track(rows.feed, -1.0, rows.curve),
         mark=replace(journey.mark),
         events=[],
