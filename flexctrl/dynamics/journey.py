@@ -232,15 +232,14 @@ class Journey:
         end, self._told = self.plan.until - self.tick, time.perf_counter()
         self._kept = self._told
         while self.status is Status.FINISHED:
-            t, stop = self.point.state.t, self.stops.next
-            if t >= end:
+            if (t := self.point.state.t) >= end:
                 return
-            if stop - t <= self.tick:
+            look_ahead(self)
+            if (stop := self.stops.next) - t <= self.tick:
                 self._renew(stop)
                 self._pause()
                 continue
-            look_ahead(self)
-            self.go(self.stops.next, self.plan.until)
+            self.go(stop, self.plan.until)
             self._pause()
             if apart := self.plan.model.apart(self.point.state):
                 raise StepError(self.stepper.counts.worst, f"{apart} (t = {self.point.state.t:.6g} s)")

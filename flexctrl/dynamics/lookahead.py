@@ -60,15 +60,15 @@ def look_ahead(journey: Journey) -> None:
         return
     chosen = isinstance(plan.method.pace, Controlled)
     span = min(mark.size if chosen else plan.method.pace.step, stops.next - t, plan.until - t)  # type: ignore[union-attr]
+    if span <= journey.tick:
+        return
     try:
         end, jumps = _clear(journey, span, _BENT if chosen else _MISSED)
     except ControllerError:  # what it says when it is asked in earnest is told then
         return
     if jumps or (end < math.inf and not chosen):
-        stops.found = max(
-            end, t + 0.5 * journey.tick
-        )  # just behind here is here: the law is asked again, no step taken
-        plan.feed.met[:] = [stops.found]
+        stops.found = end
+        plan.feed.met[:] = [end]
         mark.left = 0
     else:
         journey.horizon = end
@@ -98,7 +98,7 @@ def _course(journey: Journey, span: float) -> _Course:
     plan, t, mark = journey.plan, journey.point.state.t, journey.mark
     count = max(_FEWEST, math.ceil(_OF_RUN * span / plan.until))
     k = np.arange(count)
-    beyond = span < journey.stops.next - t and span < plan.until - t  # what jumps right at the end is seen, too
+    beyond = span < journey.stops.next - t  # what jumps right at the end is seen, too
     shares = np.concatenate([[0.0], (k + (_GOLDEN * k + 0.5) % 1.0) / count, [1.0 + (_TOUCH if beyond else -_TOUCH)]])
     times = t + span * np.sort(shares)
     values = np.array([_said(journey, s) for s in times.tolist()])
