@@ -71,11 +71,11 @@ class Checked(_Wrapped):
     """A method whose runs are laid beside coarser ones, which tell how far they are off.
 
     What errors of steps add up to (the report's ``drift``) says nothing of what grows of itself, as in a double
-    pendulum that goes over. Where a machine has swung by more than a radian, gone farther than its size, met corners of
-    its laws of force or followed a continuous law, it is therefore run once more, under 27 times the tolerance (a third
-    of the steps for `AdaptiveAlpha`) or in steps of twice the length. Of what the two are apart, a method of order p
-    leaves 1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 % a note says so, and
-    until when the run is right to that.
+    pendulum that goes over. Where a machine has swung by more than half a radian, gone farther than half its size,
+    met corners of its laws of force or followed a continuous law, it is therefore run once more, under 27 times the
+    tolerance (a third of the steps for `AdaptiveAlpha`) or in steps of twice the length. Of what the two are apart,
+    a method of order p leaves 1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 %
+    a note says so, and until when the run is right to that.
 
     Nothing is run again where a sampled law is asked in Python (it may remember what it was asked), for linear models
     and small motion, from a `Checkpoint`, and where steps took too much room to be kept.

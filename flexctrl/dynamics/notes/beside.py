@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["may_grow", "told_beside"]
 
-_FAR = 1.0
+_FAR = 0.5
 _INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
 _TOLD, _AIM = 0.03, 0.01
 _LEAST = 0.1
@@ -37,8 +37,8 @@ def may_grow(journey: Journey) -> bool:
     Returns
     -------
     bool
-        Whether something has swung by more than a radian, gone farther than the machine is large, met corners, or
-        followed a continuous law, which may have corners of its own.
+        Whether something has swung by more than half a radian, gone farther than half the machine's size, met corners,
+        or followed a continuous law, which may have corners of its own.
     """
     plan, sums = journey.plan, journey.books.sums
     feed, model, watch = plan.feed, plan.model, journey.watch
