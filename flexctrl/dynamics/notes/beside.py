@@ -90,7 +90,8 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
     Returns
     -------
     Run
-        As it is where the coarser one tells nothing: it took no step, or nearly all its steps are the same.
+        As it is where the coarser one tells nothing: it took no step, nearly all its steps are the same, or it has
+        parted from the finer one so far that sums of local errors tell more.
     """
     if not coarse.track.stretches:
         return run
@@ -99,7 +100,7 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
     gap = _gap(run, coarse, journey)
     left = min(max(free, _LEAST), 1.0) * (longer**report.order - 1.0)
     error = float(gap.size[-1]) / left
-    if error < report.drift and free < _LEAST:
+    if error < report.drift and (free < _LEAST or gap.size[-1] > _PARTED):
         return run
     notes = tuple(note for note in report.notes if note != journey.drift.note)
     if error > _TOLD:
