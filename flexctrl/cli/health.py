@@ -43,6 +43,8 @@ def _integrator(data: Mapping[str, Any]) -> str:
         lines.append(f"loops of rigid parts closed to {data['closure_error']:.2g}")
     if data["drift"]:
         lines.append(f"errors of steps add up to {data['drift']:.2g} of the motion of {data['drifted']}")
+    if data["error"] != data["drift"]:
+        lines.append(f"off by {data['error']:.2g} of the motion, by a coarser run")
     return "\n".join([*lines, grid(("energy", "J"), rows)])
 
 

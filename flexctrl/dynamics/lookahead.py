@@ -80,11 +80,13 @@ def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
     for tried in range(_DEEPEST):
         course = _course(journey, span)
         last = len(course.times) - 1
-        if course.bends(last) <= limit:
+        if course.bends(last) <= _BENT:
             return (float(course.times[last]) if tried else math.inf), False
-        bent = next(end for end in range(2, last + 1) if course.bends(end) > limit)
-        if (jump := _jump(journey, course, bent, limit)) is not None:
+        bent = next(end for end in range(2, last + 1) if course.bends(end) > _BENT)
+        if (jump := _jump(journey, course, bent)) is not None:
             return jump, True
+        if course.bends(last) <= limit:
+            return _first_jump(journey, course)
         if bent > _ENOUGH:
             return float(course.times[bent - 1]), False
         span = float(course.times[bent]) - t
@@ -93,10 +95,30 @@ def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
     return t + span, False
 
 
+def _first_jump(journey: Journey, course: _Course) -> tuple[float, bool]:
+    """The first jump beyond bends that steps of one length are let pass; infinity if there is none."""
+    first, t = math.inf, journey.point.state.t
+    while (jump := _jump(journey, course, len(course.times) - 1)) is not None and jump > t:
+        first = jump
+        course = _course(journey, (1.0 - _TOUCH) * (jump - t))
+    return first, first < math.inf
+
+
 def _course(journey: Journey, span: float) -> _Course:
-    """Ask the law over a span from here."""
-    plan, t, mark = journey.plan, journey.point.state.t, journey.mark
-    count = max(_FEWEST, math.ceil(_OF_RUN * span / plan.until))
+    """Ask the law over a span from here; closely only if that shows what is passed over otherwise."""
+    course = _asked(journey, span, _FEWEST)
+    closely = math.ceil(_OF_RUN * span / journey.plan.until)
+    if closely > _FEWEST and course.bends(len(course.times) - 1) <= _BENT:
+        swings = journey.mark.swings
+        closer = _asked(journey, span, closely)
+        if closer.bends(len(closer.times) - 1) > 2.0 * _BENT:
+            return closer
+        journey.mark.swings = swings  # how long the run is has no say in what it does
+    return course
+
+
+def _asked(journey: Journey, span: float, count: int) -> _Course:
+    t, mark = journey.point.state.t, journey.mark
     k = np.arange(count)
     beyond = span < journey.stops.next - t  # what jumps right at the end is seen, too
     shares = np.concatenate([[0.0], (k + (_GOLDEN * k + 0.5) % 1.0) / count, [1.0 + (_TOUCH if beyond else -_TOUCH)]])
@@ -116,11 +138,11 @@ def _said(journey: Journey, t: float) -> np.ndarray:
     return np.append(said.u, said.rate)
 
 
-def _jump(journey: Journey, course: _Course, bent: int, limit: float) -> float | None:
+def _jump(journey: Journey, course: _Course, bent: int) -> float | None:
     """The first instant after a jump just before one at which the course has left its line; None if it is none."""
     steps = np.abs(np.diff(course.values[: bent + 1], axis=0)) / course.swings
     at = int(np.argmax(steps.max(axis=1)))
-    if (whole := float(steps[at].max())) <= limit:
+    if (whole := float(steps[at].max())) <= _BENT:
         return None
     (a, b), (low, high) = course.times[at : at + 2].tolist(), course.values[at : at + 2]
     while a < (middle := 0.5 * (a + b)) < b:

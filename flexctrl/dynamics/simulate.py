@@ -20,7 +20,7 @@ from flexctrl.dynamics.feed import Supply, feed_of
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
-from flexctrl.dynamics.notes.beside import may_grow, told_beside
+from flexctrl.dynamics.notes.beside import can_be_told, may_grow, told_beside
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track, curves_of
 from flexctrl.dynamics.records.record import InMemory, Record
@@ -131,6 +131,7 @@ def simulate(
             check_state(model, start, "simulate: start")
             model.__dict__["_begun"] = start
     feed = feed_of(plant, controller, _base(plant, start, inputs))
+    asked = isinstance(method, Checked)
     method, check = checked(method or AdaptiveAlpha())
     plan = Plan(
         plant,
@@ -144,8 +145,10 @@ def simulate(
     )
     with np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
         journey, run = _travelled(plan, start, events_of(events), record, spacing)
-        if check is not None and not isinstance(start, Checkpoint) and may_grow(journey):
-            return _laid_beside(run, journey, check, start)
+        if check is None or isinstance(start, Checkpoint) or not can_be_told(journey):
+            return run
+        if asked or may_grow(journey):
+            return _laid_beside(run, journey, check, start, spacing)
     return run
 
 
@@ -175,7 +178,7 @@ def _travelled(
             stepper.done()
 
 
-def _laid_beside(run: Run, journey: Journey, method: Checked, start: State | Rest | None) -> Run:
+def _laid_beside(run: Run, journey: Journey, method: Checked, start: State | Rest | None, spacing: float | None) -> Run:
     """The run with what a coarser one tells of it; that is ended where it takes far longer."""
     plan, end = journey.plan, run.final.t
     coarser, tolerance = method.coarser(plan.tolerance)
@@ -187,7 +190,7 @@ def _laid_beside(run: Run, journey: Journey, method: Checked, start: State | Res
 
     beside = replace(plan, method=coarser, tolerance=tolerance, until=end, tell=ended, autosave=None)
     try:
-        _, coarse = _travelled(beside, start, (), InMemory(), end)
+        _, coarse = _travelled(beside, start, (), InMemory(), spacing)
     except (FlexctrlError, KeyboardInterrupt):
         return run
     return told_beside(run, coarse, journey, method.longer)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha
+from flexctrl.dynamics.methods.checked import bare
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
@@ -196,7 +197,7 @@ def finer_plan(plan: Any, run: Run) -> Any:
     """
     half = 0.5 * float(run.t[-1] - run.t[0]) / max(run.report.steps, 1)
     tolerance = Tolerance(0.1 * plan.tolerance.relative, 0.1 * plan.tolerance.absolute)
-    return replace(plan, method=_with_steps(plan.method or AdaptiveAlpha(), half), tolerance=tolerance)
+    return replace(plan, method=_with_steps(bare(plan.method or AdaptiveAlpha()), half), tolerance=tolerance)
 
 
 def _with_steps(method: Any, longest: float) -> Any:

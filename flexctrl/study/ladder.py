@@ -11,6 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.linear_motion.exact import Exact
+from flexctrl.dynamics.methods.checked import bare
 from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import FlexctrlError, StructureError
@@ -159,7 +160,7 @@ def rungs(scene: Subject) -> tuple[tuple[str, Setting], ...]:
     -------
     tuple of (str, Setting)
     """
-    method, tolerance = scene.simulation.method or AdaptiveAlpha(), scene.simulation.tolerance
+    method, tolerance = bare(scene.simulation.method or AdaptiveAlpha()), scene.simulation.tolerance
     found = [(s.fidelity.value, s) for s in sweep(scene, meshes=(1,), methods=[(method, tolerance)])]
     follows = scene.law is not None and not scene.law.sample_time
     exact = method if follows else Exact(spacing_of(scene))

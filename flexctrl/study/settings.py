@@ -9,6 +9,7 @@ from typing import Any
 
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.linear_motion.exact import Exact
+from flexctrl.dynamics.methods.checked import bare
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
@@ -348,8 +349,8 @@ def around(method: Integrator | None, tolerance: Tolerance) -> tuple[tuple[Integ
     -------
     tuple of (Integrator, Tolerance)
     """
+    method = bare(method) if method is not None else AdaptiveAlpha()
     if isinstance(method, GeneralizedAlpha):
         return tuple((replace(method, step=f * method.step), tolerance) for f in (8.0, 4.0, 2.0, 1.0, 0.5))
-    adaptive = method if method is not None else AdaptiveAlpha()
     scale = tolerance.absolute / tolerance.relative if tolerance.relative else 1e-3
-    return tuple((adaptive, Tolerance(r, scale * r)) for r in (1e-2, 1e-3, 1e-4, 1e-5))
+    return tuple((method, Tolerance(r, scale * r)) for r in (1e-2, 1e-3, 1e-4, 1e-5))

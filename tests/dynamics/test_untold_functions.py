@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import flexctrl as fc
 from flexctrl.design import OpenLoop, Step, Tracking, pd
@@ -68,6 +69,30 @@ def test_a_square_wave_jumps_where_it_does(frequency, method):
 
 
 @pytest.mark.parametrize("method", METHODS, ids=NAMES)
+def test_jumps_of_all_sizes_are_met(method):
+    """A force that is another one every 10 ms, against products of exponentials."""
+    levels, hold = 8.0 * np.random.default_rng(2).normal(size=400), 0.01
+    spring = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=40.0, damping=0.3)
+    mass = fc.PointMass("mass", spring.end, 2.0)
+    structure = fc.Structure(
+        [spring, mass],
+        [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")],
+        inputs=[fc.Force("force", mass.node, "x")],
+        outputs=[fc.Position("x", mass.node, "x")],
+    )
+    model = fc.assemble(structure, [fc.LargeRotation()])
+    law = OpenLoop({"force": lambda t: levels[int(np.floor(t / hold + 1e-9))]})
+    step = expm(hold * np.array([[0.0, 1.0, 0.0], [-20.0, -0.15, 0.5], [0.0, 0.0, 0.0]]))
+    x, places = np.zeros(3), [0.0]
+    for level in levels[:100]:
+        x[2] = level
+        x = step @ x
+        places.append(x[0])
+    run = fc.simulate(model, law, until=1.0, every=hold, method=method)
+    assert np.abs(run["x"][: len(places)] - 1.0 - places).max() < 0.01 * np.abs(places).max()
+
+
+@pytest.mark.parametrize("method", METHODS, ids=NAMES)
 def test_a_smooth_force_is_followed(method):
     law = OpenLoop({"force": lambda t: np.sin(3.0 * t) + 0.1 * np.exp(-(((t - 11.0) / 0.02) ** 2))})
     run = fc.simulate(cart(), law, until=20.0, method=method)
@@ -114,7 +139,7 @@ def test_references_in_a_loop_are_followed(own, method):
     assert np.abs(expected).max() > 0.3
 
 
-@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(0.01)], ids=NAMES[:2])
+@pytest.mark.parametrize("method", METHODS[:3], ids=NAMES[:3])
 @pytest.mark.parametrize("cut", [0.5, 5.9999, 6.004, 6.4, 7.1])
 def test_they_go_on_with_the_same_bits(cut, method):
     model, law = cart(), Own()

@@ -11,7 +11,7 @@ from flexctrl.dynamics.steps import Controlled, Integrator, Pace, Stepper
 from flexctrl.errors import StructureError
 from flexctrl.model.plant import Plant
 
-__all__ = ["Checked", "Unchecked", "checked"]
+__all__ = ["Checked", "Unchecked", "bare", "checked"]
 
 _LOOSER = 27.0
 """Under such a tolerance steps of a method of second order are three times as long, and errors nine times as large."""
@@ -71,14 +71,14 @@ class Checked(_Wrapped):
     """A method whose runs are laid beside coarser ones, which tell how far they are off.
 
     What errors of steps add up to (the report's ``drift``) says nothing of what grows of itself, as in a double
-    pendulum that goes over. Where a machine has swung by more than half a radian, gone farther than half its size,
-    met corners of its laws of force or followed a continuous law, it is therefore run once more, under 27 times the
-    tolerance (a third of the steps for `AdaptiveAlpha`) or in steps of twice the length. Of what the two are apart,
-    a method of order p leaves 1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 %
-    a note says so, and until when the run is right to that.
+    pendulum that goes over. Where a machine has swung by more than a quarter of a radian, gone farther than a
+    quarter of its size, met corners of its laws of force or followed a continuous law, and wherever this is asked
+    for, it is therefore run once more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or
+    in steps of twice the length. Of what the two are apart, a method of order p leaves 1/(rᵖ − 1) where steps are r
+    times as long. It stands in ``report.error``; above 3 % a note says so, and until when the run is right to that.
 
-    Nothing is run again where a sampled law is asked in Python (it may remember what it was asked), for linear models
-    and small motion, from a `Checkpoint`, and where steps took too much room to be kept.
+    Nothing is run again where a sampled law is asked in Python (it may remember what it was asked), for linear
+    models and small motion, and from a `Checkpoint`.
 
     Parameters
     ----------
@@ -136,3 +136,17 @@ def checked(method: Integrator) -> tuple[Integrator, Checked | None]:
     if isinstance(method, Unchecked):
         return method.method, None
     return method, Checked(method) if isinstance(method.pace, Controlled) else None
+
+
+def bare(method: Integrator) -> Integrator:
+    """Return a method by itself: studies have references of their own.
+
+    Parameters
+    ----------
+    method : Integrator
+
+    Returns
+    -------
+    Integrator
+    """
+    return checked(method)[0]

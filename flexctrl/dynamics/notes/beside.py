@@ -8,26 +8,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.run import Run, Status
-from flexctrl.dynamics.scales import farthest, yardsticks
+from flexctrl.dynamics.scales import farthest, output_yardsticks, yardsticks
 from flexctrl.dynamics.steps import Controlled
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
+from flexctrl.structure.outputs import DriveAngle, Position, Rotation, SwayAngle
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["may_grow", "told_beside"]
+__all__ = ["can_be_told", "may_grow", "told_beside"]
 
-_FAR = 0.5
+_FAR = 0.25
+_POINTS, _FEW = 4, 1500
 _INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
 _TOLD, _AIM = 0.03, 0.01
 _LEAST = 0.1
 """Where fewer steps than that could be longer, both runs are about the same but for what grows."""
 _PARTED = 0.5
+_MORE = 1.2
+_PLACES = (Position, SwayAngle, Rotation, DriveAngle)
 
 
-def may_grow(journey: Journey) -> bool:
-    """Tell whether small differences may have grown of themselves, and whether that can be found out.
+def can_be_told(journey: Journey) -> bool:
+    """Tell whether a coarser run may be made, and would say something.
 
     Parameters
     ----------
@@ -37,19 +41,37 @@ def may_grow(journey: Journey) -> bool:
     Returns
     -------
     bool
-        Whether something has swung by more than half a radian, gone farther than half the machine's size, met corners,
-        or followed a continuous law, which may have corners of its own.
+        False under a sampled law asked in Python, in small motion, and where the run ended early.
     """
-    plan, sums = journey.plan, journey.books.sums
-    feed, model, watch = plan.feed, plan.model, journey.watch
+    feed, model = journey.plan.feed, journey.plan.model
     remembers = feed.controller is not None and not feed.continuous and feed.lowered is None
     ended = journey.status in (Status.FINISHED, Status.STOPPED)
-    if not ended or remembers or not isinstance(model, Model) or not journey.track.stretches:
+    return ended and not remembers and isinstance(model, Model) and model.large and journey.mark.steps > 0
+
+
+def may_grow(journey: Journey) -> bool:
+    """Tell whether small differences may have grown of themselves.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    bool
+        Whether something has swung by more than a quarter of a radian, gone farther than a quarter of the machine's
+        size, met corners, or followed a continuous law, which may have corners of its own. Not where samples keep
+        nearly all steps short: a coarser run would be the same.
+    """
+    plan, sums, watch = journey.plan, journey.books.sums, journey.watch
+    feed, model = plan.feed, plan.model
+    if feed.sample_time and journey.mark.steps < _MORE * journey.point.state.t / feed.sample_time:
         return False
     own = {*watch.names, *watch.corner_names}
     swung = bool((sums.moved > _FAR * yardsticks(model)).any())
     led = feed.continuous and feed.reads.size > 0
-    return model.large and (swung or led or any(event.name in own for event in journey.events))
+    return swung or led or any(event.name in own for event in journey.events)
 
 
 @dataclass(frozen=True)
@@ -62,7 +84,7 @@ class _Gap:
     size : numpy.ndarray, shape (instants,)
         The most so far, over the largest motion of the run.
     where : str
-        The node, or the motor's angle, at which that is most.
+        The output, the node or the motor's angle at which that is most.
     """
 
     t: np.ndarray
@@ -93,11 +115,12 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
         As it is where the coarser one tells nothing: it took no step, nearly all its steps are the same, or it has
         parted from the finer one so far that sums of local errors tell more.
     """
-    if not coarse.track.stretches:
+    if not coarse.report.steps:
         return run
     fewer, report = coarse.report.steps / run.report.steps, run.report
     free = (1.0 - fewer) / (1.0 - 1.0 / longer)
-    gap = _gap(run, coarse, journey)
+    kept = not journey.plan.feed.sample_time and report.steps <= _FEW and run.track.stretches and coarse.track.stretches
+    gap = (_gap if kept else _gap_of_rows)(run, coarse, journey)
     left = min(max(free, _LEAST), 1.0) * (longer**report.order - 1.0)
     error = float(gap.size[-1]) / left
     if error < report.drift and (free < _LEAST or gap.size[-1] > _PARTED):
@@ -112,13 +135,56 @@ def _gap(run: Run, coarse: Run, journey: Journey) -> _Gap:
     """Places and turns of nodes and angles of motors, in yardsticks, at instants of no rhythm."""
     model, begin, end = journey.plan.model, run.track.starts[0], min(run.final.t, coarse.final.t)
     assert isinstance(model, Model)
-    shares = (np.arange(1, _INSTANTS) + (_GOLDEN * np.arange(1, _INSTANTS)) % 1.0) / _INSTANTS
-    t = np.append(begin + (end - begin) * shares, end)
+    k = np.arange(1, _INSTANTS)
+    t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / _INSTANTS, end)
     apart = np.array([_apart(model, run.track.state(s)[0], coarse.track.state(s)[0]) for s in t])
-    most = max(float(farthest(model, journey.books.sums.moved).max()), 1e3 * journey.plan.tolerance.absolute)
-    names = (*map(str, model.structure.nodes), *(model.coordinates[i] for i in _sources(model)))
-    worst = int(np.argmax(apart.max(axis=0)))
-    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / most, names[worst])
+    worst = _names(model)[int(np.argmax(apart.max(axis=0)))]
+    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst)
+
+
+def _gap_of_rows(run: Run, coarse: Run, journey: Journey) -> _Gap:
+    """Places and angles among the outputs, row by row, and all nodes and motors at the end; in yardsticks.
+
+    For many steps, and those from sample to sample: these are kept as what they set out from, and would all have to be
+    taken again.
+    """
+    model, near = journey.plan.model, 1e-9 * run.final.t
+    assert isinstance(model, Model)
+    judged = [i for i, o in enumerate(model.structure.outputs) if isinstance(o, _PLACES)]
+    t = coarse.t[coarse.t <= run.final.t + near] if judged and len(run.t) >= _POINTS else np.zeros(0)
+    yards = output_yardsticks(model, 1.0)[judged]
+    rows = coarse.y[: len(t), judged] - _between(run.t, run.y[:, judged], t) if t.size else np.zeros((0, len(judged)))
+    apart, names = np.abs(rows) / np.where(yards > 0.0, yards, np.inf), [model.outputs[i] for i in judged]
+    if abs(coarse.final.t - run.final.t) <= near:
+        names += _names(model)
+        last = _apart(model, run.final, coarse.final)
+        wide = np.hstack([apart, np.zeros((len(apart), last.size))])
+        apart, t = np.vstack([wide, np.append(np.zeros(len(judged)), last)]), np.append(t, run.final.t)
+    if not apart.size:
+        return _Gap(np.array([run.final.t]), np.zeros(1), "")
+    worst = names[int(np.argmax(apart.max(axis=0)))]
+    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst)
+
+
+def _between(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Values at times between rows: the cubic through the four rows around each."""
+    first = np.clip(np.searchsorted(times, t) - 2, 0, len(times) - _POINTS)
+    at = first[:, None] + np.arange(_POINTS)
+    x = times[at]
+    off = t[:, None] - x
+    found = np.zeros((len(t), values.shape[1]))
+    for i in range(_POINTS):
+        others = [j for j in range(_POINTS) if j != i]
+        span = np.prod(x[:, [i]] - x[:, others], axis=1)
+        weight = np.divide(np.prod(off[:, others], axis=1), span, out=np.zeros(len(t)), where=span != 0.0)
+        found += weight[:, None] * values[at[:, i]]
+    return found
+
+
+def _most(journey: Journey) -> float:
+    """How far the machine has moved, in yardsticks: what shares are of."""
+    moved = farthest(journey.plan.model, journey.books.sums.moved)
+    return max(float(moved.max(initial=0.0)), 1e3 * journey.plan.tolerance.absolute)
 
 
 def _apart(model: Model, one: State, other: State) -> np.ndarray:
@@ -128,6 +194,10 @@ def _apart(model: Model, one: State, other: State) -> np.ndarray:
     nodes = np.maximum(way, 2.0 * np.arcsin(np.minimum(chord, 1.0)))[:-1]
     sources = _sources(model)
     return np.append(nodes, np.abs(one.q - other.q)[sources] / yardsticks(model)[sources])
+
+
+def _names(model: Model) -> list[str]:
+    return [*map(str, model.structure.nodes), *(model.coordinates[i] for i in _sources(model))]
 
 
 def _sources(model: Model) -> np.ndarray:
