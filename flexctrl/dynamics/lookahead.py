@@ -27,6 +27,7 @@ _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _BENT, _MISSED = 0.02, 0.5
 """What steps chosen by their error may leave the line by, and steps of one length: what they would not see at all."""
 _ENOUGH = 8
+_LEAST, _STEEP = 1e-6, 8.0
 _TOUCH = 1e-9
 _DEEPEST, _SMALLEST = 40, 1e-12
 _ROUND_OFF = 1e-12
@@ -38,6 +39,22 @@ class _Course(NamedTuple):
     times: np.ndarray
     values: np.ndarray
     swings: np.ndarray
+
+    @property
+    def _slopes(self) -> np.ndarray:
+        return np.asarray((np.abs(np.diff(self.values, axis=0)) / self.swings).max(axis=1) / np.diff(self.times))
+
+    @property
+    def steepest(self) -> int:
+        """Between which two instants it changes fastest: after that of this number."""
+        return int(np.argmax(self._slopes))
+
+    @property
+    def steep(self) -> bool:
+        """Whether it may jump: it changes far faster in one place than in most."""
+        slopes, at = self._slopes, self.steepest
+        change = slopes[at] * (self.times[at + 1] - self.times[at])
+        return bool(change > _LEAST and slopes[at] > _STEEP * np.median(slopes))
 
     def bends(self, end: int) -> float:
         """By how much it leaves the line to an instant, at most."""
@@ -80,13 +97,11 @@ def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
     for tried in range(_DEEPEST):
         course = _course(journey, span)
         last = len(course.times) - 1
-        if course.bends(last) <= _BENT:
-            return (float(course.times[last]) if tried else math.inf), False
-        bent = next(end for end in range(2, last + 1) if course.bends(end) > _BENT)
-        if (jump := _jump(journey, course, bent)) is not None:
+        if course.steep and (jump := _first_jump(journey, course)) < math.inf:
             return jump, True
         if course.bends(last) <= limit:
-            return _first_jump(journey, course)
+            return (float(course.times[last]) if tried else math.inf), False
+        bent = next(end for end in range(2, last + 1) if course.bends(end) > limit)
         if bent > _ENOUGH:
             return float(course.times[bent - 1]), False
         span = float(course.times[bent]) - t
@@ -95,20 +110,24 @@ def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
     return t + span, False
 
 
-def _first_jump(journey: Journey, course: _Course) -> tuple[float, bool]:
-    """The first jump beyond bends that steps of one length are let pass; infinity if there is none."""
+def _first_jump(journey: Journey, course: _Course) -> float:
+    """When the law jumps first; infinity if it does not."""
     first, t = math.inf, journey.point.state.t
-    while (jump := _jump(journey, course, len(course.times) - 1)) is not None and jump > t:
+    for _ in range(_DEEPEST):
+        if not course.steep or (jump := _jump(journey, course)) is None or not t < jump < first:
+            break
         first = jump
-        course = _course(journey, (1.0 - _TOUCH) * (jump - t))
-    return first, first < math.inf
+        if first - t <= journey.tick:
+            break
+        course = _course(journey, (1.0 - 4.0 * _TOUCH) * (first - t))
+    return first
 
 
 def _course(journey: Journey, span: float) -> _Course:
     """Ask the law over a span from here; closely only if that shows what is passed over otherwise."""
     course = _asked(journey, span, _FEWEST)
     closely = math.ceil(_OF_RUN * span / journey.plan.until)
-    if closely > _FEWEST and course.bends(len(course.times) - 1) <= _BENT:
+    if closely > _FEWEST and not course.steep and course.bends(len(course.times) - 1) <= _BENT:
         swings = journey.mark.swings
         closer = _asked(journey, span, closely)
         if closer.bends(len(closer.times) - 1) > 2.0 * _BENT:
@@ -138,13 +157,11 @@ def _said(journey: Journey, t: float) -> np.ndarray:
     return np.append(said.u, said.rate)
 
 
-def _jump(journey: Journey, course: _Course, bent: int) -> float | None:
-    """The first instant after a jump just before one at which the course has left its line; None if it is none."""
-    steps = np.abs(np.diff(course.values[: bent + 1], axis=0)) / course.swings
-    at = int(np.argmax(steps.max(axis=1)))
-    if (whole := float(steps[at].max())) <= _BENT:
-        return None
+def _jump(journey: Journey, course: _Course) -> float | None:
+    """The first instant after the jump where a course is steepest; None if it is none."""
+    at = course.steepest
     (a, b), (low, high) = course.times[at : at + 2].tolist(), course.values[at : at + 2]
+    whole = np.max(np.abs(high - low) / course.swings)
     while a < (middle := 0.5 * (a + b)) < b:
         said = _said(journey, middle)
         if np.max(np.abs(said - low) / course.swings) > np.max(np.abs(high - said) / course.swings):

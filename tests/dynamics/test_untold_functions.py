@@ -89,7 +89,7 @@ def test_jumps_of_all_sizes_are_met(method):
         x = step @ x
         places.append(x[0])
     run = fc.simulate(model, law, until=1.0, every=hold, method=method)
-    assert np.abs(run["x"][: len(places)] - 1.0 - places).max() < 0.04 * np.abs(places).max()
+    assert np.abs(run["x"][: len(places)] - 1.0 - places).max() < 0.02 * np.abs(places).max()
 
 
 @pytest.mark.parametrize("method", METHODS, ids=NAMES)
