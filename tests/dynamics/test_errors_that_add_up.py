@@ -25,7 +25,7 @@ def swing(damping: float = 0.0, **how) -> fc.Run:
     joints = [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")]
     structure = fc.Structure([spring, mass], joints, outputs=[fc.Position("x", mass.node, "x")])
     model = fc.assemble(structure, [fc.LargeRotation()])
-    return fc.simulate(model, start=model.displace([0.3]), **how)
+    return fc.simulate(model, start=model.displace([0.3]), **{"method": fc.Unchecked(fc.AdaptiveAlpha()), **how})
 
 
 def off(run: fc.Run) -> float:
