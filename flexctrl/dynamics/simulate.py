@@ -190,7 +190,8 @@ def _laid_beside(run: Run, journey: Journey, method: Checked, start: State | Res
 
     beside = replace(plan, method=coarser, tolerance=tolerance, until=end, tell=ended, autosave=None)
     try:
-        _, coarse = _travelled(beside, start, (), InMemory(), spacing)
+        # a run that keeps no rows, as a stream does not, is compared where it ends
+        _, coarse = _travelled(beside, start, (), InMemory(), spacing if len(run.t) > 1 else end)
     except (FlexctrlError, KeyboardInterrupt):
         return run
     return told_beside(run, coarse, journey, method.longer)
