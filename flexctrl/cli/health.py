@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from flexctrl.cli.answer import grid
+from flexctrl.dynamics.run import worst_output
 from flexctrl.errors import FlexctrlError
 from flexctrl.linear.certificate import Certificate
 from flexctrl.scene import Scene
@@ -45,6 +46,8 @@ def _integrator(data: Mapping[str, Any]) -> str:
         lines.append(f"errors of steps add up to {data['drift']:.2g} of the motion of {data['drifted']}")
     if data["error"] != data["drift"]:
         lines.append(f"off by {data['error']:.2g} of the motion, by a coarser run")
+    if data["output_errors"]:
+        lines.append(worst_output(data["output_errors"]))
     return "\n".join([*lines, grid(("energy", "J"), rows)])
 
 

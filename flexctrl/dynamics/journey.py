@@ -27,6 +27,7 @@ from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
 from flexctrl.dynamics.notes.adding import Drift
 from flexctrl.dynamics.notes.growing import growth
+from flexctrl.dynamics.notes.outputs import OutputErrors
 from flexctrl.dynamics.notes.straying import lost, thrown
 from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.records.books import Books
@@ -58,7 +59,7 @@ __all__ = ["Journey", "Plan"]
 
 _FORESEEN = 20_000
 _SECONDS = 0.1
-_NONE = Drift()
+_NONE, _NOTHING = Drift(), OutputErrors({})
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,7 @@ class Journey:
     fault: BaseException | None = None
     notes: tuple[str, ...] = ()
     drift: Drift = _NONE
+    outputs: OutputErrors = _NOTHING
     told: float = -math.inf
     balked: bool = False
     horizon: float = math.inf

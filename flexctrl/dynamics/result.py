@@ -6,6 +6,7 @@ import time
 
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.notes.adding import drifted
+from flexctrl.dynamics.notes.outputs import by_sums
 from flexctrl.dynamics.notes.straying import strayed
 from flexctrl.dynamics.notes.unsized import unsized
 from flexctrl.dynamics.notes.unsure import unsure
@@ -40,14 +41,16 @@ def result(journey: Journey) -> Run:
         rows = journey.rows.recorder.table()
     width = len(plan.model.outputs)
     journey.drift = drift = drifted(journey)
-    journey.notes += strayed(journey) + unsized(journey) + unsure(journey, rows[:, 1 : 1 + width])
-    if drift.note and journey.status is not Status.FAILED:
-        journey.notes += (drift.note,)
+    y = rows[:, 1 : 1 + width]
+    journey.outputs = by_sums(journey, y)
+    journey.notes += strayed(journey) + unsized(journey) + unsure(journey, y)
+    if journey.status is not Status.FAILED:
+        journey.notes += (drift.note,) * bool(drift.note) + journey.outputs.notes
     return Run(
         rows[:, 0],
         plan.model.outputs,
         plan.model.inputs,
-        rows[:, 1 : 1 + width],
+        y,
         rows[:, 1 + width :],
         state,
         journey.rows.frames,
@@ -81,6 +84,7 @@ def _report(journey: Journey) -> Report:
         drift=drift.share,
         drifted=drift.freedom,
         error=drift.share,
+        output_errors=journey.outputs.shares,
         message=journey.message,
         notes=(*model.notes, *journey.notes),
     )

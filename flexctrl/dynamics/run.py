@@ -136,6 +136,10 @@ class Report:
     error : float
         By how much the run is off, over the largest motion, growth of small differences included: by a coarser run laid
         beside it (`Checked`); ``drift`` where there is none.
+    output_errors : mapping of str to float
+        By how much places and angles among the outputs may be off, each over the range of its own values (1: all of
+        it): a deflection of millimetres beside a travel of metres. Empty for linear models and streamed rows; those
+        that move by no more than absolute tolerances are left out.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str
@@ -158,6 +162,7 @@ class Report:
     drift: float
     drifted: str
     error: float
+    output_errors: Mapping[str, float]
     message: str
     notes: tuple[str, ...]
 
@@ -174,10 +179,27 @@ class Report:
             *([f"loops of rigid parts closed to {self.closure_error:.2g}"] if self.closure_error else []),
             *([f"errors of steps add up to {self.drift:.2g} of the motion of {self.drifted}"] if self.drift else []),
             *([f"off by {self.error:.2g} of the motion, by a coarser run"] if self.error != self.drift else []),
+            *([worst_output(self.output_errors)] if self.output_errors else []),
             *([self.message] if self.message else []),
             *self.notes,
         ]
         return "\n".join(lines)
+
+
+def worst_output(errors: Mapping[str, float]) -> str:
+    """Return which output is off by the largest share of its own motion, in words.
+
+    Parameters
+    ----------
+    errors : mapping of str to float
+        As a report has them; one at least.
+
+    Returns
+    -------
+    str
+    """
+    name = max(errors, key=lambda output: errors[output])
+    return f"of the outputs {name} is off by the largest share of its own motion, up to {errors[name]:.2g}"
 
 
 @dataclass(frozen=True)
@@ -317,4 +339,4 @@ class Run:
         np.savetxt(path, np.column_stack([self.t, self.y, self.u]), delimiter=",", header=header, comments="")
 
 
-__all__ = ["EnergyBalance", "Moment", "Report", "Run", "Status", "Tolerance"]
+__all__ = ["EnergyBalance", "Moment", "Report", "Run", "Status", "Tolerance", "worst_output"]

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from flexctrl.dynamics.scales import farthest, yardsticks
-from flexctrl.dynamics.steps import Controlled, Fixed, Judging
+from flexctrl.dynamics.steps import Controlled, Fixed
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Drift", "drifted"]
+__all__ = ["Drift", "drifted", "remedy"]
 
 _TOLD, _AIM = 0.03, 0.01
 _REST = 10.0
@@ -33,11 +33,14 @@ class Drift(NamedTuple):
         The worst degree of freedom.
     note : str
         What is to be said of it; empty if it is little.
+    late : numpy.ndarray, shape (n,)
+        By how much each degree of freedom may run ahead of itself, or lag; empty where that is not known.
     """
 
     share: float = 0.0
     freedom: str = ""
     note: str = ""
+    late: np.ndarray = np.zeros(0)
 
 
 def drifted(journey: Journey) -> Drift:
@@ -72,7 +75,7 @@ def drifted(journey: Journey) -> Drift:
     shares = np.maximum(lags, _run_off(journey) / most)
     worst = int(np.argmax(shares))
     share, freedom = float(shares[worst]), model.coordinates[worst]
-    return Drift(share, freedom, _note(journey, stepper, share, freedom) if share > _TOLD else "")
+    return Drift(share, freedom, _note(journey, share, freedom) if share > _TOLD else "", shares * most)
 
 
 def _width(swept: np.ndarray, bent: np.ndarray, path: np.ndarray) -> np.ndarray:
@@ -99,17 +102,34 @@ def _run_off(journey: Journey) -> np.ndarray:
     return np.asarray(yard * np.minimum(abs(sums.made) / sums.turnover * np.maximum(rounds, swings), way))
 
 
-def _note(journey: Journey, stepper: Judging[Any], share: float, freedom: str) -> str:
+def _note(journey: Journey, share: float, freedom: str) -> str:
     """What is to be said, with the tolerance or the step that would leave little."""
-    plan = journey.plan
+    most = f"{100.0 * share:.2g} %" if share < 1.0 else "all (or a radian, or the machine's size)"
+    said = f"the errors of {journey.mark.steps} steps may have added up to {most} of the motion of {freedom}"
+    return f"{said}: {remedy(journey, share)}"
+
+
+def remedy(journey: Journey, share: float) -> str:
+    """Return which tolerance, or step, would leave a hundredth of motion whose errors of steps add up to a share.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end; its method tells errors of steps.
+    share : float
+
+    Returns
+    -------
+    str
+    """
+    plan, mark, stepper = journey.plan, journey.mark, journey.judging
+    assert stepper is not None
     pace, power = plan.method.pace, math.log2(stepper.remains(2.0) / stepper.remains(1.0))
     if isinstance(pace, Controlled):
         less, asked = (_AIM / share) ** (1.0 / (power * (1.0 - 1.0 / pace.steepness))), plan.tolerance
-        remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
+        less *= min(1.0, journey.point.state.t / (mark.steps * mark.size)) ** pace.steepness  # samples keep them short
+        said = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
         finer = pace.step * (_AIM / share) ** (1.0 / max(2.0 * power, plan.method.order))
-        remedy = f"take steps of {finer:.1g} s"
-    if plan.method.order == 2:
-        remedy += ", or take Richardson of the method"
-    most = f"{100.0 * share:.2g} %" if share < 1.0 else "all (or a radian, or the machine's size)"
-    return f"the errors of {journey.mark.steps} steps may have added up to {most} of the motion of {freedom}: {remedy}"
+        said = f"take steps of {finer:.1g} s"
+    return said + ", or take Richardson of the method" * (plan.method.order == 2)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.dynamics.notes.outputs import by_rows, placed
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.scales import farthest, output_yardsticks, yardsticks
 from flexctrl.dynamics.steps import Controlled
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
-from flexctrl.structure.outputs import DriveAngle, Position, Rotation, SwayAngle
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -27,7 +27,6 @@ _LEAST = 0.1
 """Where fewer steps than that could be longer, both runs are about the same but for what grows."""
 _PARTED = 0.5
 _MORE = 1.2
-_PLACES = (Position, SwayAngle, Rotation, DriveAngle)
 
 
 def can_be_told(journey: Journey) -> bool:
@@ -85,11 +84,14 @@ class _Gap:
         The most so far, over the largest motion of the run.
     where : str
         The output, the node or the motor's angle at which that is most.
+    outputs : numpy.ndarray, shape (outputs,)
+        The most in each output that is a place or an angle, in its own unit; 0 in others.
     """
 
     t: np.ndarray
     size: np.ndarray
     where: str
+    outputs: np.ndarray
 
 
 def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
@@ -125,10 +127,12 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
     error = float(gap.size[-1]) / left
     if error < report.drift and (free < _LEAST or gap.size[-1] > _PARTED):
         return run
-    notes = tuple(note for note in report.notes if note != journey.drift.note)
+    outputs = by_rows(journey, run.y, gap.outputs / left, error)
+    notes = tuple(note for note in report.notes if note not in (journey.drift.note, *journey.outputs.notes))
     if error > _TOLD:
         notes += (_note(journey, gap, left),)
-    return replace(run, report=replace(report, error=error, notes=notes))
+    known = replace(report, error=error, output_errors=outputs.shares, notes=notes + outputs.notes)
+    return replace(run, report=known)
 
 
 def _gap(run: Run, coarse: Run, journey: Journey) -> _Gap:
@@ -137,9 +141,12 @@ def _gap(run: Run, coarse: Run, journey: Journey) -> _Gap:
     assert isinstance(model, Model)
     k = np.arange(1, _INSTANTS)
     t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / _INSTANTS, end)
-    apart = np.array([_apart(model, run.track.state(s)[0], coarse.track.state(s)[0]) for s in t])
+    pairs = [(run.track.state(s)[0], coarse.track.state(s)[0]) for s in t]
+    apart = np.array([_apart(model, one, other) for one, other in pairs])
     worst = _names(model)[int(np.argmax(apart.max(axis=0)))]
-    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst)
+    read, judged = np.zeros(len(model.outputs)), placed(model)
+    read[judged] = np.max([abs(model.measure(one) - model.measure(other)) for one, other in pairs], axis=0)[judged]
+    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst, read)
 
 
 def _gap_of_rows(run: Run, coarse: Run, journey: Journey) -> _Gap:
@@ -150,10 +157,11 @@ def _gap_of_rows(run: Run, coarse: Run, journey: Journey) -> _Gap:
     """
     model, near = journey.plan.model, 1e-9 * run.final.t
     assert isinstance(model, Model)
-    judged = [i for i, o in enumerate(model.structure.outputs) if isinstance(o, _PLACES)]
+    judged, read = placed(model), np.zeros(len(model.outputs))
     t = coarse.t[coarse.t <= run.final.t + near] if judged and len(run.t) >= _POINTS else np.zeros(0)
     yards = output_yardsticks(model, 1.0)[judged]
     rows = coarse.y[: len(t), judged] - _between(run.t, run.y[:, judged], t) if t.size else np.zeros((0, len(judged)))
+    read[judged] = np.abs(rows).max(axis=0, initial=0.0)
     apart, names = np.abs(rows) / np.where(yards > 0.0, yards, np.inf), [model.outputs[i] for i in judged]
     if abs(coarse.final.t - run.final.t) <= near:
         names += _names(model)
@@ -161,9 +169,9 @@ def _gap_of_rows(run: Run, coarse: Run, journey: Journey) -> _Gap:
         wide = np.hstack([apart, np.zeros((len(apart), last.size))])
         apart, t = np.vstack([wide, np.append(np.zeros(len(judged)), last)]), np.append(t, run.final.t)
     if not apart.size:
-        return _Gap(np.array([run.final.t]), np.zeros(1), "")
+        return _Gap(np.array([run.final.t]), np.zeros(1), "", read)
     worst = names[int(np.argmax(apart.max(axis=0)))]
-    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst)
+    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst, read)
 
 
 def _between(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:

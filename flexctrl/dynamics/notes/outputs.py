@@ -1,0 +1,130 @@
+"""Places and angles among the outputs: how far each may be off, over its own motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.dynamics.notes.adding import remedy
+from flexctrl.dynamics.scales import yardsticks
+from flexctrl.model.model import Model
+from flexctrl.structure.outputs import DriveAngle, Position, Rotation, SwayAngle
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["OutputErrors", "by_rows", "by_sums", "placed"]
+
+_TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
+_BY_SUMS = "{name} has moved by {way:.2g}, and errors of {steps} steps may have added up to {far} of that: {remedy}"
+_BY_COARSER = "by a coarser run, {name} is off by {far} of its motion, which is {way:.2g}: {remedy}"
+_PLACES = (Position, SwayAngle, Rotation, DriveAngle)
+
+
+class OutputErrors(NamedTuple):
+    """What there is to be told of single outputs.
+
+    Attributes
+    ----------
+    shares : mapping of str to float
+        By how much each place or angle may be off, over the range of its own values.
+    notes : tuple of str
+        What is to be said of those that are off by more than the machine is.
+    """
+
+    shares: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+
+def placed(model: Model) -> list[int]:
+    """Return which outputs are places or angles."""
+    return [i for i, output in enumerate(model.structure.outputs) if isinstance(output, _PLACES)]
+
+
+def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:
+    """Return what local errors of steps may have added up to in each output.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end, with its drift.
+    y : numpy.ndarray, shape (rows, outputs)
+
+    Returns
+    -------
+    OutputErrors
+        Empty for linear models and where no rows are kept.
+    """
+    model, late = journey.plan.model, journey.drift.late
+    if not (isinstance(model, Model) and late.size and len(y) > 2):
+        return OutputErrors({})
+    off = reach(journey) @ late
+    way, judged = seen(journey, y)
+    shares = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in judged}
+    return OutputErrors(shares, _notes(journey, y, shares, journey.drift.share, _BY_SUMS))
+
+
+def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float) -> OutputErrors:
+    """Return how far each output is off by a coarser run, or by sums of local errors where these tell more.
+
+    A vibration that neither run resolves is missing in both.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end, with its drift and what that tells of outputs.
+    y : numpy.ndarray, shape (rows, outputs)
+    off : numpy.ndarray, shape (outputs,)
+        What a coarser run has each output off by.
+    error : float
+        How far the machine is off.
+
+    Returns
+    -------
+    OutputErrors
+    """
+    model, summed = journey.plan.model, journey.outputs.shares
+    if not summed:
+        return journey.outputs
+    way, judged = seen(journey, y)
+    beside = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in judged}
+    more = {name: share for name, share in beside.items() if share > summed[name]}
+    less = {name: share for name, share in summed.items() if name not in more}
+    notes = _notes(journey, y, more, error, _BY_COARSER) + _notes(journey, y, less, error, _BY_SUMS)
+    return OutputErrors({**summed, **more}, notes)
+
+
+def reach(journey: Journey) -> sp.csr_matrix:
+    """Return by how much each degree of freedom moves each output, without signs, shape (outputs, n)."""
+    model, state = journey.plan.model, journey.point.state
+    still = np.zeros(model.motion.raw)
+    return abs(model.signals.slopes(state, still, still.size)[0] @ model.motion.jacobian(state))
+
+
+def seen(journey: Journey, y: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Return how far outputs go, and which are places or angles that go farther than absolute tolerances."""
+    model, tolerance = journey.plan.model, journey.plan.tolerance
+    assert isinstance(model, Model)
+    yards = yardsticks(model)
+    least = _SEEN * tolerance.absolute * (reach(journey) @ np.where(np.isfinite(yards), yards, 0.0))
+    way = np.ptp(y, axis=0)
+    return way, [i for i in placed(model) if way[i] > least[i]]
+
+
+def _notes(journey: Journey, y: np.ndarray, shares: Mapping[str, float], error: float, said: str) -> tuple[str, ...]:
+    """What is to be said of outputs that are farther off than all else."""
+    ways = dict(zip(journey.plan.model.outputs, np.ptp(y, axis=0).tolist(), strict=True))
+    worst = sorted((name for name in shares if shares[name] > max(_TOLD, _BESIDE * error)), key=lambda n: -shares[n])
+    return tuple(
+        said.format(
+            name=name,
+            way=ways[name],
+            far=f"{100.0 * shares[name]:.2g} %",
+            steps=journey.mark.steps,
+            remedy=remedy(journey, shares[name]),
+        )
+        for name in worst
+    )
