@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -29,11 +29,15 @@ _NEAR = 1e-10
 
 @dataclass(frozen=True)
 class Supply:
-    """Inputs at an instant: u, the controller's state, and how fast that changes."""
+    """Inputs at an instant: u, the controller's state, and how fast that changes.
+
+    ``slid`` where u is between what a continuous law says on both sides of a jump.
+    """
 
     u: np.ndarray
     x: np.ndarray
     rate: np.ndarray
+    slid: bool = False
 
 
 @dataclass(frozen=True)
@@ -209,7 +213,10 @@ class Feed:
         first, last = h * before.rate, h * after.rate
         step = after.x - before.x
         x = before.x + s * (first + s * (3.0 * step - 2.0 * first - last + s * (first + last - 2.0 * step)))
-        return self.within(state, x)
+        inside = self.within(state, x)
+        if before.slid and after.slid:
+            return replace(inside, u=before.u + s * (after.u - before.u), slid=True)
+        return inside
 
     def _total(self, command: Any) -> list[float]:
         u = self._base.copy()
@@ -253,17 +260,28 @@ class Feed:
         except Exception as error:
             raise blamed(error)  # noqa: B904 - its cause is set
 
-    def slope(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> sp.csr_matrix:
-        """Return ∂(generalised forces of the inputs)/∂(own motion) through a continuous controller."""
+    def gains(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> np.ndarray:
+        """Return ∂(inputs)/∂(own motion) through a continuous controller over a step, shape (inputs, n)."""
         n = self.model.n
         if not self.continuous or not self.reads.size:
-            return sp.csr_matrix((n, n))
+            return np.zeros((len(self.base), n))
         rates = self.model.rates(state)
         on_place, on_rates = self.model.signals.slopes(state, rates, self.model.motion.raw)
         T = self.model.motion.jacobian(state)[: self.model.motion.raw]
         C = (seeds[0] * on_place + seeds[1] * on_rates)[self.reads] @ T
-        gain = sp.csr_matrix(self._gain(state, supply, h))
-        slope = (T.T @ self.model.reach(state, supply.u) @ gain @ C).tocsr()
+        return np.asarray(self._gain(state, supply, h) @ C)
+
+    def slope(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> sp.csr_matrix:
+        """Return ∂(generalised forces of the inputs)/∂(own motion) through a continuous controller."""
+        return self.felt(state, supply, self.gains(state, supply, h, seeds))
+
+    def felt(self, state: State, supply: Supply, gains: np.ndarray) -> sp.csr_matrix:
+        """Return the generalised forces of inputs that change with own motion by gains, shape (n, n)."""
+        n = self.model.n
+        if not gains.any():
+            return sp.csr_matrix((n, n))
+        T = self.model.motion.jacobian(state)[: self.model.motion.raw]
+        slope = (T.T @ self.model.reach(state, supply.u) @ sp.csr_matrix(gains)).tocsr()
         return self.model.switches.freed(state, slope) if self.model.switches.sticks(state) else slope
 
     def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:

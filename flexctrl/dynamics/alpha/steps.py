@@ -7,6 +7,7 @@ stable, with the high frequencies damped down to the spectral radius ρ.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from flexctrl.dynamics.alpha.coning import coning_of
 from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough, wanted
 from flexctrl.dynamics.alpha.outset import join, lengthen, renew, start
 from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
+from flexctrl.dynamics.alpha.sliding import jumps, may_slide, slide
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.run import Tolerance
@@ -46,6 +48,14 @@ class Tangent(NamedTuple):
     h: float
 
 
+class _Last(NamedTuple):
+    """The last correction of Newton's method: its worst freedom, the inputs that it is for, itself."""
+
+    worst: int
+    used: np.ndarray
+    correction: np.ndarray
+
+
 @dataclass
 class Stepper:
     """Steps of one model; keeps a factorised tangent while it is good.
@@ -71,6 +81,7 @@ class Stepper:
     memory: Tangent | None = None
     _solve: Solve | None = None
     _plan: Plan | None = None
+    _gains: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     _exact: bool = False
     _sides: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
@@ -133,10 +144,19 @@ class Stepper:
         StepError
             If Newton's method does not converge, even with a fresh tangent.
         """
+        slides = may_slide(self.feed)
+        if slides and point.supply.slid:
+            with suppress(StepError):
+                return slide(self, point, h)
         try:
             return self._attempt(point, h, fresh=False)
         except StepError:
-            return self._attempt(point, h, fresh=True)
+            try:
+                return self._attempt(point, h, fresh=True)
+            except StepError as failure:
+                if not slides or point.supply.slid:
+                    raise
+                return _slid(self, point, h, failure)
 
     def exactly(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later, solved to the last digits.
@@ -180,7 +200,7 @@ class Stepper:
             if caution.over(size, contraction, iteration) if wary else self._solved(size, contraction):
                 across = self._across(now, step, v)
                 if not across:
-                    return self._finish(point, h, step, v, rate, worst)
+                    return self._finish(point, h, step, v, rate, _Last(worst, supply.u, correction))
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
 
@@ -194,9 +214,9 @@ class Stepper:
         return step + self.coning(h, before, v), v, rate
 
     def _finish(
-        self, point: AlphaPoint, h: float, step: np.ndarray, v: np.ndarray, rate: np.ndarray, worst: int
+        self, point: AlphaPoint, h: float, step: np.ndarray, v: np.ndarray, rate: np.ndarray, last: _Last
     ) -> AlphaPoint:
-        c = self.coefficients
+        c, (worst, used, correction) = self.coefficients, last
         self.counts.worst = worst
         state = self.model.advance(point.state, step, v, later(point.state.t, h))
         motion = self.model.motion
@@ -207,7 +227,10 @@ class Stepper:
         algorithmic = c.blend(rate, point.rate, point.algorithmic)
         change = rate - point.rate
         lean = _lean(change * self.weight, point.trend * self.weight)
-        return AlphaPoint(state, rate, self.feed.at(state, point.supply, h), algorithmic, change, lean)
+        supply = self.feed.at(state, point.supply, h)
+        if may_slide(self.feed) and jumps(point.supply.u, used, supply.u, self._gains @ correction):
+            raise StepError(worst, f"the law jumps at t = {state.t:.6g} s")
+        return AlphaPoint(state, rate, supply, algorithmic, change, lean)
 
     def _solved(self, size: float, contraction: float) -> bool:
         """Tell whether a correction was the last that is needed, or the next is foretold to be none."""
@@ -238,7 +261,8 @@ class Stepper:
     def _factor(self, at: Tangent) -> None:
         slope = self.model.slope(at.state, at.v, at.rate, at.seeds, at.supply.u)
         if self.feed.continuous:
-            slope = slope + self.feed.slope(at.state, at.supply, at.h, at.seeds)
+            self._gains = self.feed.gains(at.state, at.supply, at.h, at.seeds)
+            slope = slope + self.feed.felt(at.state, at.supply, self._gains)
         try:
             solve = self.factorised(slope)
             self._solve = lambda force: solve(-force)
@@ -270,6 +294,14 @@ class Stepper:
     def remains(self, share: float) -> float:
         """Return what a run is off by: as much as its errors add up to."""
         return share
+
+
+def _slid(stepper: Stepper, point: AlphaPoint, h: float, failure: StepError) -> AlphaPoint:
+    """The end of a step that lies where the law jumps; what has failed otherwise."""
+    try:
+        return slide(stepper, point, h)
+    except StepError:
+        raise failure from None
 
 
 def _lean(change: np.ndarray, before: np.ndarray) -> float:

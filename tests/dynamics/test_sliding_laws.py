@@ -1,0 +1,159 @@
+"""Continuous laws that jump with what they read: sliding modes, relays, friction of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import flexctrl as fc
+
+REACHED = (np.sqrt(6.5625) - 1.25) / 2.5
+"""When 1.25 t² − 1 + 1.25 t is zero."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A continuous law in Python."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    says: Callable[[float, np.ndarray, np.ndarray], object]
+    states: int = 0
+    grows: Callable[[np.ndarray], object] = staticmethod(lambda y: ())
+    sample_time: float = 0.0
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(self.states)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.atleast_1d(np.asarray(self.says(t, x, y), dtype=float))
+
+    def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.asarray(self.grows(y), dtype=float)
+
+
+def carts(*masses: float) -> fc.Model:
+    """Carts side by side, each with its force, place and speed."""
+    bodies = [fc.PointMass(f"m{i}", (0, i, 0), mass) for i, mass in enumerate(masses)]
+    joints = [fc.Support(body.node, "v w") for body in bodies]
+    inputs = [fc.Force(f"f{i}", body.node, "x") for i, body in enumerate(bodies)]
+    outputs = [
+        signal
+        for i, body in enumerate(bodies)
+        for signal in (fc.Position(f"x{i}", body.node, "x"), fc.Velocity(f"v{i}", body.node, "x"))
+    ]
+    return fc.assemble(fc.Structure(bodies, joints, inputs=inputs, outputs=outputs), [fc.LargeRotation()])
+
+
+SLIDING = Law(("x0", "v0"), ("f0",), lambda t, x, y: -5.0 * np.sign(y[0] - 1.0 + 0.5 * y[1]))
+
+
+def slid(t: np.ndarray) -> np.ndarray:
+    """2 kg under 5 N until x − 1 + v/2 = 0; along that from there on."""
+    left = 1.0 - 1.25 * REACHED**2
+    return np.where(t < REACHED, 1.25 * t**2, 1.0 - left * np.exp(-2.0 * (t - REACHED)))
+
+
+@pytest.mark.parametrize(
+    ("method", "near", "most"),
+    [(None, 2e-3, 100), (fc.GeneralizedAlpha(0.01), 4e-3, 500), (fc.GeneralizedAlpha(0.01, rho=1.0), 4e-3, 500)],
+)
+def test_a_sliding_mode_slides_as_filippov_says(method, near, most):
+    """Steps with either value did not converge: they fell to nanoseconds, 40 ms of time each."""
+    run = fc.simulate(carts(2.0), SLIDING, until=5.0, method=method)
+    assert run.status is fc.Status.FINISHED
+    assert run["x0"] == pytest.approx(slid(run.t), abs=near)
+    assert run.report.steps <= most
+    late = run.t > REACHED + 0.2
+    assert np.abs(run["x0"] - 1.0 + 0.5 * run["v0"])[late].max() < 1e-5
+    assert np.abs(run["f0"][late]).max() < 5.0
+
+
+def test_what_is_commanded_is_the_equivalent_control():
+    """On x − 1 + v/2 = 0, v' = −2 v: 2 kg ask for −4 v."""
+    run = fc.simulate(carts(2.0), SLIDING, until=3.0, method=fc.GeneralizedAlpha(0.01), every=0.004)
+    late = run.t > 2.0
+    assert run["f0"][late] == pytest.approx(-4.0 * run["v0"][late], abs=0.05)
+
+
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(2e-3), fc.GeneralizedAlpha(5e-3, rho=1.0)])
+def test_friction_of_ones_own_sticks_and_breaks_loose(method):
+    """3 sin 2t over 2 N of friction on 2 kg: it is gone from asin(2/3)/2 to where 3/4 (cos 2t₀ − cos 2t) = t − t₀."""
+    law = Law(("v0",), ("f0",), lambda t, x, y: 3.0 * np.sin(2.0 * t) - 2.0 * np.sign(y[0]))
+    run = fc.simulate(carts(2.0), law, until=1.9, method=method)
+    loose = 0.5 * np.arcsin(2.0 / 3.0)
+    stuck = brentq(lambda t: 0.75 * (np.cos(2.0 * loose) - np.cos(2.0 * t)) - t + loose, 1.0, 1.9)
+
+    def way(t):
+        return (
+            0.75 * np.cos(2.0 * loose) * (t - loose)
+            - 0.375 * (np.sin(2.0 * t) - np.sin(2.0 * loose))
+            - (0.5 * (t - loose) ** 2)
+        )
+
+    assert run["x0"] == pytest.approx(way(np.clip(run.t, loose, stuck)), abs=2e-3)
+
+
+def test_a_law_that_stops_what_moves_holds_it():
+    """30 N back as soon as it goes on beyond 0.5 m: held there, as by friction; the run went on for hours."""
+    law = Law(("x0", "v0"), ("f0",), lambda t, x, y: 1.0 - (30.0 if y[0] > 0.5 and y[1] > 0.0 else 0.0))
+    run = fc.simulate(carts(2.0), law, until=6.0)
+    assert run.status is fc.Status.FINISHED
+    assert run.report.steps < 200
+    assert run["x0"][-1] == pytest.approx(0.5 + 0.5 / 29.0, abs=2e-3)
+    assert abs(run["v0"][-1]) < 1e-4
+
+
+def test_two_that_slide_each_have_their_value_between():
+    law = Law(
+        ("x0", "v0", "x1", "v1"),
+        ("f0", "f1"),
+        lambda t, x, y: (
+            -5.0 * np.sign(y[0] - 1.0 + 0.5 * y[1]),
+            0.1 * y[0] - 3.0 * np.sign(y[2] + 0.5 + 0.7 * y[3]),
+        ),
+    )
+    run = fc.simulate(carts(2.0, 1.0), law, until=3.0)
+    assert run.status is fc.Status.FINISHED
+    assert run["x0"] == pytest.approx(slid(run.t), abs=2e-3)
+    late = run.t > 1.5
+    assert np.abs(run["x1"] + 0.5 + 0.7 * run["v1"])[late].max() < 1e-4
+
+
+def test_a_law_with_states_slides_too():
+    law = Law(
+        ("x0", "v0"),
+        ("f0",),
+        lambda t, x, y: -5.0 * np.sign(y[0] - 1.0 + 0.5 * y[1]) + 0.2 * x[0],
+        states=1,
+        grows=lambda y: [1.0 - y[0]],
+    )
+    run = fc.simulate(carts(2.0), law, until=3.0)
+    late = run.t > 1.0
+    assert run.status is fc.Status.FINISHED
+    assert np.abs(run["x0"] - 1.0 + 0.5 * run["v0"])[late].max() < 1e-4
+
+
+def test_a_run_that_slides_goes_on_bit_for_bit(tmp_path):
+    model = carts(2.0)
+    whole = fc.simulate(model, SLIDING, until=2.0, method=fc.GeneralizedAlpha(0.01))
+    half = fc.simulate(model, SLIDING, until=1.0, method=fc.GeneralizedAlpha(0.01))
+    half.checkpoint.save(tmp_path / "half.ck")
+    start = fc.load_checkpoint(tmp_path / "half.ck")
+    rest = fc.simulate(model, SLIDING, until=2.0, method=fc.GeneralizedAlpha(0.01), start=start)
+    assert start.point.supply.slid
+    assert (rest.final.q == whole.final.q).all()
+    assert (rest.u == whole.u[-len(rest.u) :]).all()
+
+
+def test_a_smooth_law_steps_as_it_did():
+    """What does not jump is solved by Newton's method, however stiff."""
+    soft = Law(("x0", "v0"), ("f0",), lambda t, x, y: -5.0 * np.tanh(300.0 * (y[0] - 1.0 + 0.5 * y[1])))
+    run = fc.simulate(carts(2.0), soft, until=5.0)
+    assert run.status is fc.Status.FINISHED
+    assert run["x0"] == pytest.approx(slid(run.t), abs=5e-3)
+    assert not run.checkpoint.point.supply.slid
