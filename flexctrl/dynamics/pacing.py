@@ -6,7 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from flexctrl.dynamics.events.ending import ends_before
+from flexctrl.dynamics.events.impact import NO_IMPACT
 from flexctrl.dynamics.events.landing import Missed, towards
+from flexctrl.dynamics.events.law_impact import hits
 from flexctrl.dynamics.events.nearing import SHORTEST, SMALLEST
 from flexctrl.dynamics.events.switching import lead, lengthen
 from flexctrl.dynamics.run import Status
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["controlled", "fixed"]
 
 _NEAR = 1e-9
+_CAPS, _SHORTER = 2.0, 0.25
+"""Steps in which a law is hit are no longer than that many that follow the impact; longer ones are cut to a share."""
 
 
 def fixed(journey: Journey, stop: float, until: float) -> None:
@@ -70,7 +74,7 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
     Returns where it ends, its length, the length meant before, and by what its error lets that grow.
     """
     mark, t, why = journey.mark, journey.point.state.t, ""
-    size = mark.size
+    size, hit = mark.size, NO_IMPACT
     while True:
         if mark.led and h != mark.led:
             lead(journey, h)
@@ -86,6 +90,14 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
         error = journey.stepper.error(journey.point, after, h, journey.books.sums.moved, journey.plan.tolerance)
         factor = 0.9 * max(error, 1e-9) ** (-1.0 / pace.steepness)
         if error <= 1.0:
+            steps, cap = hits(journey, after, h) if h > _CAPS * hit[1] else hit
+            if h <= _CAPS * cap:
+                mark.follow, mark.cap = steps, cap
+            elif steps:
+                mark.rejected += 1
+                hit, size = (steps, cap), max(_SHORTER * h, cap)
+                h = size
+                continue
             return after, h, size, factor
         mark.rejected += 1
         size = h = h * max(0.2, factor)

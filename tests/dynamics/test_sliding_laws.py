@@ -23,7 +23,7 @@ class Law:
     outputs: tuple[str, ...]
     says: Callable[[float, np.ndarray, np.ndarray], object]
     states: int = 0
-    grows: Callable[[np.ndarray], object] = staticmethod(lambda y: ())
+    grows: Callable[[np.ndarray], object] | None = None
     sample_time: float = 0.0
 
     def initial(self) -> np.ndarray:
@@ -33,7 +33,7 @@ class Law:
         return np.atleast_1d(np.asarray(self.says(t, x, y), dtype=float))
 
     def rate(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return np.asarray(self.grows(y), dtype=float)
+        return np.asarray(self.grows(y) if self.grows else (), dtype=float)
 
 
 def carts(*masses: float) -> fc.Model:

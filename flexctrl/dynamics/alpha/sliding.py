@@ -1,7 +1,7 @@
 """Steps that end where a continuous law jumps with what it reads, and pushes back from both sides.
 
-A relay, a sliding mode or an ideal switch has no value there with which a step could end: with either it would be on the
-other side. The motion slides along where the law jumps, under the value between the two that keeps it there (A. F.
+A relay, a sliding mode or an ideal switch has no value there with which a step could end: with either it would be on
+the other side. The motion slides along where the law jumps, under the value between the two that keeps it there (A. F.
 Filippov (1988): Differential Equations with Discontinuous Righthand Sides). As an implicit step knows where it ends, it
 finds that value itself, without chatter (V. Acary, B. Brogliato (2010): Implicit Euler numerical scheme and
 chattering-free implementation of sliding mode systems).
@@ -133,7 +133,7 @@ class _End(NamedTuple):
 def _between(
     end: Callable[[np.ndarray], _End], u: np.ndarray, i: int, span: tuple[float, float]
 ) -> tuple[np.ndarray, bool]:
-    """Inputs of which one is where the law turns from saying more to saying less, or as it says; and whether it turns."""
+    """Inputs of which one is where the law turns from more to less, or what it says; and whether it turns."""
     from scipy.optimize import brentq
 
     def having(value: float) -> np.ndarray:

@@ -16,7 +16,7 @@ from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
-__all__ = ["DAMPED", "LASTING", "SEEN", "SMALL", "STEPS", "finer", "lasts"]
+__all__ = ["DAMPED", "LASTING", "NO_IMPACT", "SEEN", "SMALL", "STEPS", "finer", "followed", "lasts"]
 
 SEEN = 300.0
 SMALL = 1e-4
@@ -25,6 +25,7 @@ LASTING = 56
 """Steps an impact is followed for: it takes π/ω, 38 of them, or stays."""
 DAMPED = 0.01
 """Twice the damping ratio of an impact that is followed whether or not it is seen."""
+NO_IMPACT = 0, 0.0
 _USUAL = 1e-4
 
 
@@ -60,19 +61,42 @@ def lasts(
     float
         [s]
     """
-    tolerance, moved, turnover = how
-    none = 0, 0.0
+    turnover = how[2]
     still, v = np.zeros(model.n), beyond.v
     pushes = [model.slope(state, v, still, (1.0, 0.0, 0.0), u) @ v for state in (beyond, before)]
     momentum = -(model.slope(beyond, v, still, (0.0, 0.0, 1.0), u) @ v)
     stiffness, mass = -float(v @ (pushes[0] - pushes[1])), float(v @ momentum)
     if not (stiffness > 0.0 and mass > 2.0 * SMALL * turnover):
-        return none
-    period = math.sqrt(mass / stiffness)
+        return NO_IMPACT
     drag = float(v @ (model.balance(before, v, still) - model.balance(beyond, v, still)))
-    far = farthest(model, moved)
-    if drag * period > DAMPED * mass:
+    return followed(model, v, (stiffness / mass, drag / mass), how[:2])
+
+
+def followed(
+    model: Plant, v: np.ndarray, brought: tuple[float, float], how: tuple[Tolerance, np.ndarray]
+) -> tuple[int, float]:
+    """Return how many steps follow an impact, and how long; none where the control of steps sees it.
+
+    Parameters
+    ----------
+    model : Plant
+    v : numpy.ndarray
+        The speeds that run into it.
+    brought : tuple of 2 floats
+        ω² and twice the rate at which damping ends them [1/s²], [1/s].
+    how : tuple of Tolerance and numpy.ndarray
+        What is allowed, how far each degree of freedom has been.
+
+    Returns
+    -------
+    int
+    float
+        [s]
+    """
+    (square, rate), (tolerance, moved) = brought, how
+    period, far = math.sqrt(1.0 / square), farthest(model, moved)
+    if rate * period > DAMPED:
         times = finer(tolerance.relative + tolerance.absolute / max(float(far.max()), tolerance.absolute))
         return int(LASTING * times), period / (STEPS * times)
     deep = np.abs(v) * period / yardsticks(model) >= SEEN * tolerance.of(far)
-    return none if deep.any() else (LASTING, period / STEPS)
+    return NO_IMPACT if deep.any() else (LASTING, period / STEPS)

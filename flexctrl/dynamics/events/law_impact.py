@@ -1,0 +1,79 @@
+"""Impacts on what a continuous law does, a buffer of one's own: no corner is known beforehand that a step could end at.
+
+As at corners of laws of force, the speed that comes back is at stake, and an error of places does not see it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.dynamics.events.impact import NO_IMPACT, SMALL, STEPS, followed
+from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.steps import Point
+from flexctrl.model.state import State
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["hits"]
+
+_FELT, _MORE = 1.0 / STEPS**2, 4.0
+_NUDGE, _TINY = 1e-7, 1e-300
+
+
+def hits(journey: Journey, after: Point, h: float) -> tuple[int, float]:
+    """Return how many steps follow an impact on the law within a step, and how long; none where nothing hits.
+
+    Along the speeds v that the step begins with, ω² = v·ΔK v / v·M v with what the law's stiffness has grown by over
+    the step. A law as stiff before is followed by the control of steps.
+
+    Parameters
+    ----------
+    journey : Journey
+        At the start of the step.
+    after : Point
+        At its end.
+    h : float
+        [s]
+
+    Returns
+    -------
+    int
+    float
+        [s]
+    """
+    feed, books, before = journey.plan.feed, journey.books, journey.point
+    one, other = before.supply, after.supply
+    told = not feed.continuous or feed.answering is not None or not feed.reads.size
+    if told or one.slid or other.slid or np.array_equal(one.u, other.u):
+        return NO_IMPACT
+    model, v = feed.model, before.state.v
+    twice = 2.0 * model.energy(before.state)[0]
+    if twice <= 2.0 * SMALL * books.sums.turnover:
+        return NO_IMPACT
+    stiff, damped = _answers(journey, after, v, 1.0)
+    if not h * h * stiff > _FELT * twice:
+        return NO_IMPACT
+    soft, calm = _answers(journey, before, v, -1.0)
+    if stiff <= _MORE * max(soft, 0.0):
+        return NO_IMPACT
+    plan = journey.plan
+    return followed(
+        plan.model, v, ((stiff - soft) / twice, (damped - calm) / twice), (plan.tolerance, books.sums.moved)
+    )
+
+
+def _answers(journey: Journey, point: Point, v: np.ndarray, side: float) -> tuple[float, float]:
+    """By how much the law pushes back along some speeds: v·K v and v·C v, by differences ahead or back."""
+    feed, model, state, x = journey.plan.feed, journey.plan.model, point.state, point.supply.x
+    small = side * _NUDGE / max(float(np.abs(v / yardsticks(model)).max()), _TINY)
+
+    def pushed(there: State) -> float:
+        return float(v @ model.loads(state, feed.within(there, x).u))
+
+    here = pushed(state)
+    moved = pushed(model.advance(state, small * v, state.v, state.t))
+    faster = pushed(state.with_(v=state.v + side * _NUDGE * v))
+    return (here - moved) / small, (here - faster) / (side * _NUDGE)
