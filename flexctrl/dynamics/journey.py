@@ -17,26 +17,23 @@ from flexctrl.dynamics.events.event import EventError, Occurrence
 from flexctrl.dynamics.events.switching import beyond
 from flexctrl.dynamics.events.watch import Crossing, Watch
 from flexctrl.dynamics.events.watching import watched
-from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.lookahead import look_ahead
-from flexctrl.dynamics.march.ride import ride, rides
-from flexctrl.dynamics.march.stepper import MarchingStepper, plain_of
-from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
-from flexctrl.dynamics.methods.extrapolation import Richardson
-from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
+from flexctrl.dynamics.losing import foresee, look_back, remedy
+from flexctrl.dynamics.march.ride import ride
+from flexctrl.dynamics.march.stepper import plain_of
 from flexctrl.dynamics.notes.adding import Drift
 from flexctrl.dynamics.notes.growing import growth
 from flexctrl.dynamics.notes.outputs import OutputErrors
-from flexctrl.dynamics.notes.straying import lost, thrown
 from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track
 from flexctrl.dynamics.records.record import Unwritten, writing
 from flexctrl.dynamics.records.rows import Rows
+from flexctrl.dynamics.renewing import renew
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import (
-    Controlled,
     Counts,
     Exact,
     Fixed,
@@ -46,18 +43,15 @@ from flexctrl.dynamics.steps import (
     Point,
     StepError,
     Stepper,
-    Twofold,
     failed_step,
 )
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
-from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
 __all__ = ["Journey", "Plan"]
 
-_FORESEEN = 20_000
 _SECONDS = 0.1
 _NONE, _NOTHING = Drift(), OutputErrors({})
 
@@ -111,6 +105,8 @@ class Journey:
         Whether many steps at once have just ended before one that is to be taken by itself.
     horizon : float
         Until when the law is known to follow a line, with what it reads held [s]; infinity if nothing is in sight.
+    seen : tuple of int and float
+        How many steps had been taken when their number was last foreseen, and when that was [s].
     """
 
     plan: Plan
@@ -132,12 +128,12 @@ class Journey:
     told: float = -math.inf
     balked: bool = False
     horizon: float = math.inf
+    seen: tuple[int, float] = (0, 0.0)
     saved: Checkpoint | None = None
     _memory: Any = None
     _counts: Counts = field(default_factory=Counts)
     _told: float = 0.0
     _kept: float = 0.0
-    _seen: tuple[int, float] = (0, 0.0)
 
     def travel(self) -> None:
         """Go on to the end, or as far as it goes."""
@@ -209,7 +205,7 @@ class Journey:
         if self.status in (Status.FINISHED, Status.STOPPED) and (unresolved := self.books.unresolved):
             ended = f" (it would have ended: {self.message})" if self.message else ""
             self.status = Status.FAILED
-            self.message = f"{unresolved} at t = {self.point.state.t:.6g} s{ended}; {self._remedy}"
+            self.message = f"{unresolved} at t = {self.point.state.t:.6g} s{ended}; {remedy(self)}"
         elif self.status is not Status.FAILED:
             self.notes += self.books.doubts
 
@@ -238,38 +234,20 @@ class Journey:
                 return
             look_ahead(self)
             if (stop := self.stops.next) - t <= self.tick:
-                self._renew(stop)
+                renew(self, stop)
                 self._pause()
                 continue
             self.go(stop, self.plan.until)
             self._pause()
-            if apart := self.plan.model.apart(self.point.state):
-                raise StepError(self.stepper.counts.worst, f"{apart} (t = {self.point.state.t:.6g} s)")
-            if self.books.overflown:
-                where = f"at t = {self.point.state.t:.6g} s; look at the commands and at the start"
-                raise StepError(self.stepper.counts.worst, f"energies are beyond all numbers {where}")
-            if nonsense := self.books.nonsense:
-                where = f"at t = {self.point.state.t:.6g} s; {self._remedy}"
-                raise StepError(self.stepper.counts.worst, f"{nonsense} {where}")
-            self._look_back()
+            look_back(self)
             if (now := time.perf_counter()) - self._told > _SECONDS:
                 self._told = now
                 self.plan.tell(self.point.state.t / self.plan.until)
-                self._foresee()
+                foresee(self)
             if self.plan.autosave is not None and now - self._kept > self.plan.autosave.seconds:
                 self._kept = now
                 self._keep(self.plan.autosave.path)
             interruption.check()
-
-    def _look_back(self) -> None:
-        """Raise StepError where a loop has thrown the machine away: chosen steps would be ever more and shorter."""
-        where, remedy = f"at t = {self.point.state.t:.6g} s", "look at signs and gains of the controller"
-        if lost(self):
-            gone = f"{where} a part has gone so far that no number tells the shape of the machine any more"
-            raise StepError(self.stepper.counts.worst, f"the loop is not stable: {gone}; {remedy}")
-        if isinstance(self.plan.method.pace, Controlled) and (worst := thrown(self)) is not None:
-            gone = f"{where} a part has gone a million times the size of the machine, ever faster"
-            raise StepError(worst, f"the loop is not stable: {gone}; {remedy}, or end the run before")
 
     def _pause(self) -> None:
         """Take note of what later steps depend on, and what they have cost so far."""
@@ -286,23 +264,6 @@ class Journey:
         self.balked = False
 
     @property
-    def _remedy(self) -> str:
-        """What to do where steps of this length make energy."""
-        pace, method = self.plan.method.pace, self.plan.method
-        if isinstance(method, Richardson):
-            finer = f"steps smaller than {pace.step:g} s" if isinstance(pace, Fixed) else "a smaller Tolerance"
-            return f"the coarser of the two runs of Richardson no longer follows the motion: take {finer}"
-        if isinstance(method, ExplicitRungeKutta):
-            return "stiff parts are for implicit methods: take AdaptiveAlpha, or GeneralizedAlpha(step)"
-        if not isinstance(pace, Fixed):
-            return "give a smaller Tolerance"
-        smaller = f"take steps smaller than {pace.step:g} s, or AdaptiveAlpha, which finds them"
-        motion, switches = self.plan.model.motion, self.plan.model.switches
-        if isinstance(method, ConservingMidpoint) or motion.flows.size or switches.names or self.books.sums.lost:
-            return smaller
-        return f"{smaller}, or ConservingMidpoint({pace.step:g}), which keeps energies of springs in such steps"
-
-    @property
     def glance(self) -> float:
         """After how long at most a run looks at the clock on the wall [s]."""
         autosave = self.plan.autosave
@@ -313,23 +274,6 @@ class Journey:
         self.rows.recorder.flush()
         with writing(path):
             (self.saved or self.snapshot()).save(path)
-
-    def _foresee(self) -> None:
-        """Raise StepError if the run would take more steps than it may, at the pace of the latter half of them."""
-        pace, steps, t = self.plan.method.pace, self.mark.steps, self.point.state.t
-        before, since = self._seen
-        if not isinstance(pace, Controlled) or steps < max(_FORESEEN, 2 * before):
-            return
-        self._seen = steps, t
-        mean = (t - since) / (steps - before)
-        left = (self.plan.until - t) / mean if mean > 0.0 else math.inf
-        if before and steps + left > pace.most:
-            raise StepError(
-                self.stepper.counts.worst,
-                f"steps are {mean:.1e} s long on average at t = {t:.6g} s: {left:.1e} more of them to "
-                f"{self.plan.until:g} s; look for rates beyond what is meant, stiff parts or a contact that chatters, "
-                f"give a larger Tolerance or a shorter run, or allow them with most_steps (now {pace.most:g})",
-            )
 
     def snapshot(self) -> Checkpoint:
         """Return where the run stands."""
@@ -356,63 +300,6 @@ class Journey:
             self.told,
             self.balked,
         )
-
-    def _renew(self, stop: float) -> None:
-        """New inputs at a sample instant or break; accelerations jump with them."""
-        if self.point.state.t != stop:
-            self.point = replace(self.point, state=self.point.state.with_(t=stop))
-        self.stops.go_by(stop)
-        self.mark.left = 0
-        feed, before, state = self.plan.feed, self.point.supply, self.point.state
-        fresh = feed.restart(state, before) if feed.continuous else feed.sample(state, before)
-        if np.array_equal(fresh.u, before.u):
-            several, point = self.stepper, self.point
-            self.point = several.fed(point, fresh) if isinstance(several, Twofold) else replace(point, supply=fresh)
-        else:
-            self._jump(fresh, self.coming(stop))
-        if not self.watch.idle and not np.array_equal(fresh.u, before.u):
-            self.leapt()
-        self.rows.here(self.point, 1e-6 * self.mark.size)
-
-    def _jump(self, fresh: Supply, step: float) -> None:
-        """Let the inputs jump, as a ride does where steps are marched, with a step about to be taken."""
-        stepper, held, leapt = self.stepper, self.point, None
-        if isinstance(stepper, MarchingStepper) and self.plan.model.switches.names and rides(self):
-            leapt = stepper.leap(held, fresh, step)
-            stepper = stepper.plain
-        if leapt is None:
-            held = replace(held, state=self.under(fresh.u))
-            leapt = stepper.renew(held, fresh, step)
-        self.point = leapt
-        self.books.jump(held, leapt, step)
-
-    def coming(self, t: float) -> float:
-        """Return the length of the step after a stop, which is over."""
-        pace, left = self.plan.method.pace, self.stops.next - t
-        if not isinstance(pace, Fixed):
-            return self.mark.size
-        return left / max(1, math.ceil(left / pace.step - 1e-6)) if math.isfinite(left) else pace.step
-
-    def under(self, u: np.ndarray) -> State:
-        """Return the state under inputs that have jumped; note what breaks loose with them."""
-        switches, state = self.plan.model.switches, self.point.state
-        torn = switches.under(state, u)
-        loose = (switches.phases(state) == STUCK) & (switches.phases(torn) != STUCK)
-        for switch in np.flatnonzero(loose):
-            self.happens(Crossing(state.t, len(self.watch.events) + int(switch), True), state, u)
-        return torn
-
-    def leapt(self) -> None:
-        """Note the events that a jump of the inputs has brought about; one of them may end the run."""
-        watch, point = self.watch, self.point
-        leaps = watch.leaps(point)
-        for crossing in leaps:
-            watch.reach(crossing)
-        leaps = [crossing for crossing in leaps if not self.is_over(crossing)]
-        for crossing in leaps:
-            self.happens(crossing, point.state, point.supply.u)
-        self.end_by(leaps, point.state.t)
-        watch.settle(point)
 
     def end_by(self, crossings: Sequence[Crossing], t: float) -> None:
         """End the run if any of what happens at an instant ends it; say which do."""

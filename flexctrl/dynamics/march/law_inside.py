@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.jumping import coming
 from flexctrl.dynamics.march.guarding import Begun, go_back, next_span
 from flexctrl.dynamics.march.law import Sampling
 from flexctrl.dynamics.march.legs import Told
@@ -49,7 +50,7 @@ def told(ride: Ride, deadline: float) -> bool:
             break
     ride.mute = status == SILENT
     if m.jumping:
-        marcher.about_to(j.coming(m.t))
+        marcher.about_to(coming(j, m.t))
         ride.jumped = status == DONE and marcher.jump(ride.supply.u) == DONE
         m.jumping = 0
     return ride.mute or (ride.well(status) and ride.jumped and done > 0 and not ride.near)

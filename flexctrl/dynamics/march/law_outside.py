@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.jumping import coming
 from flexctrl.dynamics.march.guarding import Begun, go_back
 from flexctrl.dynamics.march.legs import Held
 from flexctrl.dynamics.march.lookout import FAR
@@ -85,7 +86,7 @@ def _sampled(ride: Ride, held: Held, first: np.ndarray, done: int, status: int) 
         ride.legs.parts.append(held)
         ride.written(done, first, held.commands(ride.supply.u))
     if m.jumping:
-        marcher.about_to(ride.journey.coming(m.t))
+        marcher.about_to(coming(ride.journey, m.t))
         ride.jumped = status == DONE and marcher.jump(ride.supply.u) == DONE
         m.jumping = 0
         mark.left = 0

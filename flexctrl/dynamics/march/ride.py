@@ -16,6 +16,7 @@ import numpy as np
 from flexctrl.dynamics.events.switching import beyond
 from flexctrl.dynamics.events.watch import Crossing
 from flexctrl.dynamics.inputs import Stepwise
+from flexctrl.dynamics.jumping import coming, leapt, under
 from flexctrl.dynamics.march.guarding import EVENT, guarded, warily
 from flexctrl.dynamics.march.law_inside import told
 from flexctrl.dynamics.march.law_outside import samples
@@ -272,7 +273,7 @@ class Ride:
             j.rows.drawn(self.weaver.last)
         elif written and abs(self.last.t - stop) < self.tick:
             j.rows.frame(self.last)
-        self.marcher.about_to(j.coming(stop))
+        self.marcher.about_to(coming(j, stop))
         self.jumped = same(u, before.u) or self.marcher.jump(u) == DONE
         self.marcher.under(self.supply)
         if self.lookout is None:
@@ -299,9 +300,9 @@ class Ride:
         if self.turn is not None:
             j.point = beyond(j, j.point, self.turn)
         if self.leapt:
-            j.leapt()
+            leapt(j)
         if not self.jumped:
-            held = replace(j.point, state=j.under(self.supply.u))
+            held = replace(j.point, state=under(j, self.supply.u))
             j.point = self.stepper.plain.renew(held, self.supply, j.mark.size)
             j.books.turn(j.point, j.mark.size)
         return True

@@ -1,0 +1,49 @@
+"""What comes of inputs that jump: a step of another length, contacts that break loose, events."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.dynamics.events.watch import Crossing
+from flexctrl.dynamics.steps import Fixed
+from flexctrl.model.laws.friction_kinds import STUCK
+from flexctrl.model.state import State
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["coming", "leapt", "under"]
+
+
+def coming(journey: Journey, t: float) -> float:
+    """Return the length of the step after a stop, which is over."""
+    pace, left = journey.plan.method.pace, journey.stops.next - t
+    if not isinstance(pace, Fixed):
+        return journey.mark.size
+    return left / max(1, math.ceil(left / pace.step - 1e-6)) if math.isfinite(left) else pace.step
+
+
+def under(journey: Journey, u: np.ndarray) -> State:
+    """Return the state under inputs that have jumped; note what breaks loose with them."""
+    switches, state = journey.plan.model.switches, journey.point.state
+    torn = switches.under(state, u)
+    loose = (switches.phases(state) == STUCK) & (switches.phases(torn) != STUCK)
+    for switch in np.flatnonzero(loose):
+        journey.happens(Crossing(state.t, len(journey.watch.events) + int(switch), True), state, u)
+    return torn
+
+
+def leapt(journey: Journey) -> None:
+    """Note the events that a jump of the inputs has brought about; one of them may end the run."""
+    watch, point = journey.watch, journey.point
+    leaps = watch.leaps(point)
+    for crossing in leaps:
+        watch.reach(crossing)
+    leaps = [crossing for crossing in leaps if not journey.is_over(crossing)]
+    for crossing in leaps:
+        journey.happens(crossing, point.state, point.supply.u)
+    journey.end_by(leaps, point.state.t)
+    watch.settle(point)
