@@ -12,7 +12,7 @@ from flexctrl.kernels.kernel import CasadiVM
 OF_THAT = "of that"
 
 
-def trolley(law_every: float = 0.02, backend=None):
+def trolley(backend=None, more: int = 0):
     """A trolley of 50 kg under a sampled law on a girder of 8 m that bends by a centimetre, with a load on a rope."""
     tube = fc.Section.tube(fc.STEEL, 0.08, 0.004)
     girder = fc.Beam("girder", (0, 0, 0), (8, 0, 0), tube, elements=6)
@@ -23,12 +23,13 @@ def trolley(law_every: float = 0.02, backend=None):
     joints += [fc.Pin(cart.node, rope.start), fc.Pin(rope.end, load.node)]
     outputs = [fc.Position("s", cart.travel, "x"), fc.Velocity("rate", cart.travel, "x")]
     outputs += [fc.Position("bend", cart.node, "z"), fc.Position("load", load.node, "x")]
+    outputs += [fc.Position(f"z{i}", girder.node(i + 1), "z") for i in range(more)]
     parts, inputs = [girder, cart, rope, load], [fc.Force("force", cart.travel, "x")]
     structure = fc.planar(fc.Structure(parts, joints, inputs=inputs, outputs=outputs), "y")
     effects = [fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(beta=1e-4)]
     model = fc.assemble(structure, effects, backend)
     gains = pd(kp=400.0, kd=300.0, measured="s", rate="rate", command="force")
-    return model, fc.Sampled(fc.Tracking(gains, {"s": MinimumJerk(5.0, 3.0, start=1.0)}), law_every)
+    return model, fc.Sampled(fc.Tracking(gains, {"s": MinimumJerk(5.0, 3.0, start=1.0)}), 0.02)
 
 
 @pytest.fixture(scope="module")
@@ -88,3 +89,13 @@ def test_what_stands_still_and_linear_models_tell_nothing():
     assert "load" not in still.report.output_errors
     linear = fc.linearize(model, fc.equilibrium(model))
     assert not fc.simulate(linear, until=0.5).report.output_errors
+
+
+def test_one_note_names_the_worst_of_many():
+    model, law = trolley(more=4)
+    run = fc.simulate(model, law, until=2.0, every=0.05, method=fc.GeneralizedAlpha(0.01))
+    (note,) = [note for note in run.report.notes if OF_THAT in note]
+    shares = sorted(run.report.output_errors, key=run.report.output_errors.__getitem__)
+    assert note.startswith(f"{shares[-1]} has moved")
+    assert f"beside it {shares[-2]} " in note
+    assert note.endswith("and 1 more")

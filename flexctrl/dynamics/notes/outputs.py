@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["OutputErrors", "by_rows", "by_sums", "placed"]
 
 _TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
+_NAMED = 3
 _BY_SUMS = "{name} has moved by {way:.2g}, and errors of {steps} steps may have added up to {far} of that: {remedy}"
 _BY_COARSER = "by a coarser run, {name} is off by {far} of its motion, which is {way:.2g}: {remedy}"
 _PLACES = (Position, SwayAngle, Rotation, DriveAngle)
@@ -115,16 +116,16 @@ def seen(journey: Journey, y: np.ndarray) -> tuple[np.ndarray, list[int]]:
 
 
 def _notes(journey: Journey, y: np.ndarray, shares: Mapping[str, float], error: float, said: str) -> tuple[str, ...]:
-    """What is to be said of outputs that are farther off than all else."""
-    ways = dict(zip(journey.plan.model.outputs, np.ptp(y, axis=0).tolist(), strict=True))
-    worst = sorted((name for name in shares if shares[name] > max(_TOLD, _BESIDE * error)), key=lambda n: -shares[n])
-    return tuple(
-        said.format(
-            name=name,
-            way=ways[name],
-            far=f"{100.0 * shares[name]:.2g} %",
-            steps=journey.mark.steps,
-            remedy=remedy(journey, shares[name]),
-        )
-        for name in worst
-    )
+    """What is to be said of outputs that are farther off than all else: of the worst, and the names of others."""
+    far = [name for name in shares if shares[name] > max(_TOLD, _BESIDE * error)]
+    if not far:
+        return ()
+    worst, *others = sorted(far, key=lambda name: -shares[name])
+    way = float(np.ptp(y[:, journey.plan.model.outputs.index(worst)]))
+    share, do = shares[worst], remedy(journey, shares[worst])
+    note = said.format(name=worst, way=way, far=f"{100.0 * share:.2g} %", steps=journey.mark.steps, remedy=do)
+    if not others:
+        return (note,)
+    named = ", ".join(f"{name} {100.0 * shares[name]:.2g} %" for name in others[:_NAMED])
+    more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+    return (f"{note}; beside it {named}{more}",)
