@@ -73,6 +73,13 @@ def test_a_sliding_mode_slides_as_filippov_says(method, near, most):
     assert np.abs(run["f0"][late]).max() < 5.0
 
 
+def test_extrapolated_runs_slide_with_their_finer_one():
+    """Their books take the value between for the input, not what the law says beside it."""
+    run = fc.simulate(carts(2.0), SLIDING, until=2.0, method=fc.Richardson(fc.GeneralizedAlpha(0.01)))
+    assert run.status is fc.Status.FINISHED
+    assert run["x0"] == pytest.approx(slid(run.t), abs=3e-3)
+
+
 def test_what_is_commanded_is_the_equivalent_control():
     """On x − 1 + v/2 = 0, v' = −2 v: 2 kg ask for −4 v."""
     run = fc.simulate(carts(2.0), SLIDING, until=3.0, method=fc.GeneralizedAlpha(0.01), every=0.004)

@@ -200,7 +200,8 @@ class _Stepper:
     def _supply(self, held: Supply, state: State, coarse: Point, fine: Point) -> Supply:
         if not self.feed.continuous:
             return held
-        return self.feed.within(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
+        within = self.feed.within(state, fine.supply.x + self.weight * (fine.supply.x - coarse.supply.x))
+        return replace(within, u=fine.supply.u, slid=True) if fine.supply.slid else within
 
     def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the error that the step added to the coarser run, over what is allowed.
