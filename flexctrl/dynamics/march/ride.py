@@ -207,10 +207,14 @@ class Ride:
     def written(self, done: int, before: np.ndarray, commands: np.ndarray) -> None:
         """Write rows after samples: inputs before, and in force from each step's end on."""
         rows, table = self.journey.rows, self.marcher.rows[:done]
+        to_jump = self.journey.stops.next - table[-1, 0] <= self.tick  # at the end of the run
         if self.weaver is not None:
-            rows.between(self.weaver, table, Stepwise(np.vstack([before, commands])), False)
-        else:
-            rows.sampled(table, commands, self.marcher.states(), 1e-6 * self.journey.mark.size)
+            rows.between(self.weaver, table, Stepwise(np.vstack([before, commands])), to_jump)
+            return
+        states, kept = self.marcher.states(), done - to_jump
+        states = states[:kept] if len(states) == done else states
+        if kept:
+            rows.sampled(table[:kept], commands[:kept], states, 1e-6 * self.journey.mark.size)
 
     def _even(self, stop: float) -> bool:
         """Tell whether steps of one length go to a sample from where the last one was taken."""
