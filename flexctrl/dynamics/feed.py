@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.piecewise import ROUND_OFF
+from flexctrl.dynamics.law_state import trapezoidal
 from flexctrl.dynamics.said import CommandError, blamed, reals, state_of
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import FLOAT, Compiled
@@ -27,17 +28,36 @@ _SMALL = 1e-7
 _NEAR = 1e-10
 
 
+_NONE = np.zeros(0)
+
+
 @dataclass(frozen=True)
 class Supply:
     """Inputs at an instant: u, the controller's state, and how fast that changes.
 
-    ``slid`` where u is between what a continuous law says on both sides of a jump.
+    Attributes
+    ----------
+    u, x, rate : numpy.ndarray
+    slid : bool
+        Whether u is between what a continuous law says on both sides of a jump.
+    trend, most : numpy.ndarray
+        How fast the rate of a continuous law's state has changed over the last step, and how large the state has been;
+        empty before the first one.
     """
 
     u: np.ndarray
     x: np.ndarray
     rate: np.ndarray
     slid: bool = False
+    trend: np.ndarray = field(default_factory=lambda: _NONE)
+    most: np.ndarray = field(default_factory=lambda: _NONE)
+
+    def after(self, before: Supply, h: float) -> Supply:
+        """Return these as inputs at the end of a step, with how the law's state went on over it."""
+        if not self.x.size:
+            return self
+        far = np.abs(before.x) if not before.most.size else before.most
+        return replace(self, trend=(self.rate - before.rate) / h, most=np.maximum(far, np.abs(self.x)))
 
 
 @dataclass(frozen=True)
@@ -181,7 +201,9 @@ class Feed:
 
     def restart(self, state: State, supply: Supply) -> Supply:
         """Return the inputs after a break of a continuous command."""
-        return self.evaluate(state, supply.x) if self.continuous else supply
+        if not self.continuous:
+            return supply
+        return replace(self.evaluate(state, supply.x), trend=supply.trend, most=supply.most)
 
     def evaluate(self, state: State, x: np.ndarray) -> Supply:
         """Return the inputs that a continuous controller in state x gives from now on."""
@@ -190,7 +212,9 @@ class Feed:
 
     def renewed(self, t: float, y: np.ndarray, supply: Supply) -> Supply:
         """Return the inputs from a sample instant or a break on, of what the controller reads there."""
-        return self._answered(t, y, supply.x) if self.continuous else self.sampled(t, y, supply)
+        if not self.continuous:
+            return self.sampled(t, y, supply)
+        return replace(self._answered(t, y, supply.x), trend=supply.trend, most=supply.most)
 
     def _answered(self, t: float, y: np.ndarray, x: np.ndarray) -> Supply:
         c = self.controller
@@ -255,8 +279,8 @@ class Feed:
         try:
             if not before.x.size:
                 return Supply(np.array(self._total(c.command(t, before.x, y))), before.x, before.x)
-            x = _trapezoidal(c, t, y, before, h)
-            return Supply(np.array(self._total(c.command(t, x, y))), x, state_of(c, c.rate(t, x, y), "rate", x.size))
+            x, rate = trapezoidal(c, t, y, (before.x, before.rate), h)
+            return Supply(np.array(self._total(c.command(t, x, y))), x, rate).after(before, h)
         except Exception as error:
             raise blamed(error)  # noqa: B904 - its cause is set
 
@@ -294,24 +318,6 @@ class Feed:
             up, down = (self._answer(state.t, y + s * d, supply, h).u for s in (1.0, -1.0))
             gain[:, i] = (up - down) / (2.0 * d[i])
         return gain
-
-
-def _trapezoidal(c: Controller, t: float, y: np.ndarray, before: Supply, h: float) -> np.ndarray:
-    """Solve x = x₀ + h/2 (ẋ₀ + f(t, x, y)) by Newton's method."""
-    x = before.x + h * before.rate
-    for _ in range(10):
-        f = state_of(c, c.rate(t, x, y), "rate", x.size)
-        gap = x - before.x - 0.5 * h * (before.rate + f)
-        J = np.empty((x.size, x.size))
-        for i in range(x.size):
-            d = np.zeros(x.size)
-            d[i] = _SMALL * max(1.0, abs(x[i]))
-            J[:, i] = (state_of(c, c.rate(t, x + d, y), "rate", x.size) - f) / d[i]
-        step = np.linalg.solve(np.eye(x.size) - 0.5 * h * J, gap)
-        x = x - step
-        if np.abs(step).max() <= 1e-12 * (1.0 + np.abs(x).max()):
-            break
-    return x
 
 
 def feed_of(model: Plant, controller: Any, inputs: np.ndarray) -> Feed:

@@ -42,6 +42,12 @@ class Answer:
         One row a step: inputs, state and rate of the law at its end.
     asked, answers : Reals
         Rows of what the law reads, and of its commands.
+    sides, kept : Reals
+        Rates of the law's state in the last two tries; room.
+    bend, reached : Reals
+        How fast its rate changed over the last step, and how large it has been.
+    bent : int
+        Whether there was such a step.
     reading : int
         How many outputs it reads; 0: what it commands depends on time and its state alone.
     tries, still, wanted : int
@@ -77,6 +83,11 @@ class Answer:
     told: Reals
     asked: Reals
     answers: Reals
+    sides: Reals
+    kept: Reals
+    bend: Reals
+    reached: Reals
+    bent: int = 0
     reading: int = 0
     tries: int = 0
     still: int = 0
@@ -87,4 +98,4 @@ class Answer:
 def no_answer() -> Answer:
     """Return what there is without a continuous law."""
     e, none = np.zeros(0), np.zeros(0, dtype=int)
-    return Answer(0, 0, 0, 0, 0, 0, (), e, e, none, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e)
+    return Answer(0, 0, 0, 0, 0, 0, (), e, e, none, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e)

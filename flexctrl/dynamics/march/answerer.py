@@ -88,12 +88,19 @@ class Answerer(Marcher):
         self.law.last[:] = supply.u
         if self.law.states:
             self._state[:] = supply.x, supply.rate
+            known = supply.trend.size > 0
+            self._numbers.bent = int(known)
+            self.law.bend[:] = supply.trend if known else 0.0
+            self.law.reached[:] = supply.most if known else np.abs(supply.x)
         return self
 
     def supplied(self, supply: Supply) -> Supply:
         """Return the inputs and the law's state where the march stands."""
         x, rate = self._state
-        return Supply(self.law.last.copy(), x.copy(), rate.copy())
+        found = Supply(self.law.last.copy(), x.copy(), rate.copy())
+        if not (self.law.states and self._numbers.bent):
+            return found
+        return replace(found, trend=self.law.bend.copy(), most=self.law.reached.copy())
 
     def supplies(self, supply: Supply, count: int) -> list[Supply]:
         """Return inputs and the law's state after each of as many steps taken last."""
@@ -208,6 +215,10 @@ def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
         told=np.zeros((m + 2 * s) * CAPACITY),
         asked=np.zeros(wide * _ROWS),
         answers=np.zeros(k * _ROWS),
+        sides=np.zeros(2 * s),
+        kept=np.zeros(s),
+        bend=np.zeros(s),
+        reached=np.zeros(s),
         reading=feed.reads.size,
     )
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.law_state import HALVINGS, LOOSE, NEARER, YOUNG
 from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.books import copy, reach
 from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
@@ -16,11 +17,11 @@ from flexctrl.kernels.eights import eight, larger, largest
 from flexctrl.model.flat.flat import clear, drive, load
 from flexctrl.model.gauges import read
 
-__all__ = ["commanded", "forget", "recite", "take"]
+__all__ = ["commanded", "forget", "recite", "strayed_off", "take"]
 
 _EXACT = 1e-11
-_NEARER, _LEFT = 10, 1e-8
-"""Steps of Newton's method towards the law's state, and what they may leave of it."""
+_LEFT = 1e-8
+"""What steps of Newton's method may leave of the law's state."""
 _AFRESH, _MOST, _STILL = 20, 40, 3
 """Tries until what has been learned of the law is forgotten, until the step is given up, and that move nothing."""
 
@@ -74,7 +75,9 @@ def asked(m: March) -> int:
     if m.gauges.moving == 1 and m.swift != 1 and m.whole != 1:
         drive(m.flat)
     read(m.gauges, m.flat.z, a.work)
-    for _ in range(_NEARER):
+    for _ in range(NEARER):
+        for i in range(a.states):
+            a.sides[i] = a.answer[a.commands + a.states + i]
         clear(a.commands + 2 * a.states, a.answer)
         a.step[0](a.work, a.answer)
         total = 0.0
@@ -86,14 +89,15 @@ def asked(m: March) -> int:
         for i in range(a.states):
             x[i] = a.answer[a.commands + i]
         if at_end(m):
-            break
+            return DONE
+    between(m)
     return DONE
 
 
 def at_end(m: March) -> bool:
-    """Tell whether the law's state is that of the trapezoidal rule: one step of Newton's method finds it if it is linear.
+    """Tell whether the law's state is that of the trapezoidal rule: one step of Newton's method finds a linear one.
 
-    Where its rate jumps with it there may be none: the last of ten tries is near it, as in plain steps.
+    Where its rate jumps with it there may be none.
     """
     a = m.answer
     x = a.work[a.outputs :]
@@ -104,6 +108,59 @@ def at_end(m: March) -> bool:
         if abs(x[i] - before - first - last) > _LEFT * (abs(x[i]) + abs(before) + abs(first) + abs(last)):
             return False
     return True
+
+
+def between(m: March) -> None:
+    """Put the law's state where its rate jumps, under the rate between; as `flexctrl.dynamics.law_state` does."""
+    a = m.answer
+    x = a.work[a.outputs :]
+    n = a.states
+    for i in range(n):
+        a.kept[i] = x[n + i]
+        a.sides[n + i] = a.answer[a.commands + n + i]
+    x[3 * n] = 0.0  # the law is asked at a state that is given
+    low = 0.0
+    high = 1.0
+    share = 0.0
+    for _ in range(HALVINGS):
+        share = 0.5 * (low + high)
+        for i in range(n):
+            rate = a.sides[i] + share * (a.sides[n + i] - a.sides[i])
+            x[n + i] = a.kept[i] + 0.5 * m.h * (x[2 * n + i] + rate)
+            x[i] = x[n + i]
+        clear(a.commands + 2 * n, a.answer)
+        a.step[0](a.work, a.answer)
+        turned = 0.0
+        for i in range(n):
+            apart = a.sides[n + i] - a.sides[i]
+            turned += (a.answer[a.commands + n + i] - a.sides[i] - share * apart) * apart
+        if turned > 0.0:
+            low = share
+        else:
+            high = share
+    for i in range(n):
+        a.answer[a.commands + i] = x[i]
+        a.answer[a.commands + n + i] = a.sides[i] + share * (a.sides[n + i] - a.sides[i])
+        x[n + i] = a.kept[i]
+    x[3 * n] = m.h
+
+
+def strayed_off(m: March) -> float:
+    """Return the error of the law's state over what is allowed; as `flexctrl.dynamics.law_state.error` does."""
+    a = m.answer
+    worst = 0.0
+    if a.bent == 0:
+        return worst
+    x = a.work[a.outputs :]
+    young = YOUNG * (m.t + m.h)
+    for i in range(a.states):
+        first = x[2 * a.states + i]
+        last = a.answer[a.commands + a.states + i]
+        size = max(max(a.reached[i], abs(x[i])), young * max(abs(first), abs(last)))
+        allowed = LOOSE * (m.relative + m.absolute) * size
+        if allowed > 0.0:
+            worst = max(worst, m.h * m.h / 12.0 * abs((last - first) / m.h - a.bend[i]) / allowed)
+    return worst
 
 
 def unlike(a: Answer) -> float:
@@ -213,7 +270,10 @@ def take(m: March) -> None:
         a.last[i] = a.u[i]
         told[i] = a.u[i]
     x = a.work[a.outputs :]
+    a.bent = 1
     for i in range(a.states):
+        a.bend[i] = (a.answer[a.commands + a.states + i] - x[2 * a.states + i]) / m.h
+        a.reached[i] = max(a.reached[i], abs(x[i]))
         x[a.states + i] = x[i]
         x[2 * a.states + i] = a.answer[a.commands + a.states + i]
         told[a.inputs + i] = x[i]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.events.nearing import SHORTEST, SMALLEST
-from flexctrl.dynamics.march.answering import commanded, take
+from flexctrl.dynamics.march.answering import commanded, strayed_off, take
 from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle, shelve
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
@@ -246,7 +246,7 @@ def controlled(m: March) -> int:
         error = 0.0
         if status == DONE:
             judge(m)
-            error = compared(m)
+            error = max(compared(m), strayed_off(m)) if m.answering == 1 else compared(m)
         again = status != DONE or error > 1.0
         if again:
             m.rejected += 1
