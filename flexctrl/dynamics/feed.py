@@ -13,7 +13,8 @@ import scipy.sparse as sp
 
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.piecewise import ROUND_OFF
-from flexctrl.dynamics.law_state import trapezoidal
+from flexctrl.dynamics.law_state import error, softened, trapezoidal
+from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.said import CommandError, blamed, reals, state_of
 from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import FLOAT, Compiled
@@ -307,6 +308,13 @@ class Feed:
         T = self.model.motion.jacobian(state)[: self.model.motion.raw]
         slope = (T.T @ self.model.reach(state, supply.u) @ sp.csr_matrix(gains)).tocsr()
         return self.model.switches.freed(state, slope) if self.model.switches.sticks(state) else slope
+
+    def law_error(self, before: Supply, after: Supply, state: State, h: float, tolerance: Tolerance) -> float:
+        """Return the local error of the law's state over a step that ends in a state, over what is allowed."""
+        if not after.x.size or self.controller is None:
+            return 0.0
+        soft = softened(self.controller, self._short_of_break(state.t), self.measured(state), after.x, h)
+        return error(before, after, (state.t, h), tolerance, soft)
 
     def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:
         """∂u/∂y over a step, by central differences of the controller itself."""

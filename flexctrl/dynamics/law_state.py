@@ -14,12 +14,14 @@ from flexctrl.dynamics.said import state_of
 if TYPE_CHECKING:
     from flexctrl.dynamics.feed import Supply
 
-__all__ = ["HALVINGS", "LOOSE", "NEARER", "YOUNG", "error", "trapezoidal"]
+__all__ = ["CLEAR", "HALVINGS", "LOOSE", "NEARER", "YOUNG", "error", "softened", "trapezoidal"]
 
 NEARER, HALVINGS = 10, 24
 """Steps of Newton's method towards the state; halvings between the rates on both sides of a jump."""
 LOOSE, YOUNG = 3.0, 0.01
 """By how much errors of a law's state count less than those of places: it may do little. A share of the time so far."""
+CLEAR = 1e-2
+"""Errors over what is allowed that nothing needs to be known of."""
 _SMALL, _LEFT = 1e-7, 1e-12
 _Map = Callable[[np.ndarray], np.ndarray]
 
@@ -56,12 +58,8 @@ def trapezoidal(
     x, f = x0 + h * rate0, rate0
     for _ in range(NEARER):
         before, f = f, rate(x)
-        J = np.empty((x.size, x.size))
-        for i in range(x.size):
-            d = np.zeros(x.size)
-            d[i] = _SMALL * max(1.0, abs(x[i]))
-            J[:, i] = (rate(x + d) - f) / d[i]
-        step = np.linalg.solve(np.eye(x.size) - 0.5 * h * J, x - x0 - 0.5 * h * (rate0 + f))
+        slope = np.eye(x.size) - 0.5 * h * _slope(rate, x, f)
+        step = np.linalg.solve(slope, x - x0 - 0.5 * h * (rate0 + f))
         x = x - step
         if np.abs(step).max() <= _LEFT * (1.0 + np.abs(x).max()):
             return x, rate(x)
@@ -86,11 +84,12 @@ def _between(
     return led(f), f
 
 
-def error(one: Supply, other: Supply, span: tuple[float, float], tolerance: Tolerance) -> float:
+def error(one: Supply, other: Supply, span: tuple[float, float], tolerance: Tolerance, soften: _Map) -> float:
     """Return the local error of the trapezoidal rule over what is allowed: h³/12 of the second derivative of the rate.
 
     It is relative to how large a state has been, or to what its rate makes of it in a hundredth of the time so far:
-    what leaves zero has no size yet.
+    what leaves zero has no size yet. What counts is what the rule leaves of it: a state that
+    follows at once what it reads forgets it.
 
     Parameters
     ----------
@@ -99,6 +98,8 @@ def error(one: Supply, other: Supply, span: tuple[float, float], tolerance: Tole
     span : tuple of 2 floats
         When it ends, and its length [s].
     tolerance : Tolerance
+    soften : callable
+        What the rule makes of a change of the state at the start of the step.
 
     Returns
     -------
@@ -108,7 +109,32 @@ def error(one: Supply, other: Supply, span: tuple[float, float], tolerance: Tole
     if not one.trend.size:
         return 0.0
     t, h = span
-    off = h * h / 12.0 * np.abs(other.trend - one.trend)
+    off = h * h / 12.0 * (other.trend - one.trend)
     size = np.maximum(other.most, YOUNG * t * np.maximum(np.abs(one.rate), np.abs(other.rate)))
     allowed = LOOSE * (tolerance.relative + tolerance.absolute) * size
-    return float(np.divide(off, allowed, out=np.zeros(off.size), where=allowed > 0.0).max())
+    found = _largest(off, allowed)
+    return found if found <= CLEAR else _largest(np.minimum(np.abs(off), np.abs(soften(off))), allowed)
+
+
+def _largest(off: np.ndarray, allowed: np.ndarray) -> float:
+    return float(np.divide(np.abs(off), allowed, out=np.zeros(off.size), where=allowed > 0.0).max())
+
+
+def softened(c: Controller, t: float, y: np.ndarray, x: np.ndarray, h: float) -> _Map:
+    """Return what the rule makes of changes of the state at the start of a step that ends at x: (1 − h/2 ∂f/∂x)⁻¹."""
+
+    def rate(x: np.ndarray) -> np.ndarray:
+        return state_of(c, c.rate(t, x, y), "rate", x.size)
+
+    return lambda off: np.asarray(np.linalg.solve(np.eye(x.size) - 0.5 * h * _slope(rate, x, rate(x)), off))
+
+
+def _slope(rate: _Map, x: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """∂f/∂x by differences, to the side on which less changes: a rate may jump right beside."""
+    J = np.empty((x.size, x.size))
+    for i in range(x.size):
+        d = np.zeros(x.size)
+        d[i] = _SMALL * max(1.0, abs(x[i]))
+        ahead, back = (rate(x + d) - f) / d[i], (f - rate(x - d)) / d[i]
+        J[:, i] = min(ahead, back, key=lambda column: float(np.abs(column).max()))
+    return J

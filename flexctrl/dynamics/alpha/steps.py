@@ -20,7 +20,6 @@ from flexctrl.dynamics.alpha.outset import join, lengthen, renew, start
 from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
 from flexctrl.dynamics.alpha.sliding import jumps, may_slide, slide
 from flexctrl.dynamics.feed import Feed, Supply
-from flexctrl.dynamics.law_state import error as law_error
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
@@ -286,7 +285,7 @@ class Stepper:
         change = np.abs(after.algorithmic - before.algorithmic) * self.weight
         allowed = tolerance.of(farthest(self.model, moved))
         places = abs(self.coefficients.beta - 1.0 / 6.0) * h * h * float((change / allowed).max(initial=0.0))
-        return max(places, law_error(before.supply, after.supply, (after.state.t, h), tolerance))
+        return max(places, self.feed.law_error(before.supply, after.supply, after.state, h, tolerance))
 
     def missed(self, before: AlphaPoint, after: AlphaPoint) -> np.ndarray:
         """Return the local error of a step, (β − 1/6) h² Δa."""

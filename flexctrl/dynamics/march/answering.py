@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.law_state import HALVINGS, LOOSE, NEARER, YOUNG
+from flexctrl.dynamics.law_state import CLEAR, HALVINGS, LOOSE, NEARER, YOUNG
 from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.books import copy, reach
 from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
@@ -148,18 +148,40 @@ def between(m: March) -> None:
 def strayed_off(m: March) -> float:
     """Return the error of the law's state over what is allowed; as `flexctrl.dynamics.law_state.error` does."""
     a = m.answer
-    worst = 0.0
     if a.bent == 0:
+        return 0.0
+    x = a.work[a.outputs :]
+    n = a.states
+    for i in range(n):
+        a.sides[i] = a.answer[a.commands + i]
+        a.sides[n + i] = a.answer[a.commands + n + i]
+        a.kept[i] = m.h * m.h / 12.0 * ((a.sides[n + i] - x[2 * n + i]) / m.h - a.bend[i])
+    worst = not_allowed(m)
+    if worst <= CLEAR:
         return worst
+    for i in range(n):
+        x[n + i] += a.kept[i]
+    clear(a.commands + 2 * n, a.answer)
+    a.step[0](a.work, a.answer)
+    for i in range(n):
+        x[n + i] -= a.kept[i]
+        a.kept[i] = min(abs(a.kept[i]), abs(a.answer[a.commands + i] - a.sides[i]))
+        a.answer[a.commands + i] = a.sides[i]
+        a.answer[a.commands + n + i] = a.sides[n + i]
+    return not_allowed(m)
+
+
+def not_allowed(m: March) -> float:
+    """Return errors of the law's state, which are at hand, over what is allowed."""
+    a = m.answer
     x = a.work[a.outputs :]
     young = YOUNG * (m.t + m.h)
+    worst = 0.0
     for i in range(a.states):
-        first = x[2 * a.states + i]
-        last = a.answer[a.commands + a.states + i]
-        size = max(max(a.reached[i], abs(x[i])), young * max(abs(first), abs(last)))
-        allowed = LOOSE * (m.relative + m.absolute) * size
+        rate = max(abs(x[2 * a.states + i]), abs(a.sides[a.states + i]))
+        allowed = LOOSE * (m.relative + m.absolute) * max(max(a.reached[i], abs(x[i])), young * rate)
         if allowed > 0.0:
-            worst = max(worst, m.h * m.h / 12.0 * abs((last - first) / m.h - a.bend[i]) / allowed)
+            worst = max(worst, abs(a.kept[i]) / allowed)
     return worst
 
 
