@@ -261,7 +261,7 @@ def test_what_goes_round_runs_off_with_its_speed(speed, until, method):
     ],
 )
 def test_resumed_runs_tell_the_same_to_the_bit(method, tmp_path):
-    model = chain(3, 1e3)
+    model, method = chain(3, 1e3), fc.Unchecked(method)
     whole = fc.simulate(model, until=4.0, method=method)
     half = fc.simulate(model, until=2.0, method=method)
     half.checkpoint.save(tmp_path / "half")

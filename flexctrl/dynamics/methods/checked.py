@@ -72,7 +72,7 @@ class Checked(_Wrapped):
 
     What errors of steps add up to (the report's ``drift``) says nothing of what grows of itself, as in a double
     pendulum that goes over. Where a machine has swung by more than a quarter of a radian, gone farther than a
-    quarter of its size, met corners of its laws of force or followed a continuous law, and wherever this is asked
+    fiftieth of its size, met corners of its laws of force or followed a continuous law, and wherever this is asked
     for, it is therefore run once more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or
     in steps of twice the length. Of what the two are apart, a method of order p leaves 1/(rᵖ − 1) where steps are r
     times as long. It stands in ``report.error``; above 3 % a note says so, and until when the run is right to that.

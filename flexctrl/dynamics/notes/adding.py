@@ -35,12 +35,15 @@ class Drift(NamedTuple):
         What is to be said of it; empty if it is little.
     late : numpy.ndarray, shape (n,)
         By how much each degree of freedom may run ahead of itself, or lag; empty where that is not known.
+    ran : float
+        Of the share, what a wrong speed has led astray.
     """
 
     share: float = 0.0
     freedom: str = ""
     note: str = ""
     late: np.ndarray = np.zeros(0)
+    ran: float = 0.0
 
 
 def drifted(journey: Journey) -> Drift:
@@ -72,10 +75,13 @@ def drifted(journey: Journey) -> Drift:
     width[went] = _width(sums.swept[went], sums.bent[went], sums.path[went])
     most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.absolute) * yardsticks(model)
     lags = np.minimum([stepper.remains(lag) for lag in (off / most).tolist()], width / most)
-    shares = np.maximum(lags, _run_off(journey) / most)
+    ran = _run_off(journey) / most
+    shares = np.maximum(lags, ran)
     worst = int(np.argmax(shares))
     share, freedom = float(shares[worst]), model.coordinates[worst]
-    return Drift(share, freedom, _note(journey, share, freedom) if share > _TOLD else "", shares * most)
+    return Drift(
+        share, freedom, _note(journey, share, freedom) if share > _TOLD else "", shares * most, float(ran.max())
+    )
 
 
 def _width(swept: np.ndarray, bent: np.ndarray, path: np.ndarray) -> np.ndarray:

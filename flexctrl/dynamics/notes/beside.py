@@ -9,7 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.notes.outputs import by_rows, placed
 from flexctrl.dynamics.run import Run, Status
-from flexctrl.dynamics.scales import farthest, output_yardsticks, yardsticks
+from flexctrl.dynamics.scales import farthest, output_yardsticks, turning, yardsticks
 from flexctrl.dynamics.steps import Controlled
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
@@ -19,13 +19,15 @@ if TYPE_CHECKING:
 
 __all__ = ["can_be_told", "may_grow", "told_beside"]
 
-_FAR = 0.25
+_SWUNG, _FAR = 0.25, 0.02
+"""What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
 _POINTS, _FEW = 4, 1500
 _INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
 _TOLD, _AIM = 0.03, 0.01
-_LEAST = 0.1
+_LEAST, _ALL = 0.1, 0.995
 """Where fewer steps than that could be longer, both runs are about the same but for what grows."""
-_PARTED = 0.5
+_PARTED = 0.2
+"""Runs that have parted by more may both be wrong: no share of that is sure to be the finer one's."""
 _MORE = 1.2
 
 
@@ -59,7 +61,7 @@ def may_grow(journey: Journey) -> bool:
     Returns
     -------
     bool
-        Whether something has swung by more than a quarter of a radian, gone farther than a quarter of the machine's
+        Whether something has swung by more than a quarter of a radian, gone farther than a fiftieth of the machine's
         size, met corners, or followed a continuous law, which may have corners of its own. Not where samples keep
         nearly all steps short: a coarser run would be the same.
     """
@@ -68,7 +70,7 @@ def may_grow(journey: Journey) -> bool:
     if feed.sample_time and journey.mark.steps < _MORE * journey.point.state.t / feed.sample_time:
         return False
     own = {*watch.names, *watch.corner_names}
-    swung = bool((sums.moved > _FAR * yardsticks(model)).any())
+    swung = bool((sums.moved > np.where(turning(model), _SWUNG, _FAR) * yardsticks(model)).any())
     led = feed.continuous and feed.reads.size > 0
     return swung or led or any(event.name in own for event in journey.events)
 
@@ -124,13 +126,18 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
     kept = not journey.plan.feed.sample_time and report.steps <= _FEW and run.track.stretches and coarse.track.stretches
     gap = (_gap if kept else _gap_of_rows)(run, coarse, journey)
     left = min(max(free, _LEAST), 1.0) * (longer**report.order - 1.0)
-    error = float(gap.size[-1]) / left
-    if error < report.drift and (free < _LEAST or gap.size[-1] > _PARTED):
+    told, parted = float(gap.size[-1]) / left, gap.size[-1] > _PARTED
+    if told < report.drift and (free < _LEAST or parted):
         return run
+    left = 1.0 if parted else left
+    told = float(gap.size[-1]) / left
+    error = max(told, journey.drift.ran)
     outputs = by_rows(journey, run.y, gap.outputs / left, error)
     notes = tuple(note for note in report.notes if note not in (journey.drift.note, *journey.outputs.notes))
-    if error > _TOLD:
+    if told >= error > _TOLD:
         notes += (_note(journey, gap, left),)
+    elif journey.drift.note and error > told:  # a wrong speed, which both runs have alike
+        notes += (journey.drift.note,)
     known = replace(report, error=error, output_errors=outputs.shares, notes=notes + outputs.notes)
     return replace(run, report=known)
 
@@ -218,10 +225,10 @@ def _note(journey: Journey, gap: _Gap, left: float) -> str:
     plan = journey.plan
     error, pace = float(gap.size[-1]) / left, plan.method.pace
     until = float(np.append(0.0, gap.t)[int(np.argmax(gap.size > _TOLD * left))])
-    far = f"{100.0 * error:.2g} % of the motion" if error < 1.0 else "all of the motion"
-    said = f"by a coarser run, {gap.where} is off by {far}"
-    if gap.size[-1] > _PARTED:
-        said += " or more, as small differences grow"
+    far = f"{100.0 * error:.2g} % of the motion" if error < _ALL else "all of the motion"
+    parted = gap.size[-1] > _PARTED
+    is_off = f"may be off by {far}, as small differences grow" if parted else f"is off by {far}"
+    said = f"by a coarser run, {gap.where} {is_off}"
     finer = (_AIM / error) ** (1.0 / plan.method.order)
     if isinstance(pace, Controlled):
         less, asked = finer**pace.steepness, plan.tolerance
