@@ -11,7 +11,7 @@ from flexctrl.model.paths.critical import Gauge, branching_between, limit_betwee
 
 __all__ = ["PathEnd", "Walk", "Walked"]
 
-_FIRST, _SHORTEST, _LONGEST = 0.02, 1e-7, 0.06
+_FIRST, _SHORTEST, _LONGEST = 2e-4, 1e-9, 0.06
 _AIM, _BEND, _CLOSE = 5, 0.95, 1e-4
 
 
