@@ -73,8 +73,8 @@ def look_ahead(journey: Journey) -> None:
     """
     journey.horizon = math.inf
     plan, mark, stops, t = journey.plan, journey.mark, journey.stops, journey.point.state.t
-    if not plan.feed.untold or stops.found < math.inf:
-        return
+    if not plan.feed.untold or stops.found < math.inf or journey.point.supply.slid:
+        return  # where it slides, a law jumps with whatever moves, time or places
     chosen = isinstance(plan.method.pace, Controlled)
     span = min(mark.size if chosen else plan.method.pace.step, stops.next - t, plan.until - t)  # type: ignore[union-attr]
     if span <= journey.tick:

@@ -131,6 +131,26 @@ def test_two_that_slide_each_have_their_value_between():
     assert np.abs(run["x1"] + 0.5 + 0.7 * run["v1"])[late].max() < 1e-4
 
 
+def test_surfaces_that_hang_together_and_move_are_slid_along():
+    """Two carts whose surfaces share speeds, one of them led by time: as each says once it is reached."""
+    law = Law(
+        ("x0", "v0", "x1", "v1"),
+        ("f0", "f1"),
+        lambda t, x, y: (
+            -12.0 * np.sign(y[1] + 2.0 * (y[0] - 0.5 * np.sin(t)) + 0.3 * (y[3] + 3.0 * (y[2] - 0.3))),
+            -12.0 * np.sign(y[3] + 3.0 * (y[2] - 0.3)),
+        ),
+    )
+    run = fc.simulate(carts(1.5, 1.5), law, until=3.0)
+    assert run.status is fc.Status.FINISHED
+    assert run.report.steps < 300
+    late = run.t > 1.0
+    assert np.abs(run["v0"] + 2.0 * (run["x0"] - 0.5 * np.sin(run.t)))[late].max() < 1e-4
+    assert np.abs(run["v1"] + 3.0 * (run["x1"] - 0.3))[late].max() < 1e-4
+    left = run["x1"][late] - 0.3
+    assert left == pytest.approx(left[0] * np.exp(-3.0 * (run.t[late] - run.t[late][0])), abs=1e-4)
+
+
 def test_a_law_with_states_slides_too():
     law = Law(
         ("x0", "v0"),

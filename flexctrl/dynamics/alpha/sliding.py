@@ -104,11 +104,10 @@ def slide(stepper: Stepper, point: AlphaPoint, h: float) -> AlphaPoint:
 
     one = end(point.supply.u).said.u
     found = end(one)
-    other = found.said.u
+    u, other = one, found.said.u
     apart = _JUMPS * np.maximum(np.abs(one), np.abs(other))
-    turning = np.flatnonzero(np.abs(other - one) > apart)
-    u = one
     for _ in range(_SWEEPS):
+        turning = np.flatnonzero(np.abs(other - one) > apart)
         before, turns = u, np.zeros(u.size, dtype=bool)
         for i in turning:
             u, turns[i] = _between(end, u, int(i), (float(one[i]), float(other[i])))
@@ -119,6 +118,7 @@ def slide(stepper: Stepper, point: AlphaPoint, h: float) -> AlphaPoint:
             return replace(found.after, supply=found.said)
         if (agrees | turns).all() and (turning.size == 1 or settled[turning].all()):
             return replace(found.after, supply=replace(found.said, u=u, slid=True))
+        one, other = np.where(agrees | turns, one, u), np.where(agrees | turns, other, found.said.u)
     why = f"no inputs agree with a law that jumps at t = {point.state.t + h:.6g} s"
     raise StepError(stepper.counts.worst, f"{why} with a step of {h:.3g} s")
 
