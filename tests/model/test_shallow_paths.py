@@ -39,3 +39,19 @@ def test_a_load_beyond_the_limit_is_reached_through_both(rise):
     path = fc.equilibrium_path(model, {"f": 1.0}, until=1.5 * limit)
     assert [point.factor / limit for point in path.limits] == pytest.approx([1.0, -1.0], rel=1e-5)
     assert path.end.name == "REACHED"
+
+
+def test_what_nothing_holds_is_named():
+    left = fc.Spring("left", (-1, 0, 0), (0, 0, 0.5), stiffness=1e3)
+    right = fc.Spring("right", (1, 0, 0), (0, 0, 0.5), stiffness=1e3)
+    mass = fc.PointMass("mass", (0, 0, 0.5), 1.0)
+    joints = [
+        fc.Support(left.start),
+        fc.Support(right.start),
+        fc.Pin(left.end, mass.node),
+        fc.Support(mass.node, "u v"),
+    ]
+    structure = fc.Structure([left, right, mass], joints, inputs=[fc.Force("f", mass.node, "-z")])
+    model = fc.assemble(structure, [fc.LargeRotation()])
+    with pytest.raises(fc.errors.MechanismError, match=r"nothing says where right_1_. is"):
+        fc.equilibrium_path(model, {"f": 1.0}, until=5.0)

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.errors import StructureError, check_kind, did_you_mean, shortened
+from flexctrl.errors import (
+    MechanismError,
+    SingularMatrixError,
+    StructureError,
+    check_kind,
+    did_you_mean,
+    shortened,
+)
 from flexctrl.model.balance import Balance
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
@@ -191,6 +198,8 @@ def equilibrium_path(
     ------
     EquilibriumError
         If there is no equilibrium to begin with.
+    MechanismError
+        If nothing says where a freedom is, such as the turn of an end that is free of all.
     StructureError
         For an unknown name, or a load of nothing.
     """
@@ -204,8 +213,11 @@ def equilibrium_path(
     held = {model.coordinate(name): check_finite(value, name, "hold") for name, value in (hold or {}).items()}
     count = check_whole(most, "most", "equilibrium_path", least=2)
     balance = Balance(model, model.input_vector(inputs or {}), held)
-    course, first = _begin(balance, pushed, goals, start, hold, inputs)
-    walked = Walk(course, goals, count, isinstance(start, BranchPoint)).from_(first)
+    try:
+        course, first = _begin(balance, pushed, goals, start, hold, inputs)
+        walked = Walk(course, goals, count, isinstance(start, BranchPoint)).from_(first)
+    except SingularMatrixError as error:
+        raise _unheld(balance, error.where) from None
     return EquilibriumPath(
         dict(load),
         tuple(PathPoint(s.factor, _rest(course, s)) for s in walked.stations),
@@ -214,6 +226,13 @@ def equilibrium_path(
         walked.end,
         walked.iterations,
     )
+
+
+def _unheld(balance: Balance, where: int) -> MechanismError:
+    """What is to be said of a freedom that nothing holds."""
+    name = balance.model.coordinates[balance.free[min(where, len(balance.free) - 1)]]
+    remedy = "hold it with a Support, or in hold, or have a spring pull on it"
+    return MechanismError(f"equilibrium_path: nothing says where {name} is as the load grows; {remedy}")
 
 
 def _goals(model: Model, until: float | Mapping[str, float]) -> dict[str, float]:
