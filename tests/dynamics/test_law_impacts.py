@@ -35,10 +35,10 @@ def test_it_comes_back_as_fast_as_it_came(stiffness, speed, tolerance):
     assert run.report.energy_residual < 2e-3
 
 
-def test_twenty_times_to_and_fro():
-    run = thrown(buffer(1e7), 0.2, 205.0)
-    assert abs(run["v0"][-1]) == pytest.approx(0.2, rel=0.02)
-    assert run.report.steps < 3000
+def test_ten_times_to_and_fro():
+    run = thrown(buffer(1e7), 0.2, 105.0)
+    assert abs(run["v0"][-1]) == pytest.approx(0.2, rel=0.01)
+    assert run.report.steps < 1500
 
 
 @pytest.mark.parametrize("damping", [100.0, 500.0])

@@ -35,8 +35,7 @@ def trolley(backend=None, more: int = 0):
 @pytest.fixture(scope="module")
 def truth():
     model, law = trolley()
-    fine = fc.Richardson(fc.AdaptiveAlpha())
-    return fc.simulate(model, law, until=5.0, every=0.05, method=fine, tolerance=fc.Tolerance(1e-7, 1e-10))
+    return fc.simulate(model, law, until=5.0, every=0.05, method=fc.GeneralizedAlpha(5e-5))
 
 
 @pytest.mark.parametrize(
