@@ -50,6 +50,21 @@ LONG = (
     "test_resumed_at_switches.py::test_so_do_other_methods_under_a_sampled_controller[extrapolated, chosen]",
     "test_accuracy.py::test_a_coarse_scene_is_judged_by_finer_runs[method1-None]",
     "test_accuracy.py::test_a_ledger_does_not_hang_on_units[mm, t, s]",
+    "test_ledgers.py::test_the_ledger_keeps_what_matters[bridge_crane]",
+    "test_diverging_runs.py::test_loops_that_throw_an_arm_away[too high-chosen-compiled]",
+    "test_diverging_runs.py::test_loops_with_friction_lag_and_play[CoulombFriction-plain]",
+    "test_events_under_control.py::test_marched_and_plain_runs_tell_the_same[quarters-own]",
+    "test_extrapolated_course.py::test_courses_and_books_keep_their_orders[rocket-ConservingMidpoint]",
+    "test_watched_and_resumed.py::test_a_run_stopped_anywhere_goes_on_with_the_same_bits[dry-continuous-adaptive-no]",
+    "test_watched_and_resumed.py::test_a_run_stopped_anywhere_goes_on_with_the_same_bits[lag-continuous-adaptive-no]",
+    "test_under_a_continuous_controller_it_moves_as_its_forces_say[ConservingMidpoint-stiffness alone]",
+    "test_massless_drives.py::test_a_lag_that_steps_do_not_see_leaves_speeds_as_they_are[1e-05]",
+    "test_motors_beside_loads.py::test_damped_steps_do_not_lose_it_later[0.005-10000000.0]",
+    "test_component_modes.py::test_every_method_of_integration_takes_modes[Richardson of midpoint]",
+    "test_march_dry.py::test_marched_friction_is_plain_friction[even-False-fixed]",
+    "test_checked.py::test_what_grows_is_told[3-9.0-4]",
+    "test_slack_in_small_motion.py::test_so_is_that_of_a_winch[('marched', 20.0)-ExplicitRungeKutta]",
+    "test_small_beside_large.py::test_a_load_that_is_nothing_beside_its_motor_sways_all_the_same[1000000000000000.0]",
 )
 """Cases whose neighbours hold the same: run with -m long."""
 
