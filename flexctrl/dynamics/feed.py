@@ -91,6 +91,11 @@ class Feed:
         return self.controller is not None and self.controller.sample_time == 0.0
 
     @cached_property
+    def reacting(self) -> bool:
+        """Whether inputs change with the motion within steps: those of a continuous law that reads it."""
+        return self.continuous and self.reads.size > 0
+
+    @cached_property
     def breaks(self) -> tuple[float, ...]:
         """Instants at which a continuous command jumps."""
         return tuple(getattr(self.controller, "breaks", ())) if self.continuous else ()
@@ -288,7 +293,7 @@ class Feed:
     def gains(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> np.ndarray:
         """Return ∂(inputs)/∂(own motion) through a continuous controller over a step, shape (inputs, n)."""
         n = self.model.n
-        if not self.continuous or not self.reads.size:
+        if not self.reacting:
             return np.zeros((len(self.base), n))
         rates = self.model.rates(state)
         on_place, on_rates = self.model.signals.slopes(state, rates, self.model.motion.raw)
@@ -311,10 +316,19 @@ class Feed:
 
     def law_error(self, before: Supply, after: Supply, state: State, h: float, tolerance: Tolerance) -> float:
         """Return the local error of the law's state over a step that ends in a state, over what is allowed."""
-        if not after.x.size or self.controller is None:
+        if not before.trend.size:
             return 0.0
-        soft = softened(self.controller, self._short_of_break(state.t), self.measured(state), after.x, h)
-        return error(before, after, (state.t, h), tolerance, soft)
+        c = self.controller
+        assert c is not None
+
+        def soften(off: np.ndarray) -> np.ndarray:
+            t, y = self._short_of_break(state.t), self.measured(state)
+            return softened(c, t, y, (after.x, h), off)
+
+        try:
+            return error(before, after, (state.t, h), tolerance, soften)
+        except Exception as fault:
+            raise blamed(fault)  # noqa: B904 - its cause is set
 
     def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:
         """∂u/∂y over a step, by central differences of the controller itself."""

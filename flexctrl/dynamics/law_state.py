@@ -66,11 +66,7 @@ def trapezoidal(
     return _between(lambda f: x0 + 0.5 * h * (rate0 + f), rate, (before, f))
 
 
-def _between(
-    led: Callable[[np.ndarray], np.ndarray],
-    rate: Callable[[np.ndarray], np.ndarray],
-    sides: tuple[np.ndarray, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
+def _between(led: _Map, rate: _Map, sides: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """The rate between two others that leads to where it jumps from one to the other, and the state there."""
     one, d = sides[0], sides[1] - sides[0]
     low, high = 0.0, 1.0
@@ -120,13 +116,31 @@ def _largest(off: np.ndarray, allowed: np.ndarray) -> float:
     return float(np.divide(np.abs(off), allowed, out=np.zeros(off.size), where=allowed > 0.0).max())
 
 
-def softened(c: Controller, t: float, y: np.ndarray, x: np.ndarray, h: float) -> _Map:
-    """Return what the rule makes of changes of the state at the start of a step that ends at x: (1 − h/2 ∂f/∂x)⁻¹."""
+def softened(c: Controller, t: float, y: np.ndarray, ends: tuple[np.ndarray, float], off: np.ndarray) -> np.ndarray:
+    """Return what the rule makes of a change of the state at the start of a step: (1 − h/2 ∂f/∂x)⁻¹ of it.
+
+    Parameters
+    ----------
+    c : Controller
+    t : float
+        At the end of the step [s].
+    y : numpy.ndarray
+        What it reads there.
+    ends : tuple of numpy.ndarray and float
+        The state there, and the length of the step [s].
+    off : numpy.ndarray
+        The change.
+
+    Returns
+    -------
+    numpy.ndarray
+    """
+    x, h = ends
 
     def rate(x: np.ndarray) -> np.ndarray:
         return state_of(c, c.rate(t, x, y), "rate", x.size)
 
-    return lambda off: np.asarray(np.linalg.solve(np.eye(x.size) - 0.5 * h * _slope(rate, x, rate(x)), off))
+    return np.asarray(np.linalg.solve(np.eye(x.size) - 0.5 * h * _slope(rate, x, rate(x)), off))
 
 
 def _slope(rate: _Map, x: np.ndarray, f: np.ndarray) -> np.ndarray:

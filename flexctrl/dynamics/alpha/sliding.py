@@ -23,7 +23,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.alpha.steps import Stepper
 
-__all__ = ["jumps", "may_slide", "slide"]
+__all__ = ["jumps", "slide"]
 
 _FINE = 2.0**-16
 """Share of a jump to which the value between is found."""
@@ -38,18 +38,10 @@ class _Held:
     feed: Feed
     u: np.ndarray
     continuous: bool = False
-
-    @property
-    def reads(self) -> np.ndarray:
-        return self.feed.reads
+    reacting: bool = False
 
     def at(self, state: State, before: Supply, h: float) -> Supply:
         return replace(self.feed.at(state, before, h), u=self.u)
-
-
-def may_slide(feed: Feed) -> bool:
-    """Tell whether inputs may jump with the motion: those of a continuous law that reads it."""
-    return feed.continuous and feed.reads.size > 0
 
 
 def jumps(before: np.ndarray, used: np.ndarray, said: np.ndarray, foretold: np.ndarray) -> bool:

@@ -18,7 +18,7 @@ from flexctrl.dynamics.alpha.coning import coning_of
 from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough, wanted
 from flexctrl.dynamics.alpha.outset import join, lengthen, renew, start
 from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
-from flexctrl.dynamics.alpha.sliding import jumps, may_slide, slide
+from flexctrl.dynamics.alpha.sliding import jumps, slide
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.run import Tolerance
@@ -121,7 +121,7 @@ class Stepper:
 
     def inputs_may_throw(self, h: float) -> bool:
         """Tell whether inputs that jump may; they are not those of a continuous law that reads what moves."""
-        if (self.feed.continuous and self.feed.reads.size) or not self.may_throw(h):
+        if self.feed.reacting or not self.may_throw(h):
             return False
         damping, stiffness = holding_inputs(self.model)
         return h * (self.coefficients.gamma * damping + self.coefficients.beta * h * stiffness) > THROWN
@@ -144,7 +144,7 @@ class Stepper:
         StepError
             If Newton's method does not converge, even with a fresh tangent.
         """
-        slides = may_slide(self.feed)
+        slides = self.feed.reacting
         if slides and point.supply.slid:
             with suppress(StepError):
                 return slide(self, point, h)
@@ -228,7 +228,7 @@ class Stepper:
         change = rate - point.rate
         lean = _lean(change * self.weight, point.trend * self.weight)
         supply = self.feed.at(state, point.supply, h)
-        if may_slide(self.feed) and jumps(point.supply.u, used, supply.u, self._gains @ correction):
+        if self.feed.reacting and jumps(point.supply.u, used, supply.u, self._gains @ correction):
             raise StepError(worst, f"the law jumps at t = {state.t:.6g} s")
         return AlphaPoint(state, rate, supply, algorithmic, change, lean)
 

@@ -46,7 +46,7 @@ def hits(journey: Journey, after: Point, h: float) -> tuple[int, float]:
     """
     feed, books, before = journey.plan.feed, journey.books, journey.point
     one, other = before.supply, after.supply
-    told = not feed.continuous or feed.answering is not None or not feed.reads.size
+    told = not feed.reacting or feed.answering is not None
     if told or one.slid or other.slid or np.array_equal(one.u, other.u):
         return NO_IMPACT
     model, v = feed.model, before.state.v

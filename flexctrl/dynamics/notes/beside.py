@@ -71,8 +71,7 @@ def may_grow(journey: Journey) -> bool:
         return False
     own = {*watch.names, *watch.corner_names}
     swung = bool((sums.moved > np.where(turning(model), _SWUNG, _FAR) * yardsticks(model)).any())
-    led = feed.continuous and feed.reads.size > 0
-    return swung or led or any(event.name in own for event in journey.events)
+    return swung or feed.reacting or any(event.name in own for event in journey.events)
 
 
 @dataclass(frozen=True)

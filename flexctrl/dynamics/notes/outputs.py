@@ -16,7 +16,7 @@ from flexctrl.structure.outputs import DriveAngle, Position, Rotation, SwayAngle
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["OutputErrors", "by_rows", "by_sums", "placed"]
+__all__ = ["OutputErrors", "by_rows", "by_sums", "placed", "reach", "seen"]
 
 _TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
 _NAMED = 3

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.dynamics.notes.outputs import reach, seen
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import Controlled
 from flexctrl.model.model import Model
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["unsure"]
 
-_CLEAR, _SEEN = 10.0, 10.0
+_CLEAR = 10.0
 
 
 def unsure(journey: Journey, y: np.ndarray) -> tuple[str, ...]:
@@ -42,14 +43,11 @@ def unsure(journey: Journey, y: np.ndarray) -> tuple[str, ...]:
         return ()
     judged = [i for i, o in enumerate(model.structure.outputs) if isinstance(o, Position | SwayAngle)]
     shorter = min(1.0, state.t / (mark.steps * mark.size)) ** 3
-    still = np.zeros(model.motion.raw)
-    reach = abs(model.signals.slopes(state, still, still.size)[0] @ model.motion.jacobian(state))
     yards = yardsticks(model)
     yards = np.where(np.isfinite(yards), yards, 0.0)
-    allowed = shorter * (reach @ (yards * tolerance.of(farthest(model, moved))))
-    least = reach @ (yards * tolerance.absolute)
-    way = np.ptp(y, axis=0)
-    found = [i for i in judged if _SEEN * least[i] < way[i] < _CLEAR * allowed[i]]
+    allowed = shorter * (reach(journey) @ (yards * tolerance.of(farthest(model, moved))))
+    way, far = seen(journey, y)
+    found = [i for i in judged if i in far and way[i] < _CLEAR * allowed[i]]
     return tuple(
         f"{model.outputs[i]} has moved by {way[i]:.2g}, and each step may err by {allowed[i]:.2g} in it under "
         f"Tolerance({tolerance.relative:g}, {tolerance.absolute:g}): give a smaller one, or it may be all error"
