@@ -65,6 +65,21 @@ LONG = (
     "test_checked.py::test_what_grows_is_told[3-9.0-4]",
     "test_slack_in_small_motion.py::test_so_is_that_of_a_winch[('marched', 20.0)-ExplicitRungeKutta]",
     "test_small_beside_large.py::test_a_load_that_is_nothing_beside_its_motor_sways_all_the_same[1000000000000000.0]",
+    "test_a_block_slips_alike_in_any_units_of_mass[alpha-static]",
+    "test_a_block_slips_alike_in_any_units_of_mass[alpha-stribeck]",
+    "test_sliding_laws.py::test_a_sliding_mode_slides_as_filippov_says[method2-0.004-500]",
+    "test_extrapolated_course.py::test_courses_and_books_keep_their_orders[hung-alpha]",
+    "test_d23_fast_spin.py::test_heavy_top[Richardson of ConservingMidpoint]",
+    "test_d23_fast_spin.py::test_no_artificial_precession[ConservingMidpoint-160.0]",
+    "test_untold_functions.py::test_they_go_on_with_the_same_bits[6.004-GeneralizedAlpha]",
+    "test_untold_functions.py::test_they_go_on_with_the_same_bits[7.1-GeneralizedAlpha]",
+    "test_untold_functions.py::test_they_go_on_with_the_same_bits[5.9999-GeneralizedAlpha]",
+    "test_resumed_at_switches.py::test_so_do_other_methods_under_a_sampled_controller[explicit, fixed]",
+    "test_march_dry.py::test_samples_and_switches_go_on_bit_for_bit[adaptive]",
+    "test_checked.py::test_what_grows_in_steps_of_one_length_is_told[0.005]",
+    "test_random_structures.py::test_steps_end_where_a_damped_gap_closes[21]",
+    "test_law_states.py::test_anti_windup_slides_along_its_limit[backend5-how5-0.001-gains1]",
+    "test_massless_drives.py::test_under_a_continuous_controller_it_moves_as_its_forces_say[GeneralizedAlpha-friction]",
 )
 """Cases whose neighbours hold the same: run with -m long."""
 

@@ -4,35 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.alpha.first_step import first_step
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha
 from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
-from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same, machine_of
+from flexctrl.dynamics.checking import Beginning, laid_beside
+from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same
 from flexctrl.dynamics.events.event import Event
-from flexctrl.dynamics.events.nearing import SMALLEST
-from flexctrl.dynamics.events.watch import Watch
-from flexctrl.dynamics.feed import Supply, feed_of
-from flexctrl.dynamics.journey import Journey, Plan
+from flexctrl.dynamics.feed import feed_of
+from flexctrl.dynamics.journey import Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
-from flexctrl.dynamics.notes.beside import can_be_told, may_grow, told_beside
-from flexctrl.dynamics.records.books import Books
-from flexctrl.dynamics.records.dense import Track, curves_of
+from flexctrl.dynamics.notes.beside import can_be_told, may_grow
 from flexctrl.dynamics.records.record import InMemory, Record
-from flexctrl.dynamics.records.rows import Rows
-from flexctrl.dynamics.result import result
 from flexctrl.dynamics.run import Run, Tolerance
-from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Mark, Reusable, Stepper
-from flexctrl.dynamics.stops import Stops
-from flexctrl.dynamics.swift.layers import beyond_layers
-from flexctrl.dynamics.swift.settling import quasistatic
-from flexctrl.dynamics.unbegun import UNASKED, unbegun
-from flexctrl.errors import FlexctrlError, MechanismError, SingularMatrixError, StructureError
+from flexctrl.dynamics.setting_out import travelled
+from flexctrl.dynamics.steps import Fixed, Integrator
+from flexctrl.errors import StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest
@@ -42,7 +32,6 @@ from flexctrl.model.state import State
 from flexctrl.structure.freedoms import HUGE
 
 _ROWS = 1000
-_LONGER, _SECONDS = 2.0, 0.2
 
 
 def simulate(
@@ -123,20 +112,20 @@ def simulate(
     spacing = every if record.every is None else record.every
     check_rows(until, spacing, len(model.inputs) + len(model.outputs))
     plant: Plant
+    chosen, check = checked(method or _default(model, _spacing(start, every, until)))
     if isinstance(model, LinearModel):
-        plant, method = _plant(model, method, _spacing(start, every, until))
+        plant = _plant(model, chosen)
     else:
         plant = model
         if isinstance(start, State) and model.__dict__.get("_begun") is not start:
             check_state(model, start, "simulate: start")
             model.__dict__["_begun"] = start
     feed = feed_of(plant, controller, _base(plant, start, inputs))
-    asked = isinstance(method, Checked)
-    method, check = checked(method or AdaptiveAlpha())
+    beginning = Beginning.of(start, spacing, feed) if check and not isinstance(start, Checkpoint) else None
     plan = Plan(
         plant,
         feed,
-        method,
+        chosen,
         tolerance or Tolerance(),
         until,
         progress or _untold,
@@ -144,67 +133,28 @@ def simulate(
         time.perf_counter(),
     )
     with np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
-        journey, run = _travelled(plan, start, events_of(events), record, spacing)
-        if check is None or isinstance(start, Checkpoint) or not can_be_told(journey):
-            return run
-        if asked or may_grow(journey):
-            return _laid_beside(run, journey, check, start, spacing)
+        journey, run = travelled(plan, start, events_of(events), record, spacing)
+        if check and beginning and can_be_told(journey) and (isinstance(method, Checked) or may_grow(journey)):
+            return laid_beside(run, journey, check, beginning)
     return run
 
 
-def _travelled(
-    plan: Plan,
-    start: State | Rest | Checkpoint | None,
-    events: tuple[Event, ...],
-    record: Record,
-    spacing: float | None,
-) -> tuple[Journey, Run]:
-    """A run from its start to where it ends, and what it leaves."""
-    model, feed = plan.model, plan.feed
-    watch = _watch(plan, events)
-    if isinstance(start, Checkpoint):
-        _check_going_on(plan, start, watch, spacing)
-    stepper = plan.method.stepper(model, feed, plan.tolerance)
-    curve = curves_of(model, stepper)
-    recorder = record.start((*model.outputs, *model.inputs), start.rows if isinstance(start, Checkpoint) else 0)
-    try:
-        rows = Rows(feed, spacing, plan.until, recorder, curve)
-        track = Track(feed, record.states, curve)
-        journey = _run(plan, stepper, start, watch, rows, track)
-        return journey, result(journey)
-    finally:
-        recorder.close()
-        if isinstance(stepper, Reusable):
-            stepper.done()
-
-
-def _laid_beside(run: Run, journey: Journey, method: Checked, start: State | Rest | None, spacing: float | None) -> Run:
-    """The run with what a coarser one tells of it; that is ended where it takes far longer."""
-    plan, end = journey.plan, run.final.t
-    coarser, tolerance = method.coarser(plan.tolerance)
-    latest = time.perf_counter() + _LONGER * run.report.wall_s + _SECONDS
-
-    def ended(share: float) -> None:
-        if time.perf_counter() > latest:
-            raise KeyboardInterrupt
-
-    beside = replace(plan, method=coarser, tolerance=tolerance, until=end, tell=ended, autosave=None)
-    try:
-        # a run that keeps no rows, as a stream does not, is compared where it ends
-        _, coarse = _travelled(beside, start, (), InMemory(), spacing if len(run.t) > 1 else end)
-    except (FlexctrlError, KeyboardInterrupt):
-        return run
-    return told_beside(run, coarse, journey, method.longer)
-
-
-def _plant(linear: LinearModel, method: Integrator | None, step: float) -> tuple[LinearPlant, Integrator]:
-    """A linear model as a machine, and its method; outputs that feel inputs at once are known to the exact one only."""
+def _default(model: Model | LinearModel, step: float) -> Integrator:
+    """The method where none is given: exact for linear models."""
+    if not isinstance(model, LinearModel):
+        return AdaptiveAlpha()
     from flexctrl.dynamics.linear_motion.exact import Exact
 
-    method = method or Exact(step)
+    return Exact(step)
+
+
+def _plant(linear: LinearModel, method: Integrator) -> LinearPlant:
+    """A linear model as a machine; outputs that feel inputs at once are known to the exact method only."""
+    from flexctrl.dynamics.linear_motion.exact import Exact
+
     if linear.D.any() and not isinstance(method, Exact):
         raise StructureError(f"simulate: an output of {linear.name} feels inputs at once (D ≠ 0); use the method Exact")
-    return LinearPlant(linear), method
+    return LinearPlant(linear)
 
 
 def _spacing(start: State | Rest | Checkpoint | None, every: float | None, until: float) -> float:
@@ -227,102 +177,6 @@ def _base(model: Plant, start: State | Rest | Checkpoint | None, inputs: Mapping
     if inputs is not None:
         return model.input_vector(inputs)
     return start.inputs if isinstance(start, Rest) else model.input_vector({})
-
-
-def _run(
-    plan: Plan,
-    stepper: Stepper[Any],
-    start: State | Rest | Checkpoint | None,
-    watch: Watch,
-    rows: Rows,
-    track: Track,
-) -> Journey:
-    try:
-        if isinstance(start, Checkpoint):
-            journey = _resumed(plan, stepper, start, watch, rows, track)
-        else:
-            journey = _begun(plan, stepper, start, watch, rows, track)
-    except KeyboardInterrupt:
-        return unbegun(plan, stepper, start, watch, rows, track)
-    journey.travel()
-    return journey
-
-
-def _watch(plan: Plan, events: tuple[Event, ...]) -> Watch:
-    switches, kinks = plan.model.switches, plan.model.kinks.met
-    return Watch(plan.feed, events, switches.gaps, switches.names, kinks.values, kinks.names, kinks.ends, kinks.dust)
-
-
-def _begun(
-    plan: Plan,
-    stepper: Stepper[Any],
-    start: State | Rest | None,
-    watch: Watch,
-    rows: Rows,
-    track: Track,
-) -> Journey:
-    """A run from a state."""
-    model, pace = plan.model, plan.method.pace
-    state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
-    state = model.motion.counted(state)
-    supply = plan.feed.first(state)
-    state = model.switches.begin(state, supply.u)
-    stops = Stops(plan.feed.sample_time, plan.feed.breaks)
-    stops.skip(0.0)
-    state, supply, notes = beyond_layers(plan.feed, state, supply, pace, plan.tolerance)
-    size = pace.step if isinstance(pace, Fixed) else _first(plan, pace, state, supply, min(stops.next, plan.until))
-    try:
-        point = stepper.start(state, supply, size)
-    except SingularMatrixError as error:
-        name = model.coordinates[error.where]
-        raise MechanismError(
-            f"simulate: {name} has neither mass nor stiffness; hold it with a Support, or give the part "
-            "rotary inertia (rhoJ, rhoI) or mass"
-        ) from None
-    watch.begin(point)
-    books = Books(plan.feed, point.state, plan.method, plan.tolerance)
-    books.turn(point, size)
-    journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), notes=notes)
-    if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
-        journey.notes += (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
-    rows.here(point, 0.0)
-    return journey
-
-
-def _first(plan: Plan, pace: Controlled, state: State, supply: Supply, span: float) -> float:
-    """The first step, as asked for or from how the machine sets out."""
-    if pace.first is None:
-        first = first_step(plan.feed, state, supply, pace, plan.tolerance, span)
-        return max(first, SMALLEST * plan.until)
-    return min(pace.first, pace.largest)
-
-
-def _check_going_on(plan: Plan, start: Checkpoint, watch: Watch, every: float | None) -> None:
-    """Raise unless a run goes on as it was; its controller is asked later, on a model that is its own."""
-    check_same("model", machine_of(plan.model), start.machine)
-    check_same("method", repr(plan.method), start.method)
-    check_same("tolerance", plan.tolerance, start.tolerance)
-    check_same("number of events", watch.count if start.passed != UNASKED else 0, len(start.sides))
-    check_same("spacing of rows (every)", every, start.every)
-    check_same("controller", plan.feed.told_law, start.law)
-
-
-def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch, rows: Rows, track: Track) -> Journey:
-    """A run that goes on."""
-    if start.passed == UNASKED:
-        return _begun(plan, stepper, start.point.state, watch, rows, track)
-    check_same("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x))
-    stepper.recall(start.memory)
-    stepper.counts.take(start.counts)
-    watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span
-    books = Books(plan.feed, start.point.state, plan.method, plan.tolerance)
-    books.sums, books.first = replace(start.sums), start.first
-    stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed, start.found)
-    plan.feed.met[:] = [start.found]
-    rows.count = start.rows
-    journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, replace(start.mark))
-    journey.told, journey.balked = start.told, start.balked
-    return journey
 
 
 __all__ = ["simulate"]

@@ -9,7 +9,7 @@ from typing import Any
 
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.linear_motion.exact import Exact
-from flexctrl.dynamics.methods.checked import bare
+from flexctrl.dynamics.methods.checked import Unchecked, bare
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
@@ -182,7 +182,7 @@ class Setting:
         return self.run(scene.with_(structure=structure, effects=effects))
 
     def run(self, scene: Subject) -> Subject:
-        """Return a scene that has these physics already, integrated this way.
+        """Return a scene that has these physics already, integrated this way and by no other run beside.
 
         Parameters
         ----------
@@ -192,7 +192,8 @@ class Setting:
         -------
         Scene
         """
-        return scene.with_(simulation=replace(scene.simulation, method=self.method, tolerance=self.tolerance))
+        plan = replace(scene.simulation, method=Unchecked(self.method), tolerance=self.tolerance)
+        return scene.with_(simulation=plan)
 
     @property
     def physics(self) -> tuple[Fidelity, int, int]:

@@ -118,10 +118,10 @@ def test_what_has_come_to_rest_adds_nothing():
 
 
 FIXED = {
-    "alpha": (fc.GeneralizedAlpha, 0.8, 1.6),
-    "undamped": (lambda h: fc.GeneralizedAlpha(h, rho=1.0), 0.9, 1.1),
-    "midpoint": (fc.ConservingMidpoint, 0.9, 1.1),
-    "Richardson": (lambda h: fc.Richardson(fc.GeneralizedAlpha(3.0 * h)), 0.5, 5.0),
+    "alpha": (lambda h: fc.Unchecked(fc.GeneralizedAlpha(h)), 0.8, 1.6),
+    "undamped": (lambda h: fc.Unchecked(fc.GeneralizedAlpha(h, rho=1.0)), 0.9, 1.1),
+    "midpoint": (lambda h: fc.Unchecked(fc.ConservingMidpoint(h)), 0.9, 1.1),
+    "Richardson": (lambda h: fc.Unchecked(fc.Richardson(fc.GeneralizedAlpha(3.0 * h))), 0.5, 5.0),
 }
 
 

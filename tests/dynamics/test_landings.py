@@ -37,7 +37,7 @@ def test_landings_take_few_trials(model, how, monkeypatch):
     """Those and the steps that pass what they then land on: three for each."""
     taken, step = [], MarchingStepper.step
     monkeypatch.setattr(MarchingStepper, "step", lambda *given: taken.append(None) or step(*given))
-    run = fc.simulate(model(), method=fc.GeneralizedAlpha(1e-3), **how)
+    run = fc.simulate(model(), method=fc.Unchecked(fc.GeneralizedAlpha(1e-3)), **how)
     assert run.status is fc.Status.FINISHED
     assert len(run.events) > 4
     assert len(taken) < 4 * len(run.events)

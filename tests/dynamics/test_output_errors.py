@@ -92,7 +92,7 @@ def test_what_stands_still_and_linear_models_tell_nothing():
 
 def test_one_note_names_the_worst_of_many():
     model, law = trolley(more=4)
-    run = fc.simulate(model, law, until=2.0, every=0.05, method=fc.GeneralizedAlpha(0.01))
+    run = fc.simulate(model, law, until=2.0, every=0.05, method=fc.Unchecked(fc.GeneralizedAlpha(0.01)))
     (note,) = [note for note in run.report.notes if OF_THAT in note]
     shares = sorted(run.report.output_errors, key=run.report.output_errors.__getitem__)
     assert note.startswith(f"{shares[-1]} has moved")

@@ -57,7 +57,8 @@ class Event:
     crosses and comes back where it shows in such a parabola. Steps in which signals stay clear of their values, by
     twice what they bend, are not looked at closely. What crosses twice between two places and bends otherwise goes
     unseen (a function with a kink or a narrow peak); take shorter steps for that. What only touches the value counts
-    where it does so just as an input jumps (a speed that comes to zero at the end of a braking torque).
+    where it does so just as an input jumps (a speed that comes to zero at the end of a braking torque). What is at its
+    value when a run begins has not reached it: that is not told.
     """
 
     name: str

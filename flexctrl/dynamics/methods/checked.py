@@ -11,10 +11,27 @@ from flexctrl.dynamics.steps import Controlled, Integrator, Pace, Stepper
 from flexctrl.errors import StructureError
 from flexctrl.model.plant import Plant
 
-__all__ = ["Checked", "Unchecked", "bare", "checked"]
+__all__ = ["Checked", "Coarser", "Unchecked", "bare", "checked"]
 
 _LOOSER = 27.0
 """Under such a tolerance steps of a method of second order are three times as long, and errors nine times as large."""
+
+
+@dataclass(frozen=True)
+class Coarser:
+    """How a run beside another one is made.
+
+    Attributes
+    ----------
+    method : Integrator
+    tolerance : Tolerance
+    longer : float
+        By how much its steps are longer, where nothing else keeps them short.
+    """
+
+    method: Integrator
+    tolerance: Tolerance
+    longer: float
 
 
 @dataclass(frozen=True)
@@ -51,9 +68,9 @@ class _Wrapped:
 
 @dataclass(frozen=True)
 class Unchecked(_Wrapped):
-    """A method that chooses its steps, without the coarser run that tells how far it is off: see `Checked`.
+    """A method without the coarser run that tells how far it is off: see `Checked`.
 
-    For runs by the hundred, as in a search for parameters.
+    For runs by the hundred, as in a search for parameters, and for races.
 
     Parameters
     ----------
@@ -76,14 +93,15 @@ class Checked(_Wrapped):
     for, it is therefore run once more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or
     in steps of twice the length. Of what the two are apart, a method of order p leaves 1/(rᵖ − 1) where steps are r
     times as long. It stands in ``report.error``; above 3 % a note says so, and until when the run is right to that.
+    What would be noted is asked of a second run first, half as far away (in powers): its word counts.
 
-    Nothing is run again where a sampled law is asked in Python (it may remember what it was asked), for linear
-    models and small motion, and from a `Checkpoint`.
+    Nothing is run again for linear models and small motion, where samples keep nearly all steps short, and from a
+    `Checkpoint`. A sampled law in Python is asked again as a copy of what it was before the run.
 
     Parameters
     ----------
     method : Integrator
-        Of fixed steps; methods that choose their steps are checked by themselves, unless they are `Unchecked`.
+        All are checked by themselves where differences may grow, unless they are `Unchecked`; this asks for it always.
 
     Raises
     ------
@@ -91,37 +109,37 @@ class Checked(_Wrapped):
         For what is no method, or is wrapped already.
     """
 
-    @property
-    def longer(self) -> float:
-        """By how much steps of the coarser run are longer, where nothing else keeps them short."""
-        return _LOOSER ** (1.0 / self.pace.steepness) if isinstance(self.pace, Controlled) else 2.0
-
-    def coarser(self, tolerance: Tolerance) -> tuple[Integrator, Tolerance]:
-        """Return the method and the tolerance of the run beside.
+    def coarser(self, tolerance: Tolerance, share: float = 1.0) -> Coarser:
+        """Return how the run beside is to be made.
 
         Parameters
         ----------
         tolerance : Tolerance
             Of the run that is checked.
+        share : float
+            Of 1 it is as far from that as said above; less is nearer to it, in powers.
 
         Returns
         -------
-        Integrator, Tolerance
+        Coarser
         """
         if isinstance(self.pace, Controlled):
-            return self.method, Tolerance(_LOOSER * tolerance.relative, _LOOSER * tolerance.absolute)
-        return _doubled(self.method), tolerance
+            looser = _LOOSER**share
+            easier = Tolerance(looser * tolerance.relative, looser * tolerance.absolute)
+            return Coarser(self.method, easier, looser ** (1.0 / self.pace.steepness))
+        longer = 2.0**share
+        return Coarser(_lengthened(self.method, longer), tolerance, longer)
 
 
-def _doubled(method: Any) -> Any:
-    """The method in steps of twice the length, also where it is that of another one."""
+def _lengthened(method: Any, longer: float) -> Any:
+    """The method in longer steps, also where it is that of another one."""
     if hasattr(method, "method"):
-        return replace(method, method=_doubled(method.method))
-    return replace(method, step=2.0 * method.step)
+        return replace(method, method=_lengthened(method.method, longer))
+    return replace(method, step=longer * method.step)
 
 
 def checked(method: Integrator) -> tuple[Integrator, Checked | None]:
-    """Return a method by itself, and as it is checked; None where it is not.
+    """Return a method by itself, and as it is checked; None where that is not wanted.
 
     Parameters
     ----------
@@ -135,7 +153,7 @@ def checked(method: Integrator) -> tuple[Integrator, Checked | None]:
         return method.method, method
     if isinstance(method, Unchecked):
         return method.method, None
-    return method, Checked(method) if isinstance(method.pace, Controlled) else None
+    return method, Checked(method)
 
 
 def bare(method: Integrator) -> Integrator:

@@ -10,7 +10,7 @@ import numpy as np
 from flexctrl.dynamics.notes.outputs import by_rows, placed
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.scales import farthest, output_yardsticks, turning, yardsticks
-from flexctrl.dynamics.steps import Controlled
+from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
@@ -21,6 +21,8 @@ __all__ = ["can_be_told", "may_grow", "told_beside"]
 
 _SWUNG, _FAR = 0.25, 0.02
 """What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
+_OFTEN = 12.0
+"""Little grows in half a turn, to and fro: steps of one length, half of which it costs, are not taken again for it."""
 _POINTS, _FEW = 4, 1500
 _INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
 _TOLD, _AIM = 0.03, 0.01
@@ -29,6 +31,7 @@ _LEAST, _ALL = 0.1, 0.995
 _PARTED = 0.2
 """Runs that have parted by more may both be wrong: no share of that is sure to be the finer one's."""
 _MORE = 1.2
+_GROWN = "small differences grow, or steps are too long"
 
 
 def can_be_told(journey: Journey) -> bool:
@@ -42,12 +45,10 @@ def can_be_told(journey: Journey) -> bool:
     Returns
     -------
     bool
-        False under a sampled law asked in Python, in small motion, and where the run ended early.
+        False in small motion, and where the run ended early.
     """
-    feed, model = journey.plan.feed, journey.plan.model
-    remembers = feed.controller is not None and not feed.continuous and feed.lowered is None
-    ended = journey.status in (Status.FINISHED, Status.STOPPED)
-    return ended and not remembers and isinstance(model, Model) and model.large and journey.mark.steps > 0
+    model, ended = journey.plan.model, journey.status in (Status.FINISHED, Status.STOPPED)
+    return ended and isinstance(model, Model) and model.large and journey.mark.steps > 0
 
 
 def may_grow(journey: Journey) -> bool:
@@ -62,16 +63,20 @@ def may_grow(journey: Journey) -> bool:
     -------
     bool
         Whether something has swung by more than a quarter of a radian, gone farther than a fiftieth of the machine's
-        size, met corners, or followed a continuous law, which may have corners of its own. Not where samples keep
-        nearly all steps short: a coarser run would be the same.
+        size, met corners, or followed a continuous law, which may have corners of its own; in steps of one length, if
+        it has gone twelve times that way to and fro. Not where samples keep nearly all steps short: a coarser run
+        would be the same.
     """
     plan, sums, watch = journey.plan, journey.books.sums, journey.watch
     feed, model = plan.feed, plan.model
     if feed.sample_time and journey.mark.steps < _MORE * journey.point.state.t / feed.sample_time:
         return False
     own = {*watch.names, *watch.corner_names}
-    swung = bool((sums.moved > np.where(turning(model), _SWUNG, _FAR) * yardsticks(model)).any())
-    return swung or feed.reacting or any(event.name in own for event in journey.events)
+    least = np.where(turning(model), _SWUNG, _FAR) * yardsticks(model)
+    swung = sums.moved > least
+    if isinstance(plan.method.pace, Fixed):
+        swung &= sums.path > _OFTEN * least
+    return bool(swung.any()) or feed.reacting or any(event.name in own for event in journey.events)
 
 
 @dataclass(frozen=True)
@@ -226,7 +231,7 @@ def _note(journey: Journey, gap: _Gap, left: float) -> str:
     until = float(np.append(0.0, gap.t)[int(np.argmax(gap.size > _TOLD * left))])
     far = f"{100.0 * error:.2g} % of the motion" if error < _ALL else "all of the motion"
     parted = gap.size[-1] > _PARTED
-    is_off = f"may be off by {far}, as small differences grow" if parted else f"is off by {far}"
+    is_off = f"may be off by {far}, as {_GROWN}" if parted else f"is off by {far}"
     said = f"by a coarser run, {gap.where} {is_off}"
     finer = (_AIM / error) ** (1.0 / plan.method.order)
     if isinstance(pace, Controlled):
