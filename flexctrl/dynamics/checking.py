@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexctrl.design.controller import Controller
+from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
-from flexctrl.dynamics.methods.checked import Checked
-from flexctrl.dynamics.notes.beside import told_beside
+from flexctrl.dynamics.methods.checked import Beside, Checked
+from flexctrl.dynamics.notes.beside import kept_short, told_beside
 from flexctrl.dynamics.records.record import InMemory
-from flexctrl.dynamics.run import Run
-from flexctrl.dynamics.setting_out import travelled
+from flexctrl.dynamics.run import Run, Status
+from flexctrl.dynamics.setting_out import Anew, travelled
 from flexctrl.errors import FlexctrlError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
@@ -22,8 +24,8 @@ from flexctrl.model.state import State
 __all__ = ["Beginning", "laid_beside"]
 
 _LONGER, _SECONDS = 2.0, 0.2
-_NEARER = 0.5
-_UNCHECKED = "how far small differences have grown is not told by a coarser run"
+_NEARER, _LITTLE = 0.5, 0.01
+_UNCHECKED = "how far small differences have grown is not told by another run"
 
 
 @dataclass(frozen=True)
@@ -32,24 +34,29 @@ class Beginning:
 
     Attributes
     ----------
-    start : State, Rest or None
+    start : State, Rest, Anew or None
     spacing : float or None
         Of rows [s].
-    feed : Feed or None
-        As before the run: a law in Python may remember what it is asked. None where that cannot be copied.
+    steps : int
+        Taken before.
+    feed : Feed
+    spare : Controller or None
+        As it was before the run, as a law in Python may remember what it is asked; None where it cannot be copied.
     """
 
-    start: State | Rest | None
+    start: State | Rest | Anew | None
     spacing: float | None
-    feed: Feed | None
+    steps: int
+    feed: Feed
+    spare: Controller | None
 
     @staticmethod
-    def of(start: State | Rest | None, spacing: float | None, feed: Feed) -> Beginning:
+    def of(start: State | Rest | Checkpoint | None, spacing: float | None, feed: Feed) -> Beginning:
         """Return where a run is about to begin.
 
         Parameters
         ----------
-        start : State, Rest or None
+        start : State, Rest, Checkpoint or None
         spacing : float or None
         feed : Feed
 
@@ -57,21 +64,29 @@ class Beginning:
         -------
         Beginning
         """
-        return Beginning(start, spacing, _copied(feed))
+        spare = None if feed.continuous else _copied(feed.controller)
+        if isinstance(start, Checkpoint):
+            return Beginning(Anew(start), spacing, start.mark.steps, feed, spare)
+        return Beginning(start, spacing, 0, feed, spare)
+
+    @property
+    def again(self) -> Feed | None:
+        """What feeds another run; None where a law's memory is not what it was."""
+        if self.feed.controller is None or self.feed.continuous or self.feed.lowered is not None:
+            return replace(self.feed, met=[])
+        law = _copied(self.spare)
+        return None if law is None else replace(self.feed, controller=law, met=[])
 
 
-def _copied(feed: Feed) -> Feed | None:
-    """A feed whose controller remembers by itself; None where its memory cannot be copied."""
-    if feed.controller is None or feed.continuous or feed.lowered is not None:
-        return replace(feed, met=[])
+def _copied(law: Controller | None) -> Controller | None:
     try:
-        return replace(feed, controller=copy.deepcopy(feed.controller), met=[])
+        return copy.deepcopy(law)
     except Exception:  # whatever a law of one's own is made of
         return None
 
 
 def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> Run:
-    """Return the run with what a coarser one tells of it; where that is to be noted, a second one has the last word.
+    """Return the run with what a coarser one tells of it; where that is much, a second one has the last word.
 
     Parameters
     ----------
@@ -84,25 +99,25 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     Returns
     -------
     Run
-        As it is where the coarser run fails, or takes far longer and is ended.
     """
-    if beginning.feed is None:
+    if beginning.again is None:
         return _noted(run, f"{_UNCHECKED}: the controller cannot be copied")
-    told = _told(run, journey, method, beginning, 1.0)
-    if set(told.report.notes) <= set(run.report.notes):
+    tolerance = journey.plan.tolerance
+    if kept_short(journey):
+        return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time), beginning)[0]
+    told, until = _told(run, journey, method.coarser(tolerance), beginning)
+    if told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes):
         return told
-    nearer = _told(run, journey, method, beginning, _NEARER)
-    return nearer if nearer is not run else told
+    nearer, later = _told(run, journey, method.coarser(tolerance, _NEARER), beginning)
+    return told if nearer is run or later < until else nearer
 
 
-def _told(run: Run, journey: Journey, method: Checked, beginning: Beginning, share: float) -> Run:
-    """The run with what one coarser one tells; that is ended where it takes far longer."""
-    assert beginning.feed is not None
-    plan, end = journey.plan, run.final.t
-    beside, feed = method.coarser(plan.tolerance, share), _copied(beginning.feed)
+def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, float]:
+    """The run with what one other tells, and until when; that is ended where it takes far longer."""
+    plan, end, feed = journey.plan, run.final.t, beginning.again
     if feed is None:
-        return run
-    latest = time.perf_counter() + _LONGER * run.report.wall_s + _SECONDS
+        return run, 0.0
+    latest = time.perf_counter() + _LONGER / min(beside.longer, 1.0) * run.report.wall_s + _SECONDS
 
     def ended(share: float) -> None:
         if time.perf_counter() > latest:
@@ -112,12 +127,13 @@ def _told(run: Run, journey: Journey, method: Checked, beginning: Beginning, sha
     spacing = beginning.spacing if len(run.t) > 1 else end  # a run that keeps no rows is compared where it ends
     try:
         unwatched = replace(changed, until=end, tell=ended, autosave=None)
-        _, coarse = travelled(unwatched, beginning.start, (), InMemory(), spacing)
-    except (FlexctrlError, KeyboardInterrupt):
-        return run
-    if len(run.u) and len(coarse.u) and run.t[0] == coarse.t[0] and not np.array_equal(run.u[0], coarse.u[0]):
-        return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep its memory in x)")
-    return told_beside(run, coarse, journey, beside.longer)
+        _, other = travelled(unwatched, beginning.start, (), InMemory(), spacing)
+    except (FlexctrlError, KeyboardInterrupt) as fault:
+        return _noted(run, f"{_UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), 0.0
+    if len(run.u) and len(other.u) and run.t[0] == other.t[0] and not np.array_equal(run.u[0], other.u[0]):
+        return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), end
+    until = end if other.status is Status.STOPPED else other.final.t
+    return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps), until
 
 
 def _noted(run: Run, note: str) -> Run:

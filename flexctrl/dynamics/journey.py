@@ -47,6 +47,8 @@ from flexctrl.dynamics.steps import (
 )
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
+from flexctrl.model.model import Model
+from flexctrl.model.overturned import overturned
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
@@ -137,7 +139,7 @@ class Journey:
 
     def travel(self) -> None:
         """Go on to the end, or as far as it goes."""
-        self._pause()
+        self.pause()
         began = self.point
         try:
             with Interruption() as interruption:
@@ -150,7 +152,7 @@ class Journey:
             failure = self._failure(error, self.point)
             self.stepper.counts.worst = failure.worst
             worst = self.plan.model.coordinates[failure.worst]
-            self.status, self.message = Status.FAILED, f"{failure}; worst freedom: {worst}"
+            self.status, self.message = Status.FAILED, f"{self._cause(str(failure))}; worst freedom: {worst}"
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
         self._judge()
@@ -195,6 +197,12 @@ class Journey:
     def _failure(self, error: Exception, point: Any) -> StepError:
         return failed_step(error, self.stepper.counts.worst, point.state.t)
 
+    def _cause(self, failure: str) -> str:
+        """What has failed, and an element that is turned too far, which no smaller step helps."""
+        model = self.plan.model
+        turned = overturned(model, self.point.state) if isinstance(model, Model) else ""
+        return f"at t = {self.point.state.t:.6g} s {turned} ({failure})" if turned else failure
+
     def fail(self, error: Exception) -> None:
         """End as failed, for what is no fault of the step."""
         self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
@@ -205,7 +213,7 @@ class Journey:
         if self.status in (Status.FINISHED, Status.STOPPED) and (unresolved := self.books.unresolved):
             ended = f" (it would have ended: {self.message})" if self.message else ""
             self.status = Status.FAILED
-            self.message = f"{unresolved} at t = {self.point.state.t:.6g} s{ended}; {remedy(self)}"
+            self.message = self._cause(f"{unresolved} at t = {self.point.state.t:.6g} s{ended}; {remedy(self)}")
         elif self.status is not Status.FAILED:
             self.notes += self.books.doubts
 
@@ -235,10 +243,10 @@ class Journey:
             look_ahead(self)
             if (stop := self.stops.next) - t <= self.tick:
                 renew(self, stop)
-                self._pause()
+                self.pause()
                 continue
             self.go(stop, self.plan.until)
-            self._pause()
+            self.pause()
             look_back(self)
             if (now := time.perf_counter()) - self._told > _SECONDS:
                 self._told = now
@@ -249,7 +257,7 @@ class Journey:
                 self._keep(self.plan.autosave.path)
             interruption.check()
 
-    def _pause(self) -> None:
+    def pause(self) -> None:
         """Take note of what later steps depend on, and what they have cost so far."""
         self._memory, self._counts = self.stepper.memory, replace(self.stepper.counts)
 

@@ -23,10 +23,10 @@ def renew(journey: Journey, stop: float) -> None:
     """Give new inputs at a sample instant or break; accelerations jump with them."""
     if journey.point.state.t != stop:
         journey.point = replace(journey.point, state=journey.point.state.with_(t=stop))
-    journey.stops.go_by(stop)
-    journey.mark.left = 0
     feed, before, state = journey.plan.feed, journey.point.supply, journey.point.state
     fresh = feed.restart(state, before) if feed.continuous else feed.sample(state, before)
+    journey.stops.go_by(stop)  # not before the law has answered: a run that it ends goes on by asking it again
+    journey.mark.left = 0
     same = np.array_equal(fresh.u, before.u)
     if same:
         several, point = journey.stepper, journey.point

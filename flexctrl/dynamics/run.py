@@ -134,7 +134,7 @@ class Report:
     drifted : str
         The degree of freedom in which that is most.
     error : float
-        By how much the run is off, over the largest motion, growth of small differences included: by a coarser run laid
+        By how much the run is off, over the largest motion, growth of small differences included: by another run laid
         beside it (`Checked`); ``drift`` where there is none.
     output_errors : mapping of str to float
         By how much places and angles among the outputs may be off, each over the range of its own values (1: all of
@@ -178,7 +178,7 @@ class Report:
             f"converged last: {self.worst or 'none'}",
             *([f"loops of rigid parts closed to {self.closure_error:.2g}"] if self.closure_error else []),
             *([f"errors of steps add up to {self.drift:.2g} of the motion of {self.drifted}"] if self.drift else []),
-            *([f"off by {self.error:.2g} of the motion, by a coarser run"] if self.error != self.drift else []),
+            *([f"off by {self.error:.2g} of the motion, by another run"] if self.error != self.drift else []),
             *([worst_output(self.output_errors)] if self.output_errors else []),
             *([self.message] if self.message else []),
             *self.notes,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flexctrl.dynamics.alpha.first_step import first_step
@@ -27,12 +27,19 @@ from flexctrl.errors import MechanismError, SingularMatrixError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
 
-__all__ = ["travelled"]
+__all__ = ["Anew", "travelled"]
+
+
+@dataclass(frozen=True)
+class Anew:
+    """Where a checkpoint stands, for a run that goes on from there by other steps."""
+
+    saved: Checkpoint
 
 
 def travelled(
     plan: Plan,
-    start: State | Rest | Checkpoint | None,
+    start: State | Rest | Checkpoint | Anew | None,
     events: tuple[Event, ...],
     record: Record,
     spacing: float | None,
@@ -42,7 +49,7 @@ def travelled(
     Parameters
     ----------
     plan : Plan
-    start : State, Rest, Checkpoint or None
+    start : State, Rest, Checkpoint, Anew or None
     events : tuple of Event
     record : Record
     spacing : float or None
@@ -73,7 +80,7 @@ def travelled(
 def _run(
     plan: Plan,
     stepper: Stepper[Any],
-    start: State | Rest | Checkpoint | None,
+    start: State | Rest | Checkpoint | Anew | None,
     watch: Watch,
     rows: Rows,
     track: Track,
@@ -81,10 +88,13 @@ def _run(
     try:
         if isinstance(start, Checkpoint):
             journey = _resumed(plan, stepper, start, watch, rows, track)
+        elif isinstance(start, Anew):
+            journey = _anew(plan, stepper, start.saved, watch, rows, track)
         else:
             journey = _begun(plan, stepper, start, watch, rows, track)
     except KeyboardInterrupt:
-        return unbegun(plan, stepper, start, watch, rows, track)
+        where = start.saved if isinstance(start, Anew) else start
+        return unbegun(plan, stepper, where, watch, rows, track)
     journey.travel()
     return journey
 
@@ -164,3 +174,20 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, replace(start.mark))
     journey.told, journey.balked = start.told, start.balked
     return journey
+
+
+def _anew(plan: Plan, stepper: Stepper[Any], saved: Checkpoint, watch: Watch, rows: Rows, track: Track) -> Journey:
+    """A run that goes on by other steps than those that led there."""
+    if saved.passed == UNASKED:
+        return _begun(plan, stepper, saved.point.state, watch, rows, track)
+    pace = plan.method.pace
+    stops = Stops(plan.feed.sample_time, plan.feed.breaks, saved.passed, saved.found)
+    plan.feed.met[:] = [saved.found]
+    size = pace.step if isinstance(pace, Fixed) else min(saved.mark.size, pace.largest)
+    point = stepper.start(saved.point.state, saved.point.supply, size)
+    watch.begin(point)
+    books = Books(plan.feed, point.state, plan.method, plan.tolerance)
+    books.turn(point, size)
+    books.sums.moved, books.first = saved.sums.moved.copy(), saved.first  # what errors are relative to
+    rows.count = saved.rows
+    return Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))

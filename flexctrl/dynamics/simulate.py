@@ -121,7 +121,7 @@ def simulate(
             check_state(model, start, "simulate: start")
             model.__dict__["_begun"] = start
     feed = feed_of(plant, controller, _base(plant, start, inputs))
-    beginning = Beginning.of(start, spacing, feed) if check and not isinstance(start, Checkpoint) else None
+    beginning = Beginning.of(start, spacing, feed) if check else None
     plan = Plan(
         plant,
         feed,

@@ -113,6 +113,11 @@ class OwnMotion(NamedTuple):
     along: int = 0
 
 
+_UPRIGHT, _TURNED = 1e-3, -0.84
+"""What sides have in common across the chord, squared. The trace of a turn of 2.74 rad from end to end: the frame turns
+over at half a turn."""
+
+
 @dataclass(frozen=True)
 class BeamMotion:
     """What the effects may use of a moving beam element; vectors in the element frame unless said.
@@ -209,7 +214,9 @@ def beam_motion(
     sides = [node.R @ rest[:, 1] for node in (first, second)]
     mean = 0.5 * (sides[0] + sides[1])
     e3 = ca.cross(e1, mean)
-    e3 = e3 / ca.sqrt(ca.dot(e3, e3))
+    upright, turn = ca.dot(e3, e3), ca.dot(first.R, second.R)
+    sound = ca.logic_and(upright > _UPRIGHT, turn > _TURNED)
+    e3 = e3 / ca.sqrt(ca.if_else(sound, upright, float("nan")))
     e2 = ca.cross(e3, e1)
     frame = ca.horzcat(e1, e2, e3)
     rates, accelerations = (first.v, first.w, second.v, second.w), (first.a, first.b, second.a, second.b)

@@ -14,6 +14,7 @@ from flexctrl.errors import EquilibriumError, StructureError, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
+from flexctrl.model.overturned import overturned
 from flexctrl.model.search import SMALLEST_PART, Found, Newton, follow
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite, check_number
@@ -228,6 +229,8 @@ def _stands(balance: Balance, start: State) -> bool:
 
 
 def _gave_way(balance: Balance, found: Found, share: float) -> str:
+    if turned := overturned(balance.model, found.state):
+        return f"no equilibrium found: the loads carry the machine as far as {share:.4g} of them, where {turned}"
     return (
         f"no equilibrium found: brought on gradually, the loads carry the machine as far as {share:.4g} of them; there "
         f"it gives way (relative residual of the whole {found.residual:.3g}, worst at {balance.worst(found.state)}). "
@@ -236,6 +239,8 @@ def _gave_way(balance: Balance, found: Found, share: float) -> str:
 
 
 def _complaint(balance: Balance, found: Found) -> str:
+    if turned := overturned(balance.model, found.state):
+        return f"no equilibrium found: {turned}"
     loose, worst = _pushed_freely(balance, found.state), balance.worst(found.state)
     free = "If the machine is free to move there, hold that coordinate"
     if loose:

@@ -88,8 +88,22 @@ def test_the_run_is_that_of_the_method_to_the_bit():
     assert run.report.steps == bare.report.steps
     assert bare.report.error == bare.report.drift
     assert run.report.error != run.report.drift
-    resumed = fc.simulate(model, until=4.0, start=run.checkpoint, method=fc.AdaptiveAlpha())
-    assert resumed.report.error == resumed.report.drift
+
+
+def test_what_goes_on_from_a_checkpoint_is_checked():
+    """The rest of it: about as the whole run's, which has grown since."""
+    model, start = chain(2, 8.0, 1)
+    for method in (fc.AdaptiveAlpha(), fc.GeneralizedAlpha(5e-3)):
+        half = fc.simulate(model, until=2.0, start=start, method=method, every=0.01)
+        how = {"until": 5.0, "method": method, "every": 0.01}
+        rest, whole = fc.simulate(model, start=half.checkpoint, **how), fc.simulate(model, start=start, **how)
+        same = fc.simulate(model, start=half.checkpoint, **{**how, "method": fc.Unchecked(method)})
+        assert np.array_equal(rest.y, same.y)
+        assert np.array_equal(rest.final.q, whole.final.q)
+        assert same.report.error == same.report.drift
+        true = fc.simulate(model, until=3.0, start=half.final, every=0.01, **EXACT)
+        off = np.abs(rest.y[-300:] - true.y[-300:]).max() / 2.0
+        assert 0.2 * off < rest.report.error < 6.0 * off
 
 
 @pytest.mark.parametrize(
@@ -247,7 +261,59 @@ def test_a_sampled_law_in_python_is_checked_by_a_copy_of_what_it_was():
     assert 0.2 * off < run.report.error < 6.0 * off
 
 
-@pytest.mark.parametrize(("law", "why"), [(Uncopied, "cannot be copied"), (Elsewhere, "keep its memory in x")])
+class Turning(Stateful):
+    """A sampled law that leaves all as it is."""
+
+    sample_time = 2e-3
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([0.0])
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(2e-3)], ids=["chosen", "one length"])
+def test_where_samples_keep_steps_short_a_finer_run_is_made(method):
+    """1.3 of 4 m off, without a word."""
+    model, start = chain(3, 8.0, 2)
+    torque = fc.Structure(
+        model.structure.elements,
+        model.structure.joints,
+        inputs=[fc.Torque("torque", model.structure.elements[0].point("end"), "y")],
+        outputs=[*model.structure.outputs, fc.Rotation("angle", model.structure.elements[0].point("end"), "y")],
+    )
+    model = fc.assemble(torque, [fc.Gravity(), fc.LargeRotation()])
+    how = {"until": 4.0, "start": start, "every": 0.01}
+    run, true = fc.simulate(model, Turning(), method=method, **how), fc.simulate(model, **how, **EXACT)
+    off = turned(run, true)
+    assert 0.2 * off < run.report.error < 6.0 * off
+    assert any("by a finer run" in note for note in run.report.notes) == (run.report.error > 0.03)
+
+
+class Frail(Stateful):
+    """A sampled law whose copies do not live long, as one that guards a speed which a coarser run exceeds."""
+
+    last = np.inf
+
+    def __deepcopy__(self, memo: dict) -> Stateful:
+        found = Frail()
+        found.last = 0.52
+        return found
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        if t > self.last:
+            raise RuntimeError("too fast")
+        return np.array([-10.0 * y[0]])
+
+
+def test_a_coarser_run_that_ends_early_is_told():
+    """It was believed for the whole of the run, and took what sums of errors say from it."""
+    model = driven()
+    run = fc.simulate(model, Frail(), until=1.0, start=model.displace([1.0, 1.0]))
+    assert run.status is fc.Status.FINISHED
+    assert any("run beside it ended at t = 0.55 s" in note for note in run.report.notes)
+    assert run.report.error >= run.report.drift
+
+
+@pytest.mark.parametrize(("law", "why"), [(Uncopied, "cannot be copied"), (Elsewhere, "keep memory in x")])
 def test_what_cannot_be_asked_anew_is_told(law, why):
     model = driven()
     run = fc.simulate(model, law(), until=1.0, start=model.displace([1.0, 1.0]))

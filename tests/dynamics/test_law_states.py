@@ -124,3 +124,26 @@ def test_a_run_goes_on_with_what_its_law_has_come_to():
     assert half.checkpoint.point.supply.trend.size == 2
     assert (rest.final.q == whole.final.q).all()
     assert rest.report.steps == whole.report.steps
+
+
+def test_a_law_that_raises_when_its_error_is_asked_for_ends_the_run_and_is_blamed(monkeypatch):
+    class Waiting:
+        inputs, outputs, sample_time = ("x",), ("f",), 0.0
+
+        def initial(self):
+            return np.ones(1)
+
+        def command(self, t, x, y):
+            return np.array([1.0 - x[0]])
+
+        def rate(self, t, x, y):
+            return -3.0 * x * x
+
+    def fails(*given):
+        raise ZeroDivisionError("no slope here")
+
+    monkeypatch.setattr("flexctrl.dynamics.feed.softened", fails)
+    run = fc.simulate(cart(1.0), Waiting(), until=2.0)
+    assert run.status is fc.Status.FAILED
+    assert "the controller raised ZeroDivisionError: no slope here" in run.report.message
+    assert len(run.t) > 1

@@ -63,10 +63,17 @@ def subject(request):
     structure = LOOPS[which]() if which in LOOPS else machine(seed, 3 + seed % 4, supported)
     model = fc.assemble(structure, EFFECTS[kind], fc.CasadiVM())
     far = 0.15 if which in LOOPS else 0.3
-    state = model.displace(far * rng.normal(size=model.n))
-    v, a = rng.normal(size=(2, model.n))
-    state = model.advance(state, far * rng.normal(size=model.n), v, 0.0)
+    steps, (v, a) = far * rng.normal(size=(2, model.n)), rng.normal(size=(2, model.n))
+    state = displaced(model, steps, v)
     return Subject(model, state, rng.normal(size=len(model.inputs)), v, a)
+
+
+def displaced(model: fc.Model, steps: np.ndarray, v: np.ndarray) -> fc.State:
+    """Two steps from rest, in halves where they turn an element by more than it can be."""
+    state = model.rest
+    for step in steps:
+        state = model.advance(state, step, v, 0.0)
+    return state if np.isfinite(model.energy(state)).all() else displaced(model, 0.5 * steps, v)
 
 
 def differences(f, n: int, h: float = 1e-6) -> np.ndarray:

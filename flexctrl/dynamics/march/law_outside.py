@@ -59,13 +59,13 @@ def samples(ride: Ride, deadline: float) -> bool:
             mark.left = wanted - done
             break
         t = clock[0] = stop
-        stops.passed += 1
         before = u
         try:
             u, x = told(stop, x, y[done - 1].take(reads))
         except (ControllerError, KeyboardInterrupt) as fault:
             ride.faults.append(fault)
             break
+        stops.passed += 1
         if u != before:
             marcher.jumps(u)
         if lookout is not None and lookout.leaps(marcher.rows[done - 1], u, False):

@@ -126,6 +126,7 @@ class Ride:
                 well = self._leg(stop)
         some = self._end()
         if self.faults:
+            self.journey.pause()  # where it stands now is what a run goes on from
             raise self.faults[0]
         return some
 
@@ -260,7 +261,6 @@ class Ride:
         m.t = stop
         if abs(self.last.t - stop) < self.tick:
             self.last = self.last.with_(t=stop)
-        j.stops.passed += 1
         j.mark.left = 0
         y = self.marcher.rows[m.done - 1, 1:]
         feed, before = j.plan.feed, self.supply
@@ -269,6 +269,7 @@ class Ride:
         except (ControllerError, KeyboardInterrupt) as fault:
             self.faults.append(fault)
             return False
+        j.stops.passed += 1
         u = self.supply.u
         if self.weaver is not None:
             self.weaver.at(stop)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.steps import Controlled, Integrator, Pace, Stepper
+from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Pace, Stepper
 from flexctrl.errors import StructureError
 from flexctrl.model.plant import Plant
 
-__all__ = ["Checked", "Coarser", "Unchecked", "bare", "checked"]
+__all__ = ["Beside", "Checked", "Unchecked", "bare", "checked"]
 
 _LOOSER = 27.0
 """Under such a tolerance steps of a method of second order are three times as long, and errors nine times as large."""
 
 
 @dataclass(frozen=True)
-class Coarser:
+class Beside:
     """How a run beside another one is made.
 
     Attributes
@@ -95,8 +96,10 @@ class Checked(_Wrapped):
     times as long. It stands in ``report.error``; above 3 % a note says so, and until when the run is right to that.
     What would be noted is asked of a second run first, half as far away (in powers): its word counts.
 
-    Nothing is run again for linear models and small motion, where samples keep nearly all steps short, and from a
-    `Checkpoint`. A sampled law in Python is asked again as a copy of what it was before the run.
+    Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
+    steps short the other run is a finer one, in half the steps, for what has turned so and for corners. Nothing is run
+    again for linear models and small motion. A sampled law in Python is asked again as a copy of what it was before
+    the run; from a `Checkpoint` on it is the rest of the run that is checked.
 
     Parameters
     ----------
@@ -106,10 +109,15 @@ class Checked(_Wrapped):
     Raises
     ------
     StructureError
-        For what is no method, or is wrapped already.
+        For what is no method, or is wrapped already; for one of fixed steps of your own that has no field ``step``.
     """
 
-    def coarser(self, tolerance: Tolerance, share: float = 1.0) -> Coarser:
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.pace, Fixed) and not _changeable(self.method):
+            raise StructureError(f"Checked: {self.method!r} has no field `step` to be changed: take Unchecked of it")
+
+    def coarser(self, tolerance: Tolerance, share: float = 1.0) -> Beside:
         """Return how the run beside is to be made.
 
         Parameters
@@ -121,25 +129,52 @@ class Checked(_Wrapped):
 
         Returns
         -------
-        Coarser
+        Beside
         """
         if isinstance(self.pace, Controlled):
             looser = _LOOSER**share
             easier = Tolerance(looser * tolerance.relative, looser * tolerance.absolute)
-            return Coarser(self.method, easier, looser ** (1.0 / self.pace.steepness))
+            return Beside(self.method, easier, looser ** (1.0 / self.pace.steepness))
         longer = 2.0**share
-        return Coarser(_lengthened(self.method, longer), tolerance, longer)
+        return Beside(_stepping(self.method, lambda step: longer * step), tolerance, longer)
+
+    def finer(self, tolerance: Tolerance, sample: float) -> Beside:
+        """Return how a run is made whose steps are half as long as those that samples keep short.
+
+        Parameters
+        ----------
+        tolerance : Tolerance
+        sample : float
+            Time between samples [s].
+
+        Returns
+        -------
+        Beside
+        """
+        if not _changeable(self.method):
+            return self.coarser(tolerance)
+        return Beside(_stepping(self.method, lambda step: 0.5 * min(step, sample)), tolerance, 0.5)
 
 
-def _lengthened(method: Any, longer: float) -> Any:
-    """The method in longer steps, also where it is that of another one."""
+def _changeable(method: Any) -> bool:
+    """Whether the length of a method's steps, or of its longest, can be changed: one's own may not say it."""
+    inner = getattr(method, "method", method)
+    return is_dataclass(inner) and hasattr(inner, _named(inner))
+
+
+def _named(method: Any) -> str:
+    return "step" if isinstance(method.pace, Fixed) else "largest_step"
+
+
+def _stepping(method: Any, change: Callable[[float], float]) -> Any:
+    """The method in steps of another length, also where it is that of another one."""
     if hasattr(method, "method"):
-        return replace(method, method=_lengthened(method.method, longer))
-    return replace(method, step=longer * method.step)
+        return replace(method, method=_stepping(method.method, change))
+    return replace(method, **{_named(method): change(getattr(method, _named(method)))})
 
 
 def checked(method: Integrator) -> tuple[Integrator, Checked | None]:
-    """Return a method by itself, and as it is checked; None where that is not wanted.
+    """Return a method by itself, and as it is checked; None where that is not wanted, or cannot be.
 
     Parameters
     ----------
@@ -153,7 +188,8 @@ def checked(method: Integrator) -> tuple[Integrator, Checked | None]:
         return method.method, method
     if isinstance(method, Unchecked):
         return method.method, None
-    return method, Checked(method)
+    known = isinstance(method.pace, Controlled) or _changeable(method)
+    return method, Checked(method) if known else None
 
 
 def bare(method: Integrator) -> Integrator:

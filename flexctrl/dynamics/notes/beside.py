@@ -17,7 +17,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["can_be_told", "may_grow", "told_beside"]
+__all__ = ["can_be_told", "kept_short", "may_grow", "told_beside"]
 
 _SWUNG, _FAR = 0.25, 0.02
 """What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
@@ -32,6 +32,7 @@ _PARTED = 0.2
 """Runs that have parted by more may both be wrong: no share of that is sure to be the finer one's."""
 _MORE = 1.2
 _GROWN = "small differences grow, or steps are too long"
+_EARLY = "the {kind} run beside it ended at t = {t:.3g} s: how far small differences have grown since is not told"
 
 
 def can_be_told(journey: Journey) -> bool:
@@ -51,6 +52,22 @@ def can_be_told(journey: Journey) -> bool:
     return ended and isinstance(model, Model) and model.large and journey.mark.steps > 0
 
 
+def kept_short(journey: Journey) -> bool:
+    """Tell whether samples keep nearly all steps short: a coarser run would be the same.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    bool
+    """
+    sample = journey.plan.feed.sample_time
+    return sample > 0.0 and journey.mark.steps < _MORE * journey.point.state.t / sample
+
+
 def may_grow(journey: Journey) -> bool:
     """Tell whether small differences may have grown of themselves.
 
@@ -64,17 +81,15 @@ def may_grow(journey: Journey) -> bool:
     bool
         Whether something has swung by more than a quarter of a radian, gone farther than a fiftieth of the machine's
         size, met corners, or followed a continuous law, which may have corners of its own; in steps of one length, if
-        it has gone twelve times that way to and fro. Not where samples keep nearly all steps short: a coarser run
-        would be the same.
+        it has gone twelve times that way to and fro. Where samples keep steps short the other run is a finer one,
+        which costs twice as much as the run itself: only for what turns so far and often, and corners.
     """
-    plan, sums, watch = journey.plan, journey.books.sums, journey.watch
+    plan, sums, watch, short = journey.plan, journey.books.sums, journey.watch, kept_short(journey)
     feed, model = plan.feed, plan.model
-    if feed.sample_time and journey.mark.steps < _MORE * journey.point.state.t / feed.sample_time:
-        return False
-    own = {*watch.names, *watch.corner_names}
-    least = np.where(turning(model), _SWUNG, _FAR) * yardsticks(model)
+    own = {*watch.corner_names, *(() if short else watch.names)}
+    least = np.where(turning(model), _SWUNG, np.inf if short else _FAR) * yardsticks(model)
     swung = sums.moved > least
-    if isinstance(plan.method.pace, Fixed):
+    if short or isinstance(plan.method.pace, Fixed):
         swung &= sums.path > _OFTEN * least
     return bool(swung.any()) or feed.reacting or any(event.name in own for event in journey.events)
 
@@ -100,7 +115,7 @@ class _Gap:
     outputs: np.ndarray
 
 
-def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
+def told_beside(run: Run, coarse: Run, journey: Journey, longer: float, taken: int) -> Run:
     """Return a run with what a coarser one tells of its error.
 
     Where nothing else keeps them short, steps of the coarser run are longer by a factor r and its errors by rᵖ. Samples
@@ -115,33 +130,40 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float) -> Run:
     journey : Journey
         How the finer one went.
     longer : float
-        By how much steps of the coarser one are longer.
+        By how much steps of the coarser one are longer; below 1 it is a finer one.
+    taken : int
+        Steps of the run since where the other begins.
 
     Returns
     -------
     Run
         As it is where the coarser one tells nothing: it took no step, nearly all its steps are the same, or it has
-        parted from the finer one so far that sums of local errors tell more.
+        parted from the finer one so far that sums of local errors tell more. Of one that ended before the run did it
+        keeps what these sums tell, and says so.
     """
     if not coarse.report.steps:
         return run
-    fewer, report = coarse.report.steps / run.report.steps, run.report
+    fewer, report = coarse.report.steps / max(taken, 1), run.report
     free = (1.0 - fewer) / (1.0 - 1.0 / longer)
-    kept = not journey.plan.feed.sample_time and report.steps <= _FEW and run.track.stretches and coarse.track.stretches
+    kept = not journey.plan.feed.sample_time and taken <= _FEW and run.track.stretches and coarse.track.stretches
     gap = (_gap if kept else _gap_of_rows)(run, coarse, journey)
-    left = min(max(free, _LEAST), 1.0) * (longer**report.order - 1.0)
+    left = min(max(free, _LEAST), 1.0) * abs(longer**report.order - 1.0)
     told, parted = float(gap.size[-1]) / left, gap.size[-1] > _PARTED
     if told < report.drift and (free < _LEAST or parted):
         return run
     left = 1.0 if parted else left
     told = float(gap.size[-1]) / left
-    error = max(told, journey.drift.ran)
-    outputs = by_rows(journey, run.y, gap.outputs / left, error)
+    early = coarse.status not in (Status.FINISHED, Status.STOPPED)
+    error = max(told, report.drift if early else journey.drift.ran)
+    kind = "coarser" if longer > 1.0 else "finer"
+    outputs = by_rows(journey, run.y, gap.outputs / left, error, kind)
     notes = tuple(note for note in report.notes if note not in (journey.drift.note, *journey.outputs.notes))
     if told >= error > _TOLD:
-        notes += (_note(journey, gap, left),)
-    elif journey.drift.note and error > told:  # a wrong speed, which both runs have alike
+        notes += (_note(journey, gap, left, kind),)
+    elif journey.drift.note and error > told:  # a wrong speed, which both runs have alike; or nobody knows better
         notes += (journey.drift.note,)
+    if early:
+        notes += (_EARLY.format(kind=kind, t=coarse.final.t),)
     known = replace(report, error=error, output_errors=outputs.shares, notes=notes + outputs.notes)
     return replace(run, report=known)
 
@@ -224,7 +246,7 @@ def _sources(model: Model) -> np.ndarray:
     return np.unique(model.motion.sources[model.motion.sources < model.n])
 
 
-def _note(journey: Journey, gap: _Gap, left: float) -> str:
+def _note(journey: Journey, gap: _Gap, left: float, kind: str) -> str:
     """What is to be said: how far off, until when all is well, and what would leave little."""
     plan = journey.plan
     error, pace = float(gap.size[-1]) / left, plan.method.pace
@@ -232,7 +254,7 @@ def _note(journey: Journey, gap: _Gap, left: float) -> str:
     far = f"{100.0 * error:.2g} % of the motion" if error < _ALL else "all of the motion"
     parted = gap.size[-1] > _PARTED
     is_off = f"may be off by {far}, as {_GROWN}" if parted else f"is off by {far}"
-    said = f"by a coarser run, {gap.where} {is_off}"
+    said = f"by a {kind} run, {gap.where} {is_off}"
     finer = (_AIM / error) ** (1.0 / plan.method.order)
     if isinstance(pace, Controlled):
         less, asked = finer**pace.steepness, plan.tolerance

@@ -21,7 +21,7 @@ __all__ = ["OutputErrors", "by_rows", "by_sums", "placed", "reach", "seen"]
 _TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
 _NAMED = 3
 _BY_SUMS = "{name} has moved by {way:.2g}, and errors of {steps} steps may have added up to {far} of that: {remedy}"
-_BY_COARSER = "by a coarser run, {name} is off by {far} of its motion, which is {way:.2g}: {remedy}"
+_BESIDE_IT = "by a {kind} run, {name} is off by {far} of its motion, which is {way:.2g}: {remedy}"
 _PLACES = (Position, SwayAngle, Rotation, DriveAngle)
 
 
@@ -68,8 +68,8 @@ def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:
     return OutputErrors(shares, _notes(journey, y, shares, journey.drift.share, _BY_SUMS))
 
 
-def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float) -> OutputErrors:
-    """Return how far each output is off by a coarser run, or by sums of local errors where these tell more.
+def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float, kind: str) -> OutputErrors:
+    """Return how far each output is off by another run, or by sums of local errors where these tell more.
 
     A vibration that neither run resolves is missing in both.
 
@@ -79,9 +79,11 @@ def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float) -> O
         At its end, with its drift and what that tells of outputs.
     y : numpy.ndarray, shape (rows, outputs)
     off : numpy.ndarray, shape (outputs,)
-        What a coarser run has each output off by.
+        What another run has each output off by.
     error : float
         How far the machine is off.
+    kind : str
+        What the other run is: coarser, or finer.
 
     Returns
     -------
@@ -94,7 +96,9 @@ def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float) -> O
     beside = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in judged}
     more = {name: share for name, share in beside.items() if share > summed[name]}
     less = {name: share for name, share in summed.items() if name not in more}
-    notes = _notes(journey, y, more, error, _BY_COARSER) + _notes(journey, y, less, error, _BY_SUMS)
+    notes = _notes(journey, y, more, error, _BESIDE_IT.replace("{kind}", kind)) + _notes(
+        journey, y, less, error, _BY_SUMS
+    )
     return OutputErrors({**summed, **more}, notes)
 
 

@@ -20,6 +20,7 @@ from flexctrl.errors import (
 from flexctrl.model.balance import Balance
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
+from flexctrl.model.overturned import overturned
 from flexctrl.model.paths.course import Course, Direction, Station
 from flexctrl.model.paths.critical import across, softest
 from flexctrl.model.paths.walk import PathEnd, Walk
@@ -150,9 +151,11 @@ class EquilibriumPath:
     def __str__(self) -> str:
         limits = ", ".join(f"{p.factor:.6g}" for p in self.limits) or "none"
         crossings = ", ".join(f"{p.factor:.6g}" for p in self.branchings) or "none"
+        last = self.points[-1].rest
+        turned = overturned(last.model, last.state) if self.end is PathEnd.STUCK else ""
         return (
             f"{len(self.points)} equilibria, λ = {self.points[0].factor:.6g} … {self.points[-1].factor:.6g} "
-            f"({self.end.value}); limit points at λ = {limits}; branch points at λ = {crossings}"
+            f"({turned or self.end.value}); limit points at λ = {limits}; branch points at λ = {crossings}"
         )
 
 
