@@ -30,8 +30,8 @@ are told; where there are seconds, they are those of a host with other work to d
 Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9, `EigenSparse`,
 modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its quickest element here
 (no torsion; its beams with torsion take several times as long). Building the model is left out
-for both, everything that `simulate` and `SolveDynamic` do is in, but for the coarser runs that tell how far ours are off
-(`Unchecked`). These are made where much moves far, as in the full swing after a second, and take half the time of a run,
+for both, everything that `simulate` and `SolveDynamic` do is in, but for the coarser runs that tell how far ours are
+off (`Unchecked`). These are made where much moves far, as in the full swing after a second, and take half the time of a run,
 or 1.2 times where there is something to be told.
 """
 _CRANE = """\
