@@ -31,8 +31,8 @@ Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectr
 modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its quickest element here
 (no torsion; its beams with torsion take several times as long). Building the model is left out
 for both, everything that `simulate` and `SolveDynamic` do is in, but for the coarser runs that tell how far ours are
-off (`Unchecked`). These are made where much moves far, as in the full swing after a second, and take half the time of a run,
-or 1.2 times where there is something to be told.
+off (`Unchecked`). These are made where much moves far, as in the full swing after a second, and take half the time of a
+run, or 1.2 times where there is something to be told.
 """
 _CRANE = """\
 ## The paper's crane, 50 ms
