@@ -133,7 +133,10 @@ def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> t
     if len(run.u) and len(other.u) and run.t[0] == other.t[0] and not np.array_equal(run.u[0], other.u[0]):
         return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), end
     until = end if other.status is Status.STOPPED else other.final.t
-    return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps), until
+    try:
+        return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps), until
+    except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
+        return _noted(run, f"{_UNCHECKED}, whose numbers fail ({fault})"), 0.0
 
 
 def _noted(run: Run, note: str) -> Run:

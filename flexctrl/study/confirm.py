@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.alpha.method import GeneralizedAlpha
+from flexctrl.dynamics.methods.checked import Unchecked
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.errors import StructureError
@@ -177,7 +178,7 @@ def _grown(certificate: Spillover, model: Model, at: State, gain: float, steps: 
         until=round(periods) * period,
         start=start,
         inputs=dict(zip(model.inputs, certificate.inputs.tolist(), strict=True)),
-        method=GeneralizedAlpha(period / steps, rho=1.0),
+        method=Unchecked(GeneralizedAlpha(period / steps, rho=1.0)),
         every=period / _POINTS,
     )
     if run.status is not Status.FINISHED:

@@ -10,6 +10,7 @@ import scipy.linalg as la
 from scipy.interpolate import CubicSpline
 
 from flexctrl.dynamics.alpha.method import GeneralizedAlpha
+from flexctrl.dynamics.methods.checked import Unchecked
 from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.dynamics.steps import Integrator
@@ -283,7 +284,7 @@ def _run(
         until=until,
         start=case.model.advance(case.rest, step, v, 0.0),
         inputs=dict(zip(case.model.inputs, (case.inputs + u).tolist(), strict=True)),
-        method=method or GeneralizedAlpha(until / (2 * _POINTS)),
+        method=method or Unchecked(GeneralizedAlpha(until / (2 * _POINTS))),
         every=until / _POINTS,
     )
     if run.status is not Status.FINISHED:

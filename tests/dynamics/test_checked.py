@@ -11,6 +11,7 @@ import flexctrl as fc
 from flexctrl.design import pd
 from flexctrl.dynamics import checking
 from flexctrl.dynamics import simulate as running
+from flexctrl.errors import SingularMatrixError
 
 GROW = "small differences grow"
 BESIDE = "by a coarser run"
@@ -311,6 +312,19 @@ def test_a_coarser_run_that_ends_early_is_told():
     assert run.status is fc.Status.FINISHED
     assert any("run beside it ended at t = 0.55 s" in note for note in run.report.notes)
     assert run.report.error >= run.report.drift
+
+
+def test_another_run_whose_numbers_fail_is_told(monkeypatch):
+    """It raised where a coarse explicit run had no masses any more."""
+
+    def fails(*given):
+        raise SingularMatrixError(0)
+
+    monkeypatch.setattr(checking, "told_beside", fails)
+    model, start = chain(2, 8.0, 1)
+    run = fc.simulate(model, until=2.0, start=start)
+    assert run.status is fc.Status.FINISHED
+    assert any("by another run, whose numbers fail" in note for note in run.report.notes)
 
 
 @pytest.mark.parametrize(("law", "why"), [(Uncopied, "cannot be copied"), (Elsewhere, "keep memory in x")])

@@ -14,7 +14,7 @@ import flexctrl as fc
 
 PAGE = "dynamics"
 SOURCE = "equations of motion by DOP853, 1e-13"
-EXPLICIT, TIGHT = fc.ExplicitRungeKutta(), fc.Tolerance(1e-10, 1e-10)
+EXPLICIT, TIGHT = fc.Unchecked(fc.ExplicitRungeKutta()), fc.Tolerance(1e-10, 1e-10)
 RESONANCE = {10: (0.1108781327, -1.0375867561), 20: (0.0541440255, -0.9285313402), 50: (-0.0362655572, -1.0656328355)}
 STIFF = {1: (-0.9862907428, -0.1650463117), 5: (0.9423839197, -0.3345627589)}
 

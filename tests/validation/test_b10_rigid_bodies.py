@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 import flexctrl as fc
 
 PAGE = "dynamics"
-EXPLICIT, TIGHT = fc.ExplicitRungeKutta(), fc.Tolerance(0.0, 1e-11)
+EXPLICIT, TIGHT = fc.Unchecked(fc.ExplicitRungeKutta()), fc.Tolerance(0.0, 1e-11)
 TOP = {
     0.2: (0.6055505614, 0.5989576818, -0.5239830274),
     2.0: (-0.1504168227, -0.7241655916, -0.6730222696),

@@ -65,7 +65,9 @@ def start(model: fc.Model) -> fc.State:
 @cache
 def run() -> fc.Run:
     model = machine()
-    return fc.simulate(model, start=start(model), until=UNTIL, method=fc.GeneralizedAlpha(1e-5, 0.9), every=MEAN)
+    return fc.simulate(
+        model, start=start(model), until=UNTIL, method=fc.Unchecked(fc.GeneralizedAlpha(1e-5, 0.9)), every=MEAN
+    )
 
 
 def shape() -> tuple[float, float, np.ndarray]:

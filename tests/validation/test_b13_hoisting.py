@@ -42,7 +42,7 @@ def hoisted(length: float, speed: float, angle: float, until: float, tolerance: 
         until=until,
         start=start,
         inputs=balance,
-        method=fc.ExplicitRungeKutta(),
+        method=fc.Unchecked(fc.ExplicitRungeKutta()),
         tolerance=fc.Tolerance(tolerance, tolerance),
     )
 

@@ -39,7 +39,8 @@ def test_lugre_sticks_and_slips(record):
     law = fc.LuGre(1e5, kinetic=1.0, static=1.5, stribeck=1e-3, damping=np.sqrt(1e5), viscous=0.4)
     model = oscillator(2.0, fc.LuGreFriction({"block.u": law}))
     pull = fc.OpenLoop({"pull": PiecewisePolynomial((0.0,), ((0.0, 0.2),))})
-    run = fc.simulate(model, pull, until=25.0, tolerance=fc.Tolerance(2e-9, 2e-12), every=2e-3)
+    how = {"until": 25.0, "tolerance": fc.Tolerance(2e-9, 2e-12), "every": 2e-3}
+    run = fc.simulate(model, pull, method=fc.Unchecked(fc.AdaptiveAlpha()), **how)
     source = "EXUDYN Examples/lugreFrictionTest.py; high-order integration"
     record(
         "B18 LuGre, place at 10, 20, 25 s [m]",
@@ -77,7 +78,7 @@ def test_coulomb_friction_stops_an_oscillator(start, record):
         model,
         until=0.1 * np.pi * halves + 1.0,
         start=drawn,
-        method=fc.ExplicitRungeKutta(),
+        method=fc.Unchecked(fc.ExplicitRungeKutta()),
         tolerance=fc.Tolerance(1e-9, 1e-9),
     )
     record(
@@ -111,7 +112,7 @@ def test_period_with_backlash(record):
         model,
         until=5.0,
         start=model.displace(np.array([0.05])),
-        method=fc.ExplicitRungeKutta(),
+        method=fc.Unchecked(fc.ExplicitRungeKutta()),
         tolerance=fc.Tolerance(1e-9, 1e-9),
         events=[fc.Event("turning", "v", direction=fc.Direction.FALLING)],
     )
