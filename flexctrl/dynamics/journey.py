@@ -48,7 +48,7 @@ from flexctrl.dynamics.steps import (
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
 from flexctrl.model.model import Model
-from flexctrl.model.overturned import overturned
+from flexctrl.model.overturned import overturned, twirled
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
@@ -158,6 +158,7 @@ class Journey:
         self._judge()
         if self.status in (Status.FINISHED, Status.STOPPED):
             self._look_for_growth(began)
+            self._look_for_twirls(began.state)
 
     @cached_property
     def judging(self) -> Judging[Any] | None:
@@ -228,6 +229,12 @@ class Journey:
             self.status, self.message = Status.FAILED, str(found)
         elif found is not None:
             self.notes += (str(found),)
+
+    def _look_for_twirls(self, began: State) -> None:
+        """Tell of elements that may have passed half a turn within a step: they turn fast at either end of the run."""
+        model, size = self.plan.model, (self.point.state.t - began.t) / max(self.mark.steps, 1)
+        if isinstance(model, Model) and (turning := twirled(model, (began, self.point.state), size)):
+            self.notes += (turning,)
 
     @property
     def tick(self) -> float:

@@ -14,7 +14,7 @@ from flexctrl.errors import EquilibriumError, StructureError, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
-from flexctrl.model.overturned import overturned
+from flexctrl.model.overturned import displaced_beyond, overturned
 from flexctrl.model.search import SMALLEST_PART, Found, Newton, follow
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite, check_number
@@ -190,7 +190,10 @@ def rest_of(balance: Balance, found: Found) -> Rest:
     outputs = dict(zip(model.outputs, model.measure(found.state).tolist(), strict=True))
     held = tuple(model.coordinates[i] for i in balance.held)
     residual = min(found.residual, balance.beyond_noise(found.state))
-    if apart := model.apart(found.state):
+    beyond = displaced_beyond(model, found.state.q) if balance.held else ""
+    if not (beyond or np.isfinite(model.energy(found.state)).all()):
+        beyond = overturned(model, found.state)
+    if apart := beyond or model.apart(found.state):
         raise EquilibriumError(f"no equilibrium found: {apart}", found.state, residual)
     return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held)
 

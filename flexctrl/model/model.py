@@ -27,7 +27,7 @@ from flexctrl.model.laws.switches import Switches
 from flexctrl.model.laws.wind_kinds import wind_families
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import Motion
-from flexctrl.model.overturned import overturned
+from flexctrl.model.overturned import displaced_beyond, overturned
 from flexctrl.model.signals import Signals, signals_of
 from flexctrl.model.small_signals import small_signals
 from flexctrl.model.state import State
@@ -476,8 +476,9 @@ class Model:
         else:
             raise StructureError(f"displace: expected {self.n} finite numbers, one a coordinate, got {q!r}")
         state = self.advance(self.rest, step, np.zeros(self.n), 0.0)
-        if not np.isfinite(self.energy(state)).all():
-            why = overturned(self, state) or "an element has no length left: its forces are not defined there"
+        beyond = displaced_beyond(self, step)
+        if beyond or not np.isfinite(self.energy(state)).all():
+            why = beyond or overturned(self, state) or "an element has no length left: its forces are not defined there"
             raise StructureError(f"displace: {why}. Or displace it a little less")
         return state
 

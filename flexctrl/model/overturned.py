@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +13,12 @@ if TYPE_CHECKING:
     from flexctrl.model.model import Model
     from flexctrl.model.state import State
 
-__all__ = ["overturned"]
+__all__ = ["displaced_beyond", "overturned", "twirled"]
 
 _FAR, _MOST = 2.2, 2.74
+_LEAP, _ALIKE = 0.75, 1e-9
+"""What is between 2.74 rad and as much on the other side of half a turn is 0.8 rad wide."""
+_MORE = "give {} more elements"
 
 
 def overturned(model: Model, state: State) -> str:
@@ -33,18 +37,90 @@ def overturned(model: Model, state: State) -> str:
     str
         By how much, and what helps; empty if none is.
     """
-    beams = {part.name for part in model.structure.elements if isinstance(part, Beam)}
     worst, said = _FAR, ""
-    for family in model.forces.families if model.large else ():
-        if family.nodes.shape[1] != 2 or not beams.issuperset(family.parts):
-            continue
-        turns = np.einsum("eij,eij->e", state.R[family.nodes[:, 0]], state.R[family.nodes[:, 1]])
-        angles = np.arccos(np.clip(0.5 * (turns - 1.0), -1.0, 1.0))
+    for parts, ends in _beams(model):
+        first, second = state.R[ends[:, 0]], state.R[ends[:, 1]]
+        angles = np.arccos(np.clip(0.5 * (np.einsum("eij,eij->e", first, second) - 1.0), -1.0, 1.0))
         i = int(np.argmax(angles))
         if angles[i] > worst:
-            worst, part = float(angles[i]), family.parts[i]
-            which = family.parts[: i + 1].count(part)
+            worst = float(angles[i])
             far = f"{'beyond' if worst > _MOST else 'near'} the {_MOST:g} that one can be"
-            turned = f"element {which} of {part} is turned by {worst:.2f} rad from end to end"
-            said = f"{turned}, {far}: give {part} more elements"
+            said = f"{_named(parts, i)} is turned by {worst:.2f} rad from end to end, {far}: {_MORE.format(parts[i])}"
     return said
+
+
+def displaced_beyond(model: Model, q: np.ndarray) -> str:
+    """Say which element displacements turn by more than one can be, though what is left of whole turns looks like less.
+
+    Where both ends turn about one axis: there alone displacements are angles.
+
+    Parameters
+    ----------
+    model : Model
+    q : numpy.ndarray, shape (n,)
+        From the drawn shape.
+
+    Returns
+    -------
+    str
+        Empty if there is none.
+    """
+    if not model.large:
+        return ""
+    turns = _turns(model, model.motion.jacobian(model.rest) @ q)
+    for parts, ends in _beams(model):
+        first, second = turns[ends[:, 0]], turns[ends[:, 1]]
+        far = np.linalg.norm(second - first, axis=1)
+        alike = np.linalg.norm(np.cross(first, second), axis=1) <= _ALIKE * far * far
+        beyond = np.flatnonzero(alike & (far > _MOST))
+        if beyond.size:
+            i = int(beyond[0])
+            turned = f"{_named(parts, i)} is turned by {far[i]:.2f} rad from end to end"
+            return f"{turned}, beyond the {_MOST:g} that one can be: {_MORE.format(parts[i])}"
+    return ""
+
+
+def twirled(model: Model, states: Sequence[State], step: float) -> str:
+    """Say which element turns so fast, from end to end, that a step may pass half a turn unseen.
+
+    Parameters
+    ----------
+    model : Model
+    states : sequence of State
+    step : float
+        Length of a step [s].
+
+    Returns
+    -------
+    str
+        Empty if none does.
+    """
+    worst, said = _LEAP, ""
+    for state in states if model.large else ():
+        spins = _turns(model, model.rates(state))
+        for parts, ends in _beams(model):
+            leaps = step * np.linalg.norm(spins[ends[:, 1]] - spins[ends[:, 0]], axis=1)
+            i = int(np.argmax(leaps))
+            if leaps[i] > worst:
+                worst = float(leaps[i])
+                turned = f"{_named(parts, i)} turns by {worst:.2g} rad a step from end to end"
+                said = f"{turned}, and may pass half a turn unseen: take shorter steps, or {_MORE.format(parts[i])}"
+    return said
+
+
+def _turns(model: Model, raw: np.ndarray) -> np.ndarray:
+    """What turns of raw displacements or rates, one row a node and none of the ground's, which is last."""
+    nodes = len(model.structure.nodes)
+    return np.vstack([raw[: 6 * nodes].reshape(nodes, 6)[:, 3:], np.zeros(3)])
+
+
+def _beams(model: Model) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
+    """Names of beams that bend, one for each element, and the numbers of its nodes, shape (elements, 2)."""
+    beams = {part.name for part in model.structure.elements if isinstance(part, Beam)}
+    for family in model.forces.families if model.large else ():
+        if family.nodes.shape[1] == 2 and beams.issuperset(family.parts):
+            yield family.parts, family.nodes
+
+
+def _named(parts: Sequence[str], i: int) -> str:
+    return f"element {parts[: i + 1].count(parts[i])} of {parts[i]}"

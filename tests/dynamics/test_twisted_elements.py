@@ -68,3 +68,51 @@ def test_so_do_ends_that_are_bent(axis):
     path = fc.equilibrium_path(model, load={"M": WIRE.EI_y}, until=20.0)
     assert "element 1 of strip is turned by 2.7" in str(path)
     assert 2.7 < path.factor[-1] < 2.75
+
+
+def twirling(elements: int) -> fc.Model:
+    """A wire whose end turns about its axis alone."""
+    section = fc.Section(EA=1e6, EI_y=2e4, EI_z=2e4, GJ=1.0, rhoA=1e-3, rhoJ=1e-6)
+    wire = fc.Beam("wire", (0, 0, 0), (1, 0, 0), section, elements=elements)
+    disk = fc.RigidBody("disk", (1, 0, 0), 1.0, (1.0,) * 3)
+    joints = [fc.Support(wire.start), fc.Weld(wire.end, disk.node)]
+    joints += [fc.Support(node, held="u v w ry rz") for node in wire.nodes[1:]]
+    outputs = [fc.AngularVelocity("w", disk.node, "x")]
+    return fc.assemble(fc.Structure([wire, disk], joints, outputs=outputs), [fc.Flexible(), fc.LargeRotation()])
+
+
+@pytest.mark.parametrize(
+    ("elements", "speed", "how"),
+    [
+        (1, 202.5121, {}),
+        (1, 52.6795, {"tolerance": fc.Tolerance(1e-3, 1e-6)}),
+        (2, 1109.7098, {"tolerance": fc.Tolerance(1e-3, 1e-6)}),
+        (1, 314.2017, {"method": fc.GeneralizedAlpha(0.02)}),
+        (4, 8.0 * np.pi / 0.02, {"method": fc.GeneralizedAlpha(0.02)}),
+    ],
+)
+def test_what_passes_half_a_turn_in_a_step_is_told(elements, speed, how):
+    """12 % off, at a hundred radians an element, and twice the speed where steps are whole turns: without a word."""
+    model = twirling(elements)
+    start = model.rest.with_(v=speed * np.arange(1, elements + 1) / elements)
+    run = fc.simulate(model, until=0.5, start=start, **how)
+    assert run.status is fc.Status.FAILED or any("may pass half a turn unseen" in note for note in run.report.notes)
+
+
+def test_many_elements_go_there_without_a_word():
+    model = twirling(32)
+    run = fc.simulate(model, until=1.0, start=model.rest.with_(v=20.0 * np.arange(1, 33) / 32))
+    assert run.status is fc.Status.FINISHED
+    assert not any("turns by" in note for note in run.report.notes)
+    assert np.abs(run["w"] - 20.0 * np.cos(run.t)).max() < 0.2
+
+
+@pytest.mark.parametrize("angle", [2.9, 4.0, 2.0 * np.pi, 7.0, -4.0])
+def test_displacements_beyond_half_a_turn_are_refused_at_any_angle(angle):
+    """4 rad were felt as −2.28."""
+    with pytest.raises(fc.errors.StructureError, match="element 1 of wire is turned by"):
+        twirling(1).displace({"wire_1_rx": angle})
+    with pytest.raises(fc.errors.FlexctrlError, match="element 1 of wire is turned by"):
+        fc.equilibrium(twirling(1), hold={"wire_1_rx": angle})
+    fine = twirling(4).displace({f"wire_{i}_rx": angle * i / 4.0 for i in range(1, 5)})
+    assert twirling(4).energy(fine)[1] == pytest.approx(0.5 * angle**2, rel=1e-9)
