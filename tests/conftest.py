@@ -80,6 +80,12 @@ LONG = (
     "test_random_structures.py::test_steps_end_where_a_damped_gap_closes[21]",
     "test_law_states.py::test_anti_windup_slides_along_its_limit[backend5-how5-0.001-gains1]",
     "test_massless_drives.py::test_under_a_continuous_controller_it_moves_as_its_forces_say[GeneralizedAlpha-friction]",
+    "test_resumed_at_switches.py::test_so_do_other_methods_under_a_sampled_controller[extrapolated]",
+    "test_sliding_laws.py::test_a_sliding_mode_slides_as_filippov_says[method1-0.004-500]",
+    "test_angles.py::test_angles_are_integrals_of_spins[tumbler-ConservingMidpoint]",
+    "test_friction_in_any_units.py::test_a_block_slips_alike_in_any_units_of_mass[alpha-even]",
+    "test_friction_in_any_units.py::test_a_block_slips_alike_in_any_units[0.0-adaptive alpha]",
+    "test_checked.py::test_steps_of_one_length_are_checked_too[ConservingMidpoint]",
 )
 """Cases whose neighbours hold the same: run with -m long."""
 
