@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import time
 from dataclasses import dataclass, replace
 
@@ -100,23 +101,27 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     -------
     Run
     """
-    if beginning.again is None:
-        return _noted(run, f"{_UNCHECKED}: the controller cannot be copied")
     tolerance = journey.plan.tolerance
     if kept_short(journey):
         return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time), beginning)[0]
-    told, until = _told(run, journey, method.coarser(tolerance), beginning)
-    if told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes):
+    told, other = _told(run, journey, method.coarser(tolerance), beginning)
+    quiet = told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes)
+    if quiet or other is None or other.status is Status.INTERRUPTED:
         return told
-    nearer, later = _told(run, journey, method.coarser(tolerance, _NEARER), beginning)
-    return told if nearer is run or later < until else nearer
+    nearer, second = _told(run, journey, method.coarser(tolerance, _NEARER), beginning)
+    return told if second is None or _reached(second) < _reached(other) else nearer
 
 
-def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, float]:
-    """The run with what one other tells, and until when; that is ended where it takes far longer."""
+def _reached(other: Run) -> float:
+    """Until when a run tells of another; one that an end of the machine's own stops is not early."""
+    return math.inf if other.status is Status.STOPPED else other.final.t
+
+
+def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Run | None]:
+    """The run with what one other tells, and that one, ended where it takes far longer; None if there is none."""
     plan, end, feed = journey.plan, run.final.t, beginning.again
     if feed is None:
-        return run, 0.0
+        return _noted(run, f"{_UNCHECKED}: the controller cannot be copied"), None
     latest = time.perf_counter() + _LONGER / min(beside.longer, 1.0) * run.report.wall_s + _SECONDS
 
     def ended(share: float) -> None:
@@ -129,14 +134,13 @@ def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> t
         unwatched = replace(changed, until=end, tell=ended, autosave=None)
         _, other = travelled(unwatched, beginning.start, (), InMemory(), spacing)
     except (FlexctrlError, KeyboardInterrupt) as fault:
-        return _noted(run, f"{_UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), 0.0
+        return _noted(run, f"{_UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), None
     if len(run.u) and len(other.u) and run.t[0] == other.t[0] and not np.array_equal(run.u[0], other.u[0]):
-        return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), end
-    until = end if other.status is Status.STOPPED else other.final.t
+        return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
     try:
-        return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps), until
+        return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps), other
     except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
-        return _noted(run, f"{_UNCHECKED}, whose numbers fail ({fault})"), 0.0
+        return _noted(run, f"{_UNCHECKED}, whose numbers fail ({fault})"), None
 
 
 def _noted(run: Run, note: str) -> Run:

@@ -232,7 +232,7 @@ class Journey:
 
     def _look_for_twirls(self, began: State) -> None:
         """Tell of elements that may have passed half a turn within a step: they turn fast at either end of the run."""
-        model, size = self.plan.model, (self.point.state.t - began.t) / max(self.mark.steps, 1)
+        model, size = self.plan.model, self.point.state.t / max(self.mark.steps, 1)
         if isinstance(model, Model) and (turning := twirled(model, (began, self.point.state), size)):
             self.notes += (turning,)
 

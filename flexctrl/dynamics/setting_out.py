@@ -168,10 +168,8 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span
     books = Books(plan.feed, start.point.state, plan.method, plan.tolerance)
     books.sums, books.first = replace(start.sums), start.first
-    stops = Stops(plan.feed.sample_time, plan.feed.breaks, start.passed, start.found)
-    plan.feed.met[:] = [start.found]
     rows.count = start.rows
-    journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, replace(start.mark))
+    journey = Journey(plan, stepper, start.point, _stops(plan, start), books, watch, rows, track, replace(start.mark))
     journey.told, journey.balked = start.told, start.balked
     return journey
 
@@ -181,8 +179,6 @@ def _anew(plan: Plan, stepper: Stepper[Any], saved: Checkpoint, watch: Watch, ro
     if saved.passed == UNASKED:
         return _begun(plan, stepper, saved.point.state, watch, rows, track)
     pace = plan.method.pace
-    stops = Stops(plan.feed.sample_time, plan.feed.breaks, saved.passed, saved.found)
-    plan.feed.met[:] = [saved.found]
     size = pace.step if isinstance(pace, Fixed) else min(saved.mark.size, pace.largest)
     point = stepper.start(saved.point.state, saved.point.supply, size)
     watch.begin(point)
@@ -190,4 +186,10 @@ def _anew(plan: Plan, stepper: Stepper[Any], saved: Checkpoint, watch: Watch, ro
     books.turn(point, size)
     books.sums.moved, books.first = saved.sums.moved.copy(), saved.first  # what errors are relative to
     rows.count = saved.rows
-    return Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size))
+    return Journey(plan, stepper, point, _stops(plan, saved), books, watch, rows, track, Mark(size))
+
+
+def _stops(plan: Plan, saved: Checkpoint) -> Stops:
+    """What is ahead of a run that goes on."""
+    plan.feed.met[:] = [saved.found]
+    return Stops(plan.feed.sample_time, plan.feed.breaks, saved.passed, saved.found)

@@ -44,8 +44,7 @@ def overturned(model: Model, state: State) -> str:
         i = int(np.argmax(angles))
         if angles[i] > worst:
             worst = float(angles[i])
-            far = f"{'beyond' if worst > _MOST else 'near'} the {_MOST:g} that one can be"
-            said = f"{_named(parts, i)} is turned by {worst:.2f} rad from end to end, {far}: {_MORE.format(parts[i])}"
+            said = _turned(parts, i, worst)
     return said
 
 
@@ -74,9 +73,7 @@ def displaced_beyond(model: Model, q: np.ndarray) -> str:
         alike = np.linalg.norm(np.cross(first, second), axis=1) <= _ALIKE * far * far
         beyond = np.flatnonzero(alike & (far > _MOST))
         if beyond.size:
-            i = int(beyond[0])
-            turned = f"{_named(parts, i)} is turned by {far[i]:.2f} rad from end to end"
-            return f"{turned}, beyond the {_MOST:g} that one can be: {_MORE.format(parts[i])}"
+            return _turned(parts, int(beyond[0]), float(far[beyond[0]]))
     return ""
 
 
@@ -95,10 +92,10 @@ def twirled(model: Model, states: Sequence[State], step: float) -> str:
     str
         Empty if none does.
     """
-    worst, said = _LEAP, ""
-    for state in states if model.large else ():
+    worst, said, beams = _LEAP, "", list(_beams(model))
+    for state in states if beams else ():
         spins = _turns(model, model.rates(state))
-        for parts, ends in _beams(model):
+        for parts, ends in beams:
             leaps = step * np.linalg.norm(spins[ends[:, 1]] - spins[ends[:, 0]], axis=1)
             i = int(np.argmax(leaps))
             if leaps[i] > worst:
@@ -120,6 +117,11 @@ def _beams(model: Model) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
     for family in model.forces.families if model.large else ():
         if family.nodes.shape[1] == 2 and beams.issuperset(family.parts):
             yield family.parts, family.nodes
+
+
+def _turned(parts: Sequence[str], i: int, angle: float) -> str:
+    far = f"{'beyond' if angle > _MOST else 'near'} the {_MOST:g} that one can be"
+    return f"{_named(parts, i)} is turned by {angle:.2f} rad from end to end, {far}: {_MORE.format(parts[i])}"
 
 
 def _named(parts: Sequence[str], i: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -325,6 +326,21 @@ def test_another_run_whose_numbers_fail_is_told(monkeypatch):
     run = fc.simulate(model, until=2.0, start=start)
     assert run.status is fc.Status.FINISHED
     assert any("by another run, whose numbers fail" in note for note in run.report.notes)
+
+
+def test_who_ends_the_run_beside_waits_for_no_second(monkeypatch):
+    model, start = chain(3, 8.0, 2)
+    travelled, calls = checking.travelled, []
+
+    def ended(*given):
+        journey, run = travelled(*given)
+        calls.append(run)
+        return journey, replace(run, status=fc.Status.INTERRUPTED)
+
+    monkeypatch.setattr(checking, "travelled", ended)
+    run = fc.simulate(model, until=3.0, start=start)
+    assert len(calls) == 1
+    assert any("the coarser run beside it ended at t = 3 s" in note for note in run.report.notes)
 
 
 @pytest.mark.parametrize(("law", "why"), [(Uncopied, "cannot be copied"), (Elsewhere, "keep memory in x")])

@@ -99,6 +99,14 @@ def test_what_passes_half_a_turn_in_a_step_is_told(elements, speed, how):
     assert run.status is fc.Status.FAILED or any("may pass half a turn unseen" in note for note in run.report.notes)
 
 
+def test_it_is_told_of_a_run_that_goes_on_too():
+    model, how = twirling(1), {"method": fc.GeneralizedAlpha(0.02)}
+    half = fc.simulate(model, until=0.4, start=model.rest.with_(v=np.array([314.2017])), **how)
+    rest = fc.simulate(model, until=0.5, start=half.checkpoint, **how)
+    for run in (half, rest):
+        assert any("turns by 6.3 rad a step" in note for note in run.report.notes)
+
+
 def test_many_elements_go_there_without_a_word():
     model = twirling(32)
     run = fc.simulate(model, until=1.0, start=model.rest.with_(v=20.0 * np.arange(1, 33) / 32))
