@@ -14,10 +14,10 @@ from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
-from flexctrl.dynamics.notes.beside import kept_short, told_beside
+from flexctrl.dynamics.notes.beside import PARTED, kept_short, told_beside
 from flexctrl.dynamics.records.record import InMemory
 from flexctrl.dynamics.run import Run, Status
-from flexctrl.dynamics.setting_out import Anew, travelled
+from flexctrl.dynamics.setting_out import travelled
 from flexctrl.errors import FlexctrlError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
@@ -35,19 +35,16 @@ class Beginning:
 
     Attributes
     ----------
-    start : State, Rest, Anew or None
+    start : State, Rest, Checkpoint or None
     spacing : float or None
         Of rows [s].
-    steps : int
-        Taken before.
     feed : Feed
     spare : Controller or None
         As it was before the run, as a law in Python may remember what it is asked; None where it cannot be copied.
     """
 
-    start: State | Rest | Anew | None
+    start: State | Rest | Checkpoint | None
     spacing: float | None
-    steps: int
     feed: Feed
     spare: Controller | None
 
@@ -65,10 +62,7 @@ class Beginning:
         -------
         Beginning
         """
-        spare = None if feed.continuous else _copied(feed.controller)
-        if isinstance(start, Checkpoint):
-            return Beginning(Anew(start), spacing, start.mark.steps, feed, spare)
-        return Beginning(start, spacing, 0, feed, spare)
+        return Beginning(start, spacing, feed, None if feed.continuous else _copied(feed.controller))
 
     @property
     def again(self) -> Feed | None:
@@ -77,6 +71,32 @@ class Beginning:
             return replace(self.feed, met=[])
         law = _copied(self.spare)
         return None if law is None else replace(self.feed, controller=law, met=[])
+
+    def beside(self, other: Beside) -> State | Rest | Checkpoint | None:
+        """Return where another run is to begin: where it stood when the run was cut, or where the whole began."""
+        if not isinstance(self.start, Checkpoint):
+            return self.start
+        stood = (saved for saved in self.start.origin.others if _of(saved, other))
+        return next(stood, self.start.origin.state)
+
+    @property
+    def t(self) -> float:
+        """When the run goes on [s]."""
+        return _time(self.start)
+
+    @property
+    def steps(self) -> int:
+        """Taken before."""
+        return self.start.mark.steps if isinstance(self.start, Checkpoint) else 0
+
+
+def _time(start: State | Rest | Checkpoint | None) -> float:
+    return start.t if isinstance(start, Checkpoint) else 0.0
+
+
+def _of(saved: Checkpoint, other: Beside) -> bool:
+    """Whether it is such a run that stands there."""
+    return saved.method == repr(other.method) and saved.tolerance == other.tolerance
 
 
 def _copied(law: Controller | None) -> Controller | None:
@@ -104,12 +124,18 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     tolerance = journey.plan.tolerance
     if kept_short(journey):
         return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time), beginning)[0]
-    told, other = _told(run, journey, method.coarser(tolerance), beginning)
+    coarser, order = method.coarser(tolerance), run.report.order
+    told, other = _told(run, journey, coarser, beginning)
     quiet = told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes)
     if quiet or other is None or other.status is Status.INTERRUPTED:
         return told
-    nearer, second = _told(run, journey, method.coarser(tolerance, _NEARER), beginning)
-    return told if second is None or _reached(second) < _reached(other) else nearer
+    run = replace(run, checkpoint=told.checkpoint)
+    parted = told.report.error > PARTED
+    feared = told.report.error / (coarser.longer**order - 1.0) if parted else 0.0
+    nearer, second = _told(run, journey, method.coarser(tolerance, _NEARER), beginning, feared)
+    if second is None or _reached(second) < _reached(other):
+        return replace(told, checkpoint=nearer.checkpoint)
+    return nearer
 
 
 def _reached(other: Run) -> float:
@@ -117,30 +143,46 @@ def _reached(other: Run) -> float:
     return math.inf if other.status is Status.STOPPED else other.final.t
 
 
-def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Run | None]:
+def _told(
+    run: Run, journey: Journey, beside: Beside, beginning: Beginning, feared: float = 0.0
+) -> tuple[Run, Run | None]:
     """The run with what one other tells, and that one, ended where it takes far longer; None if there is none."""
-    plan, end, feed = journey.plan, run.final.t, beginning.again
+    end, feed, start = run.final.t, beginning.again, beginning.beside(beside)
     if feed is None:
         return _noted(run, f"{_UNCHECKED}: the controller cannot be copied"), None
-    latest = time.perf_counter() + _LONGER / min(beside.longer, 1.0) * run.report.wall_s + _SECONDS
+    changed = replace(journey.plan, feed=feed, method=beside.method, tolerance=beside.tolerance)
+    work = (end - _time(start)) / (end - beginning.t) / min(beside.longer, 1.0)
+    latest = time.perf_counter() + _LONGER * work * run.report.wall_s + _SECONDS
 
     def ended(share: float) -> None:
         if time.perf_counter() > latest:
             raise KeyboardInterrupt
 
-    changed = replace(plan, feed=feed, method=beside.method, tolerance=beside.tolerance)
     spacing = beginning.spacing if len(run.t) > 1 else end  # a run that keeps no rows is compared where it ends
+    if isinstance(start, Checkpoint):
+        spacing = start.every
     try:
         unwatched = replace(changed, until=end, tell=ended, autosave=None)
-        _, other = travelled(unwatched, beginning.start, (), InMemory(), spacing)
+        _, other = travelled(unwatched, start, (), InMemory(), spacing)
     except (FlexctrlError, KeyboardInterrupt) as fault:
         return _noted(run, f"{_UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), None
-    if len(run.u) and len(other.u) and run.t[0] == other.t[0] and not np.array_equal(run.u[0], other.u[0]):
+    first = journey.origin.u
+    if len(first) and len(other.u) and other.t[0] == 0.0 and not np.array_equal(first, other.u[0]):
         return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
+    run = _standing(run, other.checkpoint, beside)
+    if other.final.t <= beginning.t:
+        return _noted(run, f"{_UNCHECKED}, which ended at t = {other.final.t:.3g} s"), other
     try:
-        return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps), other
+        return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps, feared), other
     except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
         return _noted(run, f"{_UNCHECKED}, whose numbers fail ({fault})"), None
+
+
+def _standing(run: Run, other: Checkpoint, beside: Beside) -> Run:
+    """The run, with where the other one stands for what goes on from there."""
+    origin = run.checkpoint.origin
+    others = (*(saved for saved in origin.others if not _of(saved, beside)), other)
+    return replace(run, checkpoint=replace(run.checkpoint, origin=replace(origin, others=others)))
 
 
 def _noted(run: Run, note: str) -> Run:

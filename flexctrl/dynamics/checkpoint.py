@@ -20,11 +20,12 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Mark, Pace, Point
 from flexctrl.errors import StructureError
 from flexctrl.model.plant import Plant
+from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_path, check_seconds
 
-__all__ = ["Autosave", "Checkpoint", "check_same", "load_checkpoint", "machine_of"]
+__all__ = ["Autosave", "Checkpoint", "Origin", "check_same", "load_checkpoint", "machine_of"]
 
-_FORMAT = 12
+_FORMAT = 13
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
@@ -76,6 +77,8 @@ class Checkpoint:
         Events up to this time have been told [s].
     balked : bool
         Whether the next step is to be taken by itself.
+    origin : Origin
+        Where the whole run began.
     """
 
     machine: str
@@ -99,6 +102,7 @@ class Checkpoint:
     counts: Counts
     told: float
     balked: bool
+    origin: Origin
 
     @property
     def t(self) -> float:
@@ -122,6 +126,24 @@ class Checkpoint:
         with beside.open("wb") as file:
             np.savez(file, allow_pickle=False, tree=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
         os.replace(beside, path)
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """Where a run began, and where those stand that were laid beside it: what these tell goes on with it.
+
+    Attributes
+    ----------
+    state : State
+    u : numpy.ndarray, shape (inputs,)
+        Inputs as they were told first; empty if nobody was asked.
+    others : tuple of Checkpoint
+        Of each run beside, where it stood last.
+    """
+
+    state: State
+    u: np.ndarray
+    others: tuple[Checkpoint, ...] = ()
 
 
 def load_checkpoint(path: str | Path) -> Checkpoint:

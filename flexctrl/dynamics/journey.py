@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
+from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, Origin, machine_of
 from flexctrl.dynamics.events.event import EventError, Occurrence
 from flexctrl.dynamics.events.switching import beyond
 from flexctrl.dynamics.events.watch import Crossing, Watch
@@ -48,7 +48,7 @@ from flexctrl.dynamics.steps import (
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
 from flexctrl.model.model import Model
-from flexctrl.model.overturned import overturned, twirled
+from flexctrl.model.overturned import bent, overturned, twirled
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
@@ -101,6 +101,10 @@ class Journey:
     rows : Rows
     track : Track
     mark : Mark
+    origin : Origin
+        Where the whole run began.
+    bent : str
+        What is to be said of elements that are bent far at either end.
     told : float
         Events up to this time have been told by the run that this one goes on from [s].
     balked : bool
@@ -120,6 +124,7 @@ class Journey:
     rows: Rows
     track: Track
     mark: Mark
+    origin: Origin
     events: list[Occurrence] = field(default_factory=list)
     status: Status = Status.FINISHED
     message: str = ""
@@ -127,6 +132,7 @@ class Journey:
     notes: tuple[str, ...] = ()
     drift: Drift = _NONE
     outputs: OutputErrors = _NOTHING
+    bent: str = ""
     told: float = -math.inf
     balked: bool = False
     horizon: float = math.inf
@@ -158,7 +164,7 @@ class Journey:
         self._judge()
         if self.status in (Status.FINISHED, Status.STOPPED):
             self._look_for_growth(began)
-            self._look_for_twirls(began.state)
+            self._look_at_elements(began.state)
 
     @cached_property
     def judging(self) -> Judging[Any] | None:
@@ -230,11 +236,13 @@ class Journey:
         elif found is not None:
             self.notes += (str(found),)
 
-    def _look_for_twirls(self, began: State) -> None:
-        """Tell of elements that may have passed half a turn within a step: they turn fast at either end of the run."""
+    def _look_at_elements(self, began: State) -> None:
+        """Tell of those that are bent far, or that may have passed half a turn in a step, at either end of the run."""
         model, size = self.plan.model, self.point.state.t / max(self.mark.steps, 1)
-        if isinstance(model, Model) and (turning := twirled(model, (began, self.point.state), size)):
-            self.notes += (turning,)
+        if isinstance(model, Model):
+            ends = (began, self.point.state)
+            self.bent = bent(model, ends)
+            self.notes += tuple(said for said in (twirled(model, ends, size), self.bent) if said)
 
     @property
     def tick(self) -> float:
@@ -314,6 +322,7 @@ class Journey:
             self._counts,
             self.told,
             self.balked,
+            self.origin,
         )
 
     def end_by(self, crossings: Sequence[Crossing], t: float) -> None:

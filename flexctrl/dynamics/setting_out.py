@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from flexctrl.dynamics.alpha.first_step import first_step
-from flexctrl.dynamics.checkpoint import Checkpoint, check_same, machine_of
+from flexctrl.dynamics.checkpoint import Checkpoint, Origin, check_same, machine_of
 from flexctrl.dynamics.events.event import Event
 from flexctrl.dynamics.events.nearing import SMALLEST
 from flexctrl.dynamics.events.watch import Watch
@@ -27,19 +27,12 @@ from flexctrl.errors import MechanismError, SingularMatrixError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
 
-__all__ = ["Anew", "travelled"]
-
-
-@dataclass(frozen=True)
-class Anew:
-    """Where a checkpoint stands, for a run that goes on from there by other steps."""
-
-    saved: Checkpoint
+__all__ = ["travelled"]
 
 
 def travelled(
     plan: Plan,
-    start: State | Rest | Checkpoint | Anew | None,
+    start: State | Rest | Checkpoint | None,
     events: tuple[Event, ...],
     record: Record,
     spacing: float | None,
@@ -49,7 +42,7 @@ def travelled(
     Parameters
     ----------
     plan : Plan
-    start : State, Rest, Checkpoint, Anew or None
+    start : State, Rest, Checkpoint or None
     events : tuple of Event
     record : Record
     spacing : float or None
@@ -80,7 +73,7 @@ def travelled(
 def _run(
     plan: Plan,
     stepper: Stepper[Any],
-    start: State | Rest | Checkpoint | Anew | None,
+    start: State | Rest | Checkpoint | None,
     watch: Watch,
     rows: Rows,
     track: Track,
@@ -88,13 +81,10 @@ def _run(
     try:
         if isinstance(start, Checkpoint):
             journey = _resumed(plan, stepper, start, watch, rows, track)
-        elif isinstance(start, Anew):
-            journey = _anew(plan, stepper, start.saved, watch, rows, track)
         else:
             journey = _begun(plan, stepper, start, watch, rows, track)
     except KeyboardInterrupt:
-        where = start.saved if isinstance(start, Anew) else start
-        return unbegun(plan, stepper, where, watch, rows, track)
+        return unbegun(plan, stepper, start, watch, rows, track)
     journey.travel()
     return journey
 
@@ -115,9 +105,9 @@ def _begun(
     """A run from a state."""
     model, pace = plan.model, plan.method.pace
     state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
-    state = model.motion.counted(state)
-    supply = plan.feed.first(state)
-    state = model.switches.begin(state, supply.u)
+    drawn = model.motion.counted(state)
+    supply = plan.feed.first(drawn)
+    state = model.switches.begin(drawn, supply.u)
     stops = Stops(plan.feed.sample_time, plan.feed.breaks)
     stops.skip(0.0)
     state, supply, notes = beyond_layers(plan.feed, state, supply, pace, plan.tolerance)
@@ -133,7 +123,8 @@ def _begun(
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method, plan.tolerance)
     books.turn(point, size)
-    journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), notes=notes)
+    origin = Origin(drawn, point.supply.u)
+    journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), origin, notes=notes)
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
         journey.notes += (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
     rows.here(point, 0.0)
@@ -169,24 +160,10 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     books = Books(plan.feed, start.point.state, plan.method, plan.tolerance)
     books.sums, books.first = replace(start.sums), start.first
     rows.count = start.rows
-    journey = Journey(plan, stepper, start.point, _stops(plan, start), books, watch, rows, track, replace(start.mark))
+    stops, mark = _stops(plan, start), replace(start.mark)
+    journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, mark, start.origin)
     journey.told, journey.balked = start.told, start.balked
     return journey
-
-
-def _anew(plan: Plan, stepper: Stepper[Any], saved: Checkpoint, watch: Watch, rows: Rows, track: Track) -> Journey:
-    """A run that goes on by other steps than those that led there."""
-    if saved.passed == UNASKED:
-        return _begun(plan, stepper, saved.point.state, watch, rows, track)
-    pace = plan.method.pace
-    size = pace.step if isinstance(pace, Fixed) else min(saved.mark.size, pace.largest)
-    point = stepper.start(saved.point.state, saved.point.supply, size)
-    watch.begin(point)
-    books = Books(plan.feed, point.state, plan.method, plan.tolerance)
-    books.turn(point, size)
-    books.sums.moved, books.first = saved.sums.moved.copy(), saved.first  # what errors are relative to
-    rows.count = saved.rows
-    return Journey(plan, stepper, point, _stops(plan, saved), books, watch, rows, track, Mark(size))
 
 
 def _stops(plan: Plan, saved: Checkpoint) -> Stops:

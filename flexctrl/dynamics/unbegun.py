@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.checkpoint import Checkpoint
+from flexctrl.dynamics.checkpoint import Checkpoint, Origin
 from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.journey import Journey, Plan
@@ -51,13 +51,14 @@ def unbegun(
     """
     model, none = plan.model, np.zeros(0)
     if isinstance(start, Checkpoint):
-        point = start.point
+        point, origin = start.point, start.origin
     else:
         state = start.state if isinstance(start, Rest) else start or model.rest
-        point = Point(state.with_(t=0.0), np.zeros(model.n), Supply(plan.feed.base, none, none))
+        point = Point(model.motion.counted(state.with_(t=0.0)), np.zeros(model.n), Supply(plan.feed.base, none, none))
+        origin = Origin(point.state, none)
     books = Books(plan.feed, point.state, plan.method, plan.tolerance)
     mark = replace(start.mark) if isinstance(start, Checkpoint) else Mark(0.0)
-    journey = Journey(plan, stepper, point, Stops(0.0, ()), books, watch, rows, track, mark)
+    journey = Journey(plan, stepper, point, Stops(0.0, ()), books, watch, rows, track, mark, origin)
     journey.status = Status.INTERRUPTED
     journey.message = f"interrupted at t = {point.state.t:.6g} s, before the first step"
     if isinstance(start, Checkpoint):

@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     from flexctrl.model.model import Model
     from flexctrl.model.state import State
 
-__all__ = ["displaced_beyond", "overturned", "twirled"]
+__all__ = ["bent", "displaced_beyond", "overturned", "twirled"]
 
 _FAR, _MOST = 2.2, 2.74
+_BENT = 1.0
+"""Where one element bends so far under a force at its end it is off by 1.6 % of that."""
 _LEAP, _ALIKE = 0.75, 1e-9
 """What is between 2.74 rad and as much on the other side of half a turn is 0.8 rad wide."""
 _MORE = "give {} more elements"
@@ -37,15 +39,40 @@ def overturned(model: Model, state: State) -> str:
     str
         By how much, and what helps; empty if none is.
     """
-    worst, said = _FAR, ""
+    parts, i, angle = _farthest(model, state)
+    return _turned(parts, i, angle) if angle > _FAR else ""
+
+
+def bent(model: Model, states: Sequence[State]) -> str:
+    """Say which element of a beam bends, or twists, by more than a mesh should leave to one.
+
+    Parameters
+    ----------
+    model : Model
+    states : sequence of State
+
+    Returns
+    -------
+    str
+        By how much, and what helps; empty if none does.
+    """
+    parts, i, angle = max((_farthest(model, state) for state in states), key=lambda found: found[-1])
+    if angle <= _BENT:
+        return ""
+    turned = f"{_named(parts, i)} is turned by {angle:.2g} rad from end to end"
+    return f"{turned}, and may be some per cent too stiff or too soft: {_MORE.format(parts[i])}"
+
+
+def _farthest(model: Model, state: State) -> tuple[Sequence[str], int, float]:
+    """Names of a family's parts, which element of it is turned farthest from end to end, and by what angle."""
+    worst: tuple[Sequence[str], int, float] = ((), 0, 0.0)
     for parts, ends in _beams(model):
         first, second = state.R[ends[:, 0]], state.R[ends[:, 1]]
         angles = np.arccos(np.clip(0.5 * (np.einsum("eij,eij->e", first, second) - 1.0), -1.0, 1.0))
         i = int(np.argmax(angles))
-        if angles[i] > worst:
-            worst = float(angles[i])
-            said = _turned(parts, i, worst)
-    return said
+        if angles[i] > worst[-1]:
+            worst = (parts, i, float(angles[i]))
+    return worst
 
 
 def displaced_beyond(model: Model, q: np.ndarray) -> str:

@@ -92,20 +92,42 @@ def test_the_run_is_that_of_the_method_to_the_bit():
     assert run.report.error != run.report.drift
 
 
-def test_what_goes_on_from_a_checkpoint_is_checked():
-    """The rest of it: about as the whole run's, which has grown since."""
-    model, start = chain(2, 8.0, 1)
-    for method in (fc.AdaptiveAlpha(), fc.GeneralizedAlpha(5e-3)):
-        half = fc.simulate(model, until=2.0, start=start, method=method, every=0.01)
-        how = {"until": 5.0, "method": method, "every": 0.01}
-        rest, whole = fc.simulate(model, start=half.checkpoint, **how), fc.simulate(model, start=start, **how)
-        same = fc.simulate(model, start=half.checkpoint, **{**how, "method": fc.Unchecked(method)})
+@pytest.mark.parametrize("cut", [0.5, 2.0, 4.0])
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(5e-3)], ids=["chosen", "one length"])
+def test_what_goes_on_from_a_checkpoint_is_told_as_the_whole(tmp_path, method, cut):
+    """What the part before was off by grows on: it was told by nobody, 61 % here and 2 % told."""
+    model, start = chain(3, 8.0, 2)
+    how = {"method": method, "every": 0.01}
+    whole = fc.simulate(model, until=5.0, start=start, **how)
+    for before in (method, fc.Unchecked(method)):
+        part = fc.simulate(model, until=cut, start=start, **{**how, "method": before})
+        part.checkpoint.save(tmp_path / "part")
+        rest = fc.simulate(model, until=5.0, start=fc.load_checkpoint(tmp_path / "part"), **how)
+        same = fc.simulate(model, until=5.0, start=part.checkpoint, **{**how, "method": fc.Unchecked(method)})
         assert np.array_equal(rest.y, same.y)
         assert np.array_equal(rest.final.q, whole.final.q)
         assert same.report.error == same.report.drift
-        true = fc.simulate(model, until=3.0, start=half.final, every=0.01, **EXACT)
-        off = np.abs(rest.y[-300:] - true.y[-300:]).max() / 2.0
-        assert 0.2 * off < rest.report.error < 6.0 * off
+        # not quite: instants at which runs are compared go by where each begins
+        assert rest.report.error == pytest.approx(whole.report.error, rel=0.35)
+
+
+def test_a_run_in_many_parts_is_told_as_the_whole(monkeypatch):
+    """And the runs beside go on, too: none begins anew."""
+    model, start = chain(3, 5.0, 7)
+    whole = fc.simulate(model, until=5.0, start=start)
+    travelled, begun = checking.travelled, []
+
+    def counted(plan, begin, *given):
+        begun.append(getattr(begin, "t", 0.0))
+        return travelled(plan, begin, *given)
+
+    monkeypatch.setattr(checking, "travelled", counted)
+    parts = [fc.simulate(model, until=0.5, start=start)]
+    for t in np.arange(1.0, 5.1, 0.5):
+        parts.append(fc.simulate(model, until=t, start=parts[-1].checkpoint))
+    assert parts[-1].report.error == pytest.approx(whole.report.error, rel=0.1)
+    assert begun.count(0.0) == 2  # the coarser one, and a second one where that told so much
+    assert np.diff([run.report.error for run in parts]).max() > 0.02
 
 
 @pytest.mark.parametrize(
@@ -340,7 +362,7 @@ def test_who_ends_the_run_beside_waits_for_no_second(monkeypatch):
     monkeypatch.setattr(checking, "travelled", ended)
     run = fc.simulate(model, until=3.0, start=start)
     assert len(calls) == 1
-    assert any("the coarser run beside it ended at t = 3 s" in note for note in run.report.notes)
+    assert run.report.error != run.report.drift
 
 
 @pytest.mark.parametrize(("law", "why"), [(Uncopied, "cannot be copied"), (Elsewhere, "keep memory in x")])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,12 +13,13 @@ from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.scales import farthest, output_yardsticks, turning, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.model.model import Model
+from flexctrl.model.overturned import bent
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["can_be_told", "kept_short", "may_grow", "told_beside"]
+__all__ = ["PARTED", "can_be_told", "kept_short", "may_grow", "told_beside"]
 
 _SWUNG, _FAR = 0.25, 0.02
 """What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
@@ -28,7 +30,7 @@ _INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
 _TOLD, _AIM = 0.03, 0.01
 _LEAST, _ALL = 0.1, 0.995
 """Where fewer steps than that could be longer, both runs are about the same but for what grows."""
-_PARTED = 0.2
+PARTED = 0.2
 """Runs that have parted by more may both be wrong: no share of that is sure to be the finer one's."""
 _MORE = 1.2
 _GROWN = "small differences grow, or steps are too long"
@@ -82,12 +84,13 @@ def may_grow(journey: Journey) -> bool:
         Whether something has swung by more than a quarter of a radian, gone farther than a fiftieth of the machine's
         size, met corners, or followed a continuous law, which may have corners of its own; in steps of one length, if
         it has gone twelve times that way to and fro. Where samples keep steps short the other run is a finer one,
-        which costs twice as much as the run itself: only for what turns so far and often, and corners.
+        which costs twice as much as the run itself: only for what turns so far and often, or goes a quarter of the
+        machine's size so often, and corners.
     """
     plan, sums, watch, short = journey.plan, journey.books.sums, journey.watch, kept_short(journey)
     feed, model = plan.feed, plan.model
     own = {*watch.corner_names, *(() if short else watch.names)}
-    least = np.where(turning(model), _SWUNG, np.inf if short else _FAR) * yardsticks(model)
+    least = np.where(turning(model) | short, _SWUNG, _FAR) * yardsticks(model)
     swung = sums.moved > least
     if short or isinstance(plan.method.pace, Fixed):
         swung &= sums.path > _OFTEN * least
@@ -107,20 +110,25 @@ class _Gap:
         The output, the node or the motor's angle at which that is most.
     outputs : numpy.ndarray, shape (outputs,)
         The most in each output that is a place or an angle, in its own unit; 0 in others.
+    bent : str
+        What is to be said of elements bent far, at the instants looked at.
     """
 
     t: np.ndarray
     size: np.ndarray
     where: str
     outputs: np.ndarray
+    bent: str = ""
 
 
-def told_beside(run: Run, coarse: Run, journey: Journey, longer: float, taken: int) -> Run:
+def told_beside(run: Run, coarse: Run, journey: Journey, longer: float, taken: int, feared: float = 0.0) -> Run:
     """Return a run with what a coarser one tells of its error.
 
     Where nothing else keeps them short, steps of the coarser run are longer by a factor r and its errors by rᵖ. Samples
     and impacts do keep steps short: a share φ of steps that could be longer makes n/m = 1 − φ (1 − 1/r) of the n steps,
-    and is taken to have made that share of the errors. Of what the runs are apart, 1/(rᵖ − 1) φ is left.
+    and is taken to have made that share of the errors. Of what the runs are apart, 1/(rᵖ − 1) φ is left. Where another
+    one, farther off, has parted and this one has not, it may be near by accident: what is told is the geometric mean of
+    what the two would leave, if that is more.
 
     Parameters
     ----------
@@ -132,32 +140,37 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float, taken: i
     longer : float
         By how much steps of the coarser one are longer; below 1 it is a finer one.
     taken : int
-        Steps of the run since where the other begins.
+        Steps of the run since it went on.
+    feared : float
+        What one that has parted would leave if errors grew as powers of steps do; 0 if none has.
 
     Returns
     -------
     Run
         As it is where the coarser one tells nothing: it took no step, nearly all its steps are the same, or it has
         parted from the finer one so far that sums of local errors tell more. Of one that ended before the run did it
-        keeps what these sums tell, and says so.
+        keeps what these sums tell, and says so; one that reached its end and was called unresolved there is as good
+        as others.
     """
     if not coarse.report.steps:
         return run
-    fewer, report = coarse.report.steps / max(taken, 1), run.report
+    fewer, report = coarse.report.steps / max(run.report.steps, 1), run.report
     free = (1.0 - fewer) / (1.0 - 1.0 / longer)
     kept = not journey.plan.feed.sample_time and taken <= _FEW and run.track.stretches and coarse.track.stretches
     gap = (_gap if kept else _gap_of_rows)(run, coarse, journey)
     left = min(max(free, _LEAST), 1.0) * abs(longer**report.order - 1.0)
-    told, parted = float(gap.size[-1]) / left, gap.size[-1] > _PARTED
+    told, parted = float(gap.size[-1]) / left, gap.size[-1] > PARTED
     if told < report.drift and (free < _LEAST or parted):
         return run
-    left = 1.0 if parted else left
+    left = 1.0 if parted else left / max(1.0, math.sqrt(feared / max(told, 1e-300)))
     told = float(gap.size[-1]) / left
-    early = coarse.status not in (Status.FINISHED, Status.STOPPED)
+    early = coarse.status not in (Status.FINISHED, Status.STOPPED) and coarse.final.t < (1.0 - 1e-9) * run.final.t
     error = max(told, report.drift if early else journey.drift.ran)
     kind = "coarser" if longer > 1.0 else "finer"
     outputs = by_rows(journey, run.y, gap.outputs / left, error, kind)
-    notes = tuple(note for note in report.notes if note not in (journey.drift.note, *journey.outputs.notes))
+    said = (journey.drift.note, journey.bent, *journey.outputs.notes)
+    notes = tuple(note for note in report.notes if note not in said)
+    notes += tuple({gap.bent or journey.bent} - {""})
     if told >= error > _TOLD:
         notes += (_note(journey, gap, left, kind),)
     elif journey.drift.note and error > told:  # a wrong speed, which both runs have alike; or nobody knows better
@@ -170,7 +183,8 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float, taken: i
 
 def _gap(run: Run, coarse: Run, journey: Journey) -> _Gap:
     """Places and turns of nodes and angles of motors, in yardsticks, at instants of no rhythm."""
-    model, begin, end = journey.plan.model, run.track.starts[0], min(run.final.t, coarse.final.t)
+    model, begin = journey.plan.model, max(run.track.starts[0], coarse.track.starts[0])
+    end = min(run.final.t, coarse.final.t)
     assert isinstance(model, Model)
     k = np.arange(1, _INSTANTS)
     t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / _INSTANTS, end)
@@ -179,7 +193,8 @@ def _gap(run: Run, coarse: Run, journey: Journey) -> _Gap:
     worst = _names(model)[int(np.argmax(apart.max(axis=0)))]
     read, judged = np.zeros(len(model.outputs)), placed(model)
     read[judged] = np.max([abs(model.measure(one) - model.measure(other)) for one, other in pairs], axis=0)[judged]
-    return _Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst, read)
+    size = np.maximum.accumulate(apart.max(axis=1)) / _most(journey)
+    return _Gap(t, size, worst, read, bent(model, [one for one, _ in pairs]))
 
 
 def _gap_of_rows(run: Run, coarse: Run, journey: Journey) -> _Gap:
@@ -191,9 +206,10 @@ def _gap_of_rows(run: Run, coarse: Run, journey: Journey) -> _Gap:
     model, near = journey.plan.model, 1e-9 * run.final.t
     assert isinstance(model, Model)
     judged, read = placed(model), np.zeros(len(model.outputs))
-    t = coarse.t[coarse.t <= run.final.t + near] if judged and len(run.t) >= _POINTS else np.zeros(0)
+    within = (coarse.t >= run.t[0] - near) & (coarse.t <= run.final.t + near) if len(run.t) >= _POINTS else []
+    t = coarse.t[within] if judged and len(within) else np.zeros(0)
     yards = output_yardsticks(model, 1.0)[judged]
-    rows = coarse.y[: len(t), judged] - _between(run.t, run.y[:, judged], t) if t.size else np.zeros((0, len(judged)))
+    rows = coarse.y[within][:, judged] - _between(run.t, run.y[:, judged], t) if t.size else np.zeros((0, len(judged)))
     read[judged] = np.abs(rows).max(axis=0, initial=0.0)
     apart, names = np.abs(rows) / np.where(yards > 0.0, yards, np.inf), [model.outputs[i] for i in judged]
     if abs(coarse.final.t - run.final.t) <= near:
@@ -252,7 +268,7 @@ def _note(journey: Journey, gap: _Gap, left: float, kind: str) -> str:
     error, pace = float(gap.size[-1]) / left, plan.method.pace
     until = float(np.append(0.0, gap.t)[int(np.argmax(gap.size > _TOLD * left))])
     far = f"{100.0 * error:.2g} % of the motion" if error < _ALL else "all of the motion"
-    parted = gap.size[-1] > _PARTED
+    parted = gap.size[-1] > PARTED
     is_off = f"may be off by {far}, as {_GROWN}" if parted else f"is off by {far}"
     said = f"by a {kind} run, {gap.where} {is_off}"
     finer = (_AIM / error) ** (1.0 / plan.method.order)

@@ -115,8 +115,13 @@ def seen(journey: Journey, y: np.ndarray) -> tuple[np.ndarray, list[int]]:
     assert isinstance(model, Model)
     yards = yardsticks(model)
     least = _SEEN * tolerance.absolute * (reach(journey) @ np.where(np.isfinite(yards), yards, 0.0))
-    way = np.ptp(y, axis=0)
+    way = _ways(journey, y)
     return way, [i for i in placed(model) if way[i] > least[i]]
+
+
+def _ways(journey: Journey, y: np.ndarray) -> np.ndarray:
+    """How far outputs go, from where the whole run began."""
+    return np.ptp(np.vstack([journey.plan.model.measure(journey.origin.state), y]), axis=0)
 
 
 def _notes(journey: Journey, y: np.ndarray, shares: Mapping[str, float], error: float, said: str) -> tuple[str, ...]:
@@ -125,7 +130,7 @@ def _notes(journey: Journey, y: np.ndarray, shares: Mapping[str, float], error: 
     if not far:
         return ()
     worst, *others = sorted(far, key=lambda name: -shares[name])
-    way = float(np.ptp(y[:, journey.plan.model.outputs.index(worst)]))
+    way = float(_ways(journey, y)[journey.plan.model.outputs.index(worst)])
     share, do = shares[worst], remedy(journey, shares[worst])
     note = said.format(name=worst, way=way, far=f"{100.0 * share:.2g} %", steps=journey.mark.steps, remedy=do)
     if not others:
