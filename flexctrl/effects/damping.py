@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RayleighDamping(Effect):
-    """C = α M + β K: α on absolute velocities, β on the rates of deformation of each part.
+    """C = α M + β K: α on absolute velocities, β on the rates of strain of each part.
 
     At rest the tangent is exactly α M + β K with K as assembled; in large motion the β part is
     frame-invariant. ζ(ω) = α/(2ω) + βω/2.
@@ -69,7 +69,7 @@ class RayleighDamping(Effect):
         return cls(2.0 * zeta * omega1 * omega2 / (omega1 + omega2), 2.0 * zeta / (omega1 + omega2))
 
     def beam(self, m: BeamMotion) -> BeamForce:
-        """−β K_e ḋ − α M_e V."""
+        """−β Jᵀ K_e J ḋ − α M_e V, J the slope of strains in the deformations d."""
         return viscous_force(m) * self.beta + drag(m) * self.alpha
 
     def spring(self, m: LineMotion) -> ca.SX:

@@ -425,14 +425,18 @@ def deformation_rates(m: BeamMotion) -> ca.SX:
     return ca.vertcat(m.lean * (m.rates[2] - m.rates[0])[0], *turning)
 
 
-def viscous_force(m: BeamMotion) -> BeamForce:
-    """Return −K_e ḋ, the force of a damping equal to the stiffness on the rates of deformation."""
+def strain_rates(m: BeamMotion) -> ca.SX:
+    """Return the rates of `deformations`: an axis that bends as it shortens its chord is not stretched."""
     import casadi as ca
 
-    stretching, x1, y1, z1, x2, y2, z2 = ca.vertsplit(deformation_rates(m))
-    d = ca.vertcat(stretching, x2 - x1, y1, y2, z1, z2)
-    N, torque, y1, y2, z1, z2 = ca.vertsplit(stiffened(m, d))
-    force = BeamForce(-ca.vertcat(N, -torque, y1, z1, torque, y2, z2), ca.SX(3, 1), ca.SX(12, 1))
+    seen, local = seen_deformed(m)
+    rates = ca.jtimes(deformations(local), seen, ca.vertcat(deformation_rates(m), *m.modal[1:2]))
+    return ca.substitute(rates, seen, ca.vertcat(m.stretch, *m.theta, *m.modal[:1]))
+
+
+def viscous_force(m: BeamMotion) -> BeamForce:
+    """Return the force of a damping equal to the stiffness, on the rates of `deformations`."""
+    force = stress_force(m, stiffened(m, strain_rates(m)))
     return force + _modal(-component_modes.stiffness(m) * m.modal[1]) if m.modal else force
 
 

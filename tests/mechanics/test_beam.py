@@ -23,11 +23,11 @@ G = np.array([1.0, -2.0, -9.0])
 REST = np.concatenate([slot(x, np.eye(3)) for x in ENDS])
 
 
-def parameters() -> ca.DM:
-    y, z = bending(SECTION.EI_y, SECTION.GA_z, L), bending(SECTION.EI_z, SECTION.GA_y, L)
-    about_z, about_y = plane_masses(SECTION, L)
-    rho = (SECTION.rhoA * L, SECTION.rhoJ * L, *about_z, *about_y)
-    return ca.DM([*AXES.ravel(), L, SECTION.EA, SECTION.GJ, *y, *z, *rho])
+def parameters(section: fc.Section = SECTION, L: float = L, axes: np.ndarray = AXES) -> ca.DM:
+    y, z = bending(section.EI_y, section.GA_z, L), bending(section.EI_z, section.GA_y, L)
+    about_z, about_y = plane_masses(section, L)
+    rho = (section.rhoA * L, section.rhoJ * L, *about_z, *about_y)
+    return ca.DM([*axes.ravel(), L, section.EA, section.GJ, *y, *z, *rho])
 
 
 def motion(a, b):
@@ -169,6 +169,29 @@ def test_viscous_force_dissipates_but_not_in_rigid_motion(slots):
     for start in (0, 24):
         rigid[start + 12 : start + 18] = [*(drift + np.cross(spin, rigid[start : start + 3])), *spin]
     close(VISCOUS(rigid), np.zeros(12), 1e-10)
+
+
+@pytest.mark.parametrize("theta", [0.05, 0.2, 0.5])
+def test_a_wire_that_bends_along_arcs_is_damped_as_bending(theta):
+    """EI/L θ̇²: its axis keeps its length L while its chord, L sin(θ/2)/(θ/2), gets shorter."""
+    length, rate, wire = 2.0, 3.0, fc.Section(EA=4e6, EI_y=1.0, EI_z=1.0, GJ=1.0, rhoA=1.0, rhoJ=0.1)
+
+    def share(a, b):
+        m = beam.beam_motion(a, b, ca.SX(parameters(wire, length, np.eye(3))))
+        return beam.nodal_force(m, beam.viscous_force(m))
+
+    half = 0.5 * theta
+    chord, nearing = (
+        length * np.sin(half) / half,
+        rate * length * (half * np.cos(half) - np.sin(half)) / (2.0 * half**2),
+    )
+    spin, own = np.array([0.0, 0.5 * rate, 0.0]), Rotation.from_rotvec([0.0, half, 0.0]).as_matrix()
+    none = np.zeros(3)
+    first, second = slot(none, own.T, none, -spin), slot([chord, 0, 0], own, [nearing, 0, 0], spin)
+    V = np.concatenate([none, -spin, [nearing, 0, 0], spin])
+    taken = -kernel(share, 2)(np.concatenate([first, second])) @ V
+    left = wire.EA * length * (rate * theta**3 / 480.0) ** 2  # strain of θ⁴/1920 that bowing of second order leaves
+    assert taken == pytest.approx(wire.EI_y / length * rate**2 + left, rel=0.02)
 
 
 @pytest.mark.parametrize("slots", STATES)

@@ -99,7 +99,7 @@ class Checked(_Wrapped):
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so and for corners. Nothing is run
     again for linear models and small motion. A sampled law in Python is asked again as a copy of what it was before
-    the run; from a `Checkpoint` on it is the rest of the run that is checked.
+    the run; what goes on from a `Checkpoint` is laid beside what goes on from where the run beside stood.
 
     Parameters
     ----------
