@@ -47,6 +47,7 @@ from flexctrl.dynamics.steps import (
 )
 from flexctrl.dynamics.stops import Stops
 from flexctrl.errors import ControllerError
+from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import bent, overturned, twirled
 from flexctrl.model.plant import Plant
@@ -164,7 +165,7 @@ class Journey:
         self._judge()
         if self.status in (Status.FINISHED, Status.STOPPED):
             self._look_for_growth(began)
-            self._look_at_elements(began.state)
+            self._look_at_parts(began.state)
 
     @cached_property
     def judging(self) -> Judging[Any] | None:
@@ -236,13 +237,14 @@ class Journey:
         elif found is not None:
             self.notes += (str(found),)
 
-    def _look_at_elements(self, began: State) -> None:
-        """Tell of those that are bent far, or that may have passed half a turn in a step, at either end of the run."""
+    def _look_at_parts(self, began: State) -> None:
+        """Tell of what bends far, passes half a turn in a step or leaves its modes, where the run begins or ends."""
         model, size = self.plan.model, self.point.state.t / max(self.mark.steps, 1)
         if isinstance(model, Model):
             ends = (began, self.point.state)
             self.bent = bent(model, ends)
-            self.notes += tuple(said for said in (twirled(model, ends, size), self.bent) if said)
+            said = (twirled(model, ends, size), self.bent, beyond_modes(model, ends, self.books.sums.moved))
+            self.notes += tuple(note for note in said if note)
 
     @property
     def tick(self) -> float:

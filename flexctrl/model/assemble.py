@@ -93,7 +93,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     empty = sp.csr_matrix((motion.n, motion.n))
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping) and np.any(p.ratios)]
-    return replace(model, viscous=_modal_damping(model, modal[0])) if modal else model
+    return _modally_damped(model, modal[0]) if modal else model
 
 
 def checked_effects(structure: Structure, effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -204,11 +204,12 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
     return replace(unloaded, about=replace(about, load=load + unbraked))
 
 
-def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:
-    """Return M Φ diag(2 ζ ω) Φᵀ M with the flexible modes about the equilibrium that the damping names."""
+def _modally_damped(model: Model, damping: ModalDamping) -> Model:
+    """Return a model with M Φ diag(2 ζ ω) Φᵀ M of the flexible modes about the equilibrium that the damping names."""
     from flexctrl.model.linearize import released  # brings all that modes need
 
-    linear = released(rest_held(model, dict(damping.hold), dict(damping.inputs)))
+    rest = rest_held(model, dict(damping.hold), dict(damping.inputs))
+    linear = released(rest)
     count = None if isinstance(damping.ratios, float) else len(damping.ratios) + _not_vibrating(linear.modes())
     modes = linear.modes(count)
     first = _not_vibrating(modes)
@@ -218,7 +219,8 @@ def _modal_damping(model: Model, damping: ModalDamping) -> sp.csr_matrix:
     momenta = linear.M @ shapes[:, :count]
     places = [model.coordinate(name) for name in linear.coordinates]
     spread = sp.csr_matrix((np.ones(len(places)), (places, range(len(places)))), shape=(model.n, len(places)))
-    return sp.csr_matrix(spread @ (momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T @ spread.T)
+    viscous = sp.csr_matrix(spread @ (momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T @ spread.T)
+    return replace(model, viscous=viscous, modal_about=rest.state)
 
 
 def _not_vibrating(modes: Modes) -> int:

@@ -17,6 +17,7 @@ from flexctrl.model.braked import balance_of, bearing
 from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
+from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
 from flexctrl.model.stability import without_energy
 from flexctrl.model.state import State
@@ -85,8 +86,8 @@ def _frozen(model: Model, state: State) -> dict[int, float]:
 def _about(balance: Balance, state: State) -> LinearModel:
     """The certified linear model about a state in which a balance is met."""
     model, free = balance.model, balance.free
-    if apart := model.apart(state):
-        raise LinearizationError(f"linearize: {apart}")
+    if wrong := model.apart(state) or beyond_modes(model, [state]):
+        raise LinearizationError(f"linearize: {wrong}")
     if not free.size:
         raise LinearizationError(
             f"linearize: every coordinate is held ({', '.join(model.coordinates)}), so there is nothing to linearise; "

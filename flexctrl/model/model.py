@@ -67,6 +67,8 @@ class Model:
         Matrices of small motion about another place than the drawn shape (geometric stiffness).
     carried : numpy.ndarray, shape (raw,), or 0.0
         Constant raw forces beside those of the inputs: what holds a motor in an equilibrium.
+    modal_about : State or None
+        The equilibrium whose modes ``viscous`` is of.
     """
 
     structure: Structure
@@ -76,6 +78,7 @@ class Model:
     viscous: sp.csr_matrix = field(repr=False)
     about: Small | None = field(default=None, repr=False)
     carried: np.ndarray | float = field(default=0.0, repr=False)
+    modal_about: State | None = field(default=None, repr=False)
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -156,11 +156,12 @@ class _Search:
         force, self.scale = balance.force(start), balance.scale(start)
         self.newton, self.balance = newton, balance
         self.shift, self.floor = shift, 1e-7 * shift
-        self.best, self.least = start, balance.relative(force, self.scale)
+        there = balance.astray(start) == 0.0
+        self.best, self.least = start, max(balance.relative(force, self.scale), 0.0 if there else 1.0)
         self.here = _Iterate(start, None, force, self.least)
         self.before, self.iterations, self.stalled = np.inf, 0, 0
         self.steady = self.contracting = True
-        self.small = balance.astray(start) == 0.0 and self.least <= _TARGET
+        self.small = there and self.least <= _TARGET
 
     def iterate(self, watch: bool) -> bool:
         """Go one step, or hold faster where it would go astray; return whether another one may help."""

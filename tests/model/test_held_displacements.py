@@ -1,0 +1,58 @@
+"""Equilibria of beams whose end is held away from where it was drawn, with no load that would say what is large."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+
+def cantilever(elements: int, EA: float = 1e6, effects: tuple[fc.effects.Effect, ...] = ()) -> fc.Model:
+    section = fc.Section(EA=EA, EI_y=200.0, EI_z=100.0, GJ=80.0, rhoA=1.0, rhoJ=0.01)
+    beam = fc.Beam("b", (0, 0, 0), (1, 0, 0), section, elements=elements)
+    structure = fc.Structure(
+        [beam],
+        [fc.Support(beam.start)],
+        inputs=[fc.Force("push", beam.end, "z")],
+        outputs=[fc.Position("x", beam.end, "x"), fc.Position("z", beam.end, "z")],
+    )
+    return fc.assemble(structure, [fc.Flexible(), fc.LargeRotation(), *effects])
+
+
+@pytest.mark.parametrize("elements", [2, 4, 16])
+@pytest.mark.parametrize("angle", [0.1, 1.0, 4.0])
+def test_a_twisted_wire_is_twisted_evenly(elements, angle):
+    """From four elements on none was found: nothing is at work at the start, and all is large beside it."""
+    model = cantilever(elements)
+    rest = fc.equilibrium(model, hold={f"b_{elements}_rx": angle})
+    turns = [rest.state.q[model.coordinate(f"b_{i}_rx")] for i in range(1, elements + 1)]
+    assert turns == pytest.approx(angle * np.arange(1, elements + 1) / elements)
+    assert rest.iterations < 100
+
+
+@pytest.mark.parametrize("elements", [4, 16])
+@pytest.mark.parametrize("angle", [-0.01, 0.5, 2.0, 3.0])
+def test_an_end_held_at_an_angle_bends_the_beam_to_an_arc(elements, angle):
+    rest = fc.equilibrium(cantilever(elements), hold={f"b_{elements}_ry": -angle})
+    arc = np.array([np.sin(angle), 1.0 - np.cos(angle)]) / angle
+    assert list(rest.outputs.values()) == pytest.approx(arc, abs=4e-3 / elements)
+
+
+@pytest.mark.parametrize("effects", [(), (fc.Gravity(),)], ids=["alone", "with its weight"])
+@pytest.mark.parametrize("EA", [1e6, 1e9])
+@pytest.mark.parametrize("force", [5.0, 300.0])
+def test_held_where_a_force_has_it_it_is_where_the_force_has_it(force, EA, effects):
+    model = cantilever(6, EA, effects)
+    pushed = fc.equilibrium(model, inputs={"push": force})
+    held = fc.equilibrium(model, hold={"b_6_w": float(pushed.state.q[model.coordinate("b_6_w")])})
+    assert held.state.q == pytest.approx(pushed.state.q, abs=1e-9)
+    assert held.iterations < 100
+
+
+def test_what_is_stretched_is_longer_throughout():
+    rest = fc.equilibrium(cantilever(5), hold={"b_5_u": 0.01})
+    model = rest.model
+    assert [rest.state.q[model.coordinate(f"b_{i}_u")] for i in range(1, 6)] == pytest.approx(
+        0.002 * np.arange(1, 6), rel=1e-9
+    )
