@@ -99,9 +99,9 @@ class RayleighDamping(Effect):
 class ModalDamping(Effect):
     """C = M Φ diag(2 ζᵢ ωᵢ) Φᵀ M from the undamped modes about the machine's equilibrium; 0 is no damping.
 
-    Motions without stiffness, and those in which the machine would leave the equilibrium, are not damped. C does not turn
-    with the machine: what turns far from the equilibrium is braked as well, of which runs have a note, and `linearize`
-    refuses to go there. A `Scene` fills in its own ``hold`` and ``rest_inputs``.
+    Motions without stiffness, and those in which the machine would leave the equilibrium, are not damped. C does not
+    turn with the machine: what turns far from the equilibrium is braked as well, of which runs have a note, and
+    `linearize` refuses to go there. A `Scene` fills in its own ``hold`` and ``rest_inputs``.
 
     Parameters
     ----------
