@@ -79,19 +79,23 @@ class BeamForce:
         Forces and moments on the nodes, in the frame.
     modal : casadi.SX or float
         Forces on the element's own modes; 0 where it has none.
+    stress : casadi.SX, 6, or float
+        `stresses`, which resist `deformations`; 0 where there are none.
     """
 
     deformation: ca.SX
     torque: ca.SX
     nodal: ca.SX
     modal: ca.SX | float = 0.0
+    stress: ca.SX | float = 0.0
 
     def __add__(self, other: BeamForce) -> BeamForce:
         sums = (self.deformation + other.deformation, self.torque + other.torque, self.nodal + other.nodal)
-        return BeamForce(*sums, self.modal + other.modal)
+        return BeamForce(*sums, self.modal + other.modal, self.stress + other.stress)
 
     def __mul__(self, factor: float) -> BeamForce:
-        return BeamForce(self.deformation * factor, self.torque * factor, self.nodal * factor, self.modal * factor)
+        works = (self.deformation * factor, self.torque * factor, self.nodal * factor)
+        return BeamForce(*works, self.modal * factor, self.stress * factor)
 
 
 def no_force() -> BeamForce:
@@ -167,6 +171,7 @@ def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     """Return the force on the nodes in space axes (12): Bᵀ n + Gᵀ t + f, turned out of the frame."""
     import casadi as ca
 
+    force = _resolved(m, force)
     n = force.deformation
     t1, t2 = inverse_tangent(m.theta[0], n[1:4]), inverse_tangent(m.theta[1], n[4:7])
     torque = force.torque - (t1 + t2)
@@ -179,10 +184,18 @@ def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     return ca.vertcat(*[m.frame @ block for block in blocks])
 
 
+def _resolved(m: BeamMotion, force: BeamForce) -> BeamForce:
+    """The force without stresses, but what these work on."""
+    if isinstance(force.stress, float):
+        return force
+    return replace(force, stress=0.0) + stress_force(m, force.stress)
+
+
 def whole_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     """Return a force on the nodes of an element, in space axes, and then on its own modes."""
     import casadi as ca
 
+    force = _resolved(m, force)
     nodal = nodal_force(m, force)
     return ca.vertcat(nodal, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else nodal
 
@@ -398,7 +411,7 @@ def seen_deformed(m: BeamMotion) -> tuple[ca.SX, BeamMotion]:
 
 def elastic_force(m: BeamMotion) -> BeamForce:
     """Return minus the gradient of `strain_energy`."""
-    force = stress_force(m, stresses(m))
+    force = replace(no_force(), stress=stresses(m))
     return force + _modal(-component_modes.stiffness(m) * m.modal[0]) if m.modal else force
 
 
@@ -436,7 +449,7 @@ def strain_rates(m: BeamMotion) -> ca.SX:
 
 def viscous_force(m: BeamMotion) -> BeamForce:
     """Return the force of a damping equal to the stiffness, on the rates of `deformations`."""
-    force = stress_force(m, stiffened(m, strain_rates(m)))
+    force = replace(no_force(), stress=stiffened(m, strain_rates(m)))
     return force + _modal(-component_modes.stiffness(m) * m.modal[1]) if m.modal else force
 
 

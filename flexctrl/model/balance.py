@@ -140,24 +140,24 @@ class Balance:
         return K[self.free][:, self.free] if self.held else K
 
     def scale(self, state: State) -> float:
-        """Return the forces at work: all loads and weights together, or what is held, if that is more [N]."""
+        """Return the forces at work: all loads and weights together, or what holds a freedom, if that is more [N]."""
         loads = np.abs(self.model.signals.loads_at(state) @ self.u / self._raw_lever).sum()
         weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
-        left, held = (
-            np.abs(force).max(initial=0.0) for force in (self.force(state) / self.lever[self.free], self.pulls(state))
-        )
-        return float(max(loads, weights, left, held, 1e-300))
+        left = np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0)
+        return float(max(loads, weights, left, self._holding(state), 1e-300))
 
-    def pulls(self, state: State) -> np.ndarray:
-        """Return the forces that hold what is held, once it is in its place as far as stiffness tells [N]."""
+    def _holding(self, state: State) -> float:
+        """The largest force that holds what is held, once it is in its place as far as stiffness tells [N]."""
         if not self.held:
-            return self.still[:0]
+            return 0.0
         reactions = self.whole_force(state)
         if self.astray(state):
-            step = np.zeros(self.model.n)
-            step[self.fixed] = self.gap(state)
-            reactions = reactions - self.slope(state) @ step
-        return (reactions / self.lever)[self.fixed]
+            K = self.slope(state)
+            try:
+                reactions = reactions - K @ self.linear_step(state, K)
+            except SingularMatrixError:  # what has no stiffness yet is moved by loads alone
+                return 0.0
+        return float(np.abs((reactions / self.lever)[self.fixed]).max(initial=0.0))
 
     def pull(self, state: State) -> float:
         """Return the ω² at which the machine would swing as a whole under the forces at work [(rad/s)²].
