@@ -132,9 +132,10 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     run = replace(run, checkpoint=told.checkpoint)
     parted = told.report.error > PARTED
     feared = told.report.error / (coarser.longer**order - 1.0) if parted else 0.0
-    nearer, second = _told(run, journey, method.coarser(tolerance, _NEARER), beginning, feared)
+    nearby = method.coarser(tolerance, _NEARER)
+    nearer, second = _told(run, journey, nearby, beginning, feared)
     if second is None or _reached(second) < _reached(other):
-        return replace(told, checkpoint=nearer.checkpoint)
+        return told if second is None else _standing(told, second.checkpoint, nearby)
     return nearer
 
 
@@ -147,6 +148,8 @@ def _told(
     run: Run, journey: Journey, beside: Beside, beginning: Beginning, feared: float = 0.0
 ) -> tuple[Run, Run | None]:
     """The run with what one other tells, and that one, ended where it takes far longer; None if there is none."""
+    if run.final.t <= beginning.t:
+        return run, None
     end, feed, start = run.final.t, beginning.again, beginning.beside(beside)
     if feed is None:
         return _noted(run, f"{_UNCHECKED}: the controller cannot be copied"), None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
+import math
 import os
 import zlib
 from collections.abc import Mapping
@@ -139,11 +140,17 @@ class Origin:
         Inputs as they were told first; empty if nobody was asked.
     others : tuple of Checkpoint
         Of each run beside, where it stood last.
+    error : float
+        How far the run has been off by these, as `Report` has it; 0 if there are none.
+    right : float
+        Until when it has been right by these [s].
     """
 
     state: State
     u: np.ndarray
     others: tuple[Checkpoint, ...] = ()
+    error: float = 0.0
+    right: float = math.inf
 
 
 def load_checkpoint(path: str | Path) -> Checkpoint:

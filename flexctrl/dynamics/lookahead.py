@@ -76,13 +76,17 @@ def look_ahead(journey: Journey) -> None:
     if not plan.feed.untold or stops.found < math.inf or journey.point.supply.slid:
         return  # where it slides, a law jumps with whatever moves, time or places
     chosen = isinstance(plan.method.pace, Controlled)
-    span = min(mark.size if chosen else plan.method.pace.step, stops.next - t, plan.until - t)  # type: ignore[union-attr]
-    if span <= journey.tick:
+    span = min(mark.size if chosen else plan.method.pace.step, stops.next - t)  # type: ignore[union-attr]
+    limit = _BENT if chosen else _MISSED
+    if min(span, plan.until - t) <= journey.tick:
         return
     try:
-        end, jumps = _clear(journey, span, _BENT if chosen else _MISSED)
-    except ControllerError:  # what it says when it is asked in earnest is told then
-        return
+        end, jumps = _clear(journey, span, limit)  # also beyond the end, as a run does that goes on
+    except ControllerError:
+        try:
+            end, jumps = _clear(journey, min(span, plan.until - t), limit)
+        except ControllerError:  # what it says when it is asked in earnest is told then
+            return
     if jumps or (end < math.inf and not chosen):
         stops.found = end
         plan.feed.met[:] = [end]

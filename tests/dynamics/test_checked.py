@@ -111,6 +111,35 @@ def test_what_goes_on_from_a_checkpoint_is_told_as_the_whole(tmp_path, method, c
         assert rest.report.error == pytest.approx(whole.report.error, rel=0.35)
 
 
+@pytest.mark.parametrize("cut", [4.5, 5.0, 5.9])
+def test_a_part_after_runs_have_parted_knows_since_when(cut):
+    """It said "right to 3% until t = 0 s", and was off by less than the part before."""
+    model, start = chain(3, 8.0, 2)
+    how = {"method": fc.GeneralizedAlpha(5e-3), "every": 0.02}
+    whole = fc.simulate(model, until=6.0, start=start, **how)
+    part = fc.simulate(model, until=cut, start=start, **how)
+    rest = fc.simulate(model, until=6.0, start=part.checkpoint, **how)
+    assert part.report.error > 0.03
+    assert rest.report.error >= part.report.error
+    assert 0.0 < run_until(rest) == pytest.approx(run_until(whole), abs=0.4)
+
+
+def run_until(run: fc.Run) -> float:
+    [note] = [note for note in run.report.notes if "right to 3%" in note]
+    return float(note.partition("until t = ")[2].partition(" s")[0])
+
+
+@pytest.mark.parametrize(
+    "method", [fc.AdaptiveAlpha(), fc.ConservingMidpoint(1e-2), fc.GeneralizedAlpha(2e-3, rho=1.0)]
+)
+def test_a_checkpoint_at_the_end_has_nothing_to_be_checked(method):
+    model, start = chain(2, 8.0, 1)
+    run = fc.simulate(model, until=2.0, start=start, method=method)
+    again = fc.simulate(model, until=2.0, start=run.checkpoint, method=method)
+    assert again.status is fc.Status.FINISHED
+    assert np.array_equal(again.final.q, run.final.q)
+
+
 def test_a_run_in_many_parts_is_told_as_the_whole(monkeypatch):
     """And the runs beside go on, too: none begins anew."""
     model, start = chain(3, 5.0, 7)

@@ -160,25 +160,28 @@ def told_beside(run: Run, coarse: Run, journey: Journey, longer: float, taken: i
     gap = (_gap if kept else _gap_of_rows)(run, coarse, journey)
     left = min(max(free, _LEAST), 1.0) * abs(longer**report.order - 1.0)
     told, parted = float(gap.size[-1]) / left, gap.size[-1] > PARTED
-    if told < report.drift and (free < _LEAST or parted):
+    origin = journey.origin
+    if max(told, origin.error) < report.drift and (free < _LEAST or parted):
         return run
     left = 1.0 if parted else left / max(1.0, math.sqrt(feared / max(told, 1e-300)))
     told = float(gap.size[-1]) / left
     early = coarse.status not in (Status.FINISHED, Status.STOPPED) and coarse.final.t < (1.0 - 1e-9) * run.final.t
-    error = max(told, report.drift if early else journey.drift.ran)
+    error = max(told, origin.error, report.drift if early else journey.drift.ran)
+    right = min(origin.right, _right(run, gap, left))
     kind = "coarser" if longer > 1.0 else "finer"
     outputs = by_rows(journey, run.y, gap.outputs / left, error, kind)
     said = (journey.drift.note, journey.bent, *journey.outputs.notes)
     notes = tuple(note for note in report.notes if note not in said)
     notes += tuple({gap.bent or journey.bent} - {""})
-    if told >= error > _TOLD:
-        notes += (_note(journey, gap, left, kind),)
+    if max(told, origin.error) >= error > _TOLD:
+        notes += (_note(journey, gap, error, right, kind),)
     elif journey.drift.note and error > told:  # a wrong speed, which both runs have alike; or nobody knows better
         notes += (journey.drift.note,)
     if early:
         notes += (_EARLY.format(kind=kind, t=coarse.final.t),)
     known = replace(report, error=error, output_errors=outputs.shares, notes=notes + outputs.notes)
-    return replace(run, report=known)
+    so_far = replace(run.checkpoint.origin, error=max(told, origin.error), right=right)
+    return replace(run, report=known, checkpoint=replace(run.checkpoint, origin=so_far))
 
 
 def _gap(run: Run, coarse: Run, journey: Journey) -> _Gap:
@@ -262,13 +265,18 @@ def _sources(model: Model) -> np.ndarray:
     return np.unique(model.motion.sources[model.motion.sources < model.n])
 
 
-def _note(journey: Journey, gap: _Gap, left: float, kind: str) -> str:
+def _right(run: Run, gap: _Gap, left: float) -> float:
+    """Until when two runs have told that all is well; infinity if they do at the end."""
+    wrong = gap.size > _TOLD * left
+    begin = run.track.starts[:1] or run.t[:1].tolist() or [0.0]
+    return float([*begin, *gap.t.tolist()][int(np.argmax(wrong))]) if wrong.any() else math.inf
+
+
+def _note(journey: Journey, gap: _Gap, error: float, right: float, kind: str) -> str:
     """What is to be said: how far off, until when all is well, and what would leave little."""
-    plan = journey.plan
-    error, pace = float(gap.size[-1]) / left, plan.method.pace
-    until = float(np.append(0.0, gap.t)[int(np.argmax(gap.size > _TOLD * left))])
+    plan, pace = journey.plan, journey.plan.method.pace
     far = f"{100.0 * error:.2g} % of the motion" if error < _ALL else "all of the motion"
-    parted = gap.size[-1] > PARTED
+    parted = max(gap.size[-1], journey.origin.error) > PARTED
     is_off = f"may be off by {far}, as {_GROWN}" if parted else f"is off by {far}"
     said = f"by a {kind} run, {gap.where} {is_off}"
     finer = (_AIM / error) ** (1.0 / plan.method.order)
@@ -277,4 +285,4 @@ def _note(journey: Journey, gap: _Gap, left: float, kind: str) -> str:
         remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
         remedy = f"take steps of {finer * pace.step:.1g} s"
-    return f"{said}; right to {_TOLD:.0%} until t = {until:.3g} s: {remedy}"
+    return f"{said}; right to {_TOLD:.0%} until t = {right:.3g} s: {remedy}"
