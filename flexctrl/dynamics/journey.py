@@ -50,6 +50,7 @@ from flexctrl.errors import ControllerError
 from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import bent, overturned, twirled
+from flexctrl.model.places import wandered
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
@@ -243,7 +244,8 @@ class Journey:
         if isinstance(model, Model):
             ends = (began, self.point.state)
             self.bent = bent(model, ends)
-            said = (twirled(model, ends, size), self.bent, beyond_modes(model, ends, self.books.sums.moved))
+            modal, turning = beyond_modes(model, ends, self.books.sums.moved), twirled(model, ends, size)
+            said = (turning, self.bent, modal, wandered(model, *ends))
             self.notes += tuple(note for note in said if note)
 
     @property

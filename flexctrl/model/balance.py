@@ -15,6 +15,7 @@ from flexctrl.errors import SingularMatrixError
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.paths.pivots import holds, negative_pivots
+from flexctrl.model.places import places_of
 from flexctrl.model.rounding import force_rounding, slope_terms
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
@@ -22,7 +23,19 @@ from flexctrl.model.units import geared, turning, units
 
 __all__ = ["Balance"]
 
-_LASTING = ("free", "fixed", "still", "lever", "unit", "inertia", "felt", "heaviest", "_raw_lever", "_weights")
+_LASTING = (
+    "free",
+    "fixed",
+    "still",
+    "lever",
+    "unit",
+    "inertia",
+    "felt",
+    "heaviest",
+    "_raw_lever",
+    "_weights",
+    "_wander",
+)
 _STILL, _UNFELT = 1e-12, 1e-7
 
 
@@ -124,8 +137,40 @@ class Balance:
         return self.among_free(A.tocsr())
 
     def gap(self, state: State) -> np.ndarray:
-        """Return how far the held coordinates are from their places."""
-        return np.array(list(self.held.values())) - state.q[self.fixed]
+        """Return which steps of the held coordinates would bring them to their places."""
+        away = np.array(list(self.held.values())) - self.places(state)[self.fixed]
+        return places_of(self.model).steps(state, self.fixed, away) if self._wander else away
+
+    def places(self, state: State) -> np.ndarray:
+        """Return where all coordinates are, as far as that matters to those that are held."""
+        return places_of(self.model).at(state) if self._wander else state.q
+
+    @cached_property
+    def moments(self) -> tuple[str, ...]:
+        """Rotations held about axes of space, of nodes that turn about others: what holds them has no potential."""
+        if not self._wander:
+            return ()
+        several = {k for turning in places_of(self.model).chart.rotations for k in turning.coordinates}
+        return tuple(self.model.coordinates[i] for i in self.fixed if int(i) in several)
+
+    def led(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+        """Return a stiffness of all coordinates on the free ones, those that are held keeping their places."""
+        if not self._wander:
+            return self.among_free(K)
+        return (K @ places_of(self.model).led(state, self.fixed)).tocsr()[self.free][:, self.free]
+
+    def put_back(self, state: State) -> State:
+        """Return the state in which what is held is in its place again, where axes have turned beside it."""
+        if not self._wander:
+            return state
+        step = np.zeros(self.model.n)
+        step[self.fixed] = self.gap(state)
+        return self.model.advance(state, step, self.still, 0.0)
+
+    @cached_property
+    def _wander(self) -> bool:
+        """Whether sums of steps need not tell where the held coordinates are."""
+        return self.model.large and not places_of(self.model).simple(self.fixed)
 
     def astray(self, state: State) -> float:
         """Return the largest of these, in radians or sizes of the machine."""
@@ -140,11 +185,11 @@ class Balance:
         return K[self.free][:, self.free] if self.held else K
 
     def scale(self, state: State) -> float:
-        """Return the forces at work: all loads and weights together, or what holds a freedom, if that is more [N]."""
+        """Return the forces at work: all loads and weights together, or without any what holds a freedom [N]."""
         loads = np.abs(self.model.signals.loads_at(state) @ self.u / self._raw_lever).sum()
         weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
         left = np.abs(self.force(state) / self.lever[self.free]).max(initial=0.0)
-        return float(max(loads, weights, left, self._holding(state), 1e-300))
+        return float(max(loads, weights, left, 0.0 if self.loaded else self._holding(state), 1e-300))
 
     def _holding(self, state: State) -> float:
         """The largest force that holds what is held, once it is in its place as far as stiffness tells [N]."""
@@ -191,10 +236,10 @@ class Balance:
         force = self.force(state)
         if self.astray(state) or (np.abs(force) > self.round_off(state)).any():
             return False
-        return not self._loaded or self._way(state, force) <= _STILL
+        return not self.loaded or self._way(state, force) <= _STILL
 
     @property
-    def _loaded(self) -> bool:
+    def loaded(self) -> bool:
         """Whether loads or weights are at work."""
         return bool(self.u.any()) or any(isinstance(e, Gravity | RotatingFrame) for e in self.model.effects)
 
@@ -234,7 +279,7 @@ class Balance:
             return True
         if self.relative(self._beyond(state, force), scale) > tolerance:
             return False
-        return not self._loaded or self._way(state, force) <= max(tolerance, _UNFELT)
+        return not self.loaded or self._way(state, force) <= max(tolerance, _UNFELT)
 
     def _beyond(self, state: State, force: np.ndarray) -> np.ndarray:
         return np.asarray(force - np.clip(force, *np.outer((-1.0, 1.0), self.round_off(state))))
@@ -275,7 +320,8 @@ class Balance:
 
         Loads that turn with the machine come on in proportion: held back by fixed forces they would turn against them.
         """
-        held = {i: (1.0 - done) * float(start.q[i]) + done * value for i, value in self.held.items()}
+        begun = self.places(start)
+        held = {i: (1.0 - done) * float(begun[i]) + done * value for i, value in self.held.items()}
         u = np.where(self._following, done * self.u, self.u)
         return self._again(replace(self, u=u, held=held, kept=(1.0 - done) * holding))
 

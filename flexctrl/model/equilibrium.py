@@ -15,6 +15,7 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import displaced_beyond, overturned
+from flexctrl.model.places import wandered
 from flexctrl.model.search import SMALLEST_PART, Found, Newton, follow
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite, check_number
@@ -114,7 +115,8 @@ def equilibrium(
     ----------
     model : Model
     hold : mapping of str to float, optional
-        Coordinates held at a displacement from the drawn shape [m or rad].
+        Coordinates held at a displacement from the drawn shape [m or rad], as `Model.displace` takes it. Of a node that
+        turns about several axes these are components of its rotation vector, held by moments about the axes of space.
     inputs : mapping of str to float, optional
         Constant inputs; what is not named is zero.
     start : State, optional
@@ -193,7 +195,7 @@ def rest_of(balance: Balance, found: Found) -> Rest:
     beyond = displaced_beyond(model, found.state.q) if balance.held else ""
     if not (beyond or np.isfinite(model.energy(found.state)).all()):
         beyond = overturned(model, found.state)
-    if apart := beyond or model.apart(found.state):
+    if apart := beyond or model.apart(found.state) or wandered(model, found.state):
         raise EquilibriumError(f"no equilibrium found: {apart}", found.state, residual)
     return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held)
 

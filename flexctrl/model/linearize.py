@@ -98,7 +98,7 @@ def _about(balance: Balance, state: State) -> LinearModel:
     loads = without_energy(model, balance.u)
     linear, asymmetry = _derivative(balance, state, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
-    return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state))
+    return linear.certified(certify(linear, residual, asymmetry, slope, (loads, balance.moments), model.motion, state))
 
 
 def all_free(linear: LinearModel, rest: Rest) -> LinearModel:

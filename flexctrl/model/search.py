@@ -157,7 +157,8 @@ class _Search:
         self.newton, self.balance = newton, balance
         self.shift, self.floor = shift, 1e-7 * shift
         there = balance.astray(start) == 0.0
-        self.best, self.least = start, max(balance.relative(force, self.scale), 0.0 if there else 1.0)
+        all_left = float(not there and not balance.loaded)  # nothing is at work but what is not yet in its place
+        self.best, self.least = start, max(balance.relative(force, self.scale), all_left)
         self.here = _Iterate(start, None, force, self.least)
         self.before, self.iterations, self.stalled = np.inf, 0, 0
         self.steady = self.contracting = True

@@ -106,7 +106,7 @@ class Course:
     def stiffness(self, state: State, factor: float, excess: Excess | None = None) -> sp.csr_matrix:
         """Return K of the free coordinates."""
         balance = self.at(factor)
-        return balance.among_free(balance.slope(state, excess))
+        return balance.led(state, balance.slope(state, excess))
 
     def solve(self, K: sp.csr_matrix, state: State, along: Direction, force: np.ndarray, way: float) -> Direction:
         """Return the displacement and change of λ that balance a force, ``way`` far along a direction.
@@ -129,14 +129,16 @@ class Course:
         return self.unit(self.solve(self.stiffness(state, factor), state, along, still, 1.0))
 
     def moved(self, state: State, step: np.ndarray) -> State:
-        """Return the state after a step of the free coordinates."""
-        full = np.zeros(self.balance.model.n)
-        full[self.balance.free] = step
-        return self.balance.model.advance(state, full, self.balance.still, 0.0)
+        """Return the state after a step of the free coordinates, in which those that are held keep their places."""
+        balance, full = self.balance, np.zeros(self.balance.model.n)
+        full[balance.free] = step
+        after = balance.model.advance(state, full, balance.still, 0.0)
+        return balance.put_back(after)
 
     def station(self, state: State, factor: float, along: Direction, iterations: int) -> Station:
         """Return an equilibrium with its tangent."""
-        K = self.stiffness(state, factor)
+        balance = self.at(factor)
+        K = balance.among_free(balance.slope(state))
         return Station(state, factor, self.tangent(state, factor, along), turned(K), iterations)
 
     def step(self, start: Station, along: Direction, length: float, most: int = 12) -> Station | None:

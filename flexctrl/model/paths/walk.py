@@ -8,6 +8,7 @@ from enum import Enum
 
 from flexctrl.model.paths.course import Course, Station
 from flexctrl.model.paths.critical import Gauge, branching_between, limit_between, reached
+from flexctrl.model.places import wandered
 
 __all__ = ["PathEnd", "Walk", "Walked"]
 
@@ -21,6 +22,7 @@ class PathEnd(Enum):
     REACHED = "reached what was asked for"
     POINTS = "as many points as were allowed"
     STUCK = "no equilibrium within the shortest step"
+    WANDERED = "a rotation that a Support holds alone has wandered about its axis: further states hang on the way there"
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,9 @@ class Walk:
                     end = PathEnd.STUCK
                     break
                 continue
+            if wandered(course.balance.model, there.state):
+                end = PathEnd.WANDERED
+                break
             gone = self._passed(here, there)
             if gone:
                 there, length = self._first(here, length, gone)
