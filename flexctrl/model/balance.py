@@ -15,7 +15,7 @@ from flexctrl.errors import SingularMatrixError
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.paths.pivots import holds, negative_pivots
-from flexctrl.model.places import places_of
+from flexctrl.model.places import Places, places_of
 from flexctrl.model.rounding import force_rounding, slope_terms
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
@@ -34,7 +34,7 @@ _LASTING = (
     "heaviest",
     "_raw_lever",
     "_weights",
-    "_wander",
+    "_led",
 )
 _STILL, _UNFELT = 1e-12, 1e-7
 
@@ -139,38 +139,39 @@ class Balance:
     def gap(self, state: State) -> np.ndarray:
         """Return which steps of the held coordinates would bring them to their places."""
         away = np.array(list(self.held.values())) - self.places(state)[self.fixed]
-        return places_of(self.model).steps(state, self.fixed, away) if self._wander else away
+        return self._led.steps(state, self.fixed, away) if self._led else away
 
     def places(self, state: State) -> np.ndarray:
         """Return where all coordinates are, as far as that matters to those that are held."""
-        return places_of(self.model).at(state) if self._wander else state.q
+        return self._led.at(state) if self._led else state.q
 
     @cached_property
     def moments(self) -> tuple[str, ...]:
         """Rotations held about axes of space, of nodes that turn about others: what holds them has no potential."""
-        if not self._wander:
-            return ()
-        several = {k for turning in places_of(self.model).chart.rotations for k in turning.coordinates}
+        several = {k for turning in (self._led.rotations if self._led else ()) for k in turning.coordinates}
         return tuple(self.model.coordinates[i] for i in self.fixed if int(i) in several)
 
     def led(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
         """Return a stiffness of all coordinates on the free ones, those that are held keeping their places."""
-        if not self._wander:
+        if self._led is None:
             return self.among_free(K)
-        return (K @ places_of(self.model).led(state, self.fixed)).tocsr()[self.free][:, self.free]
+        return (K @ self._led.led(state, self.fixed)).tocsr()[self.free][:, self.free]
 
     def put_back(self, state: State) -> State:
         """Return the state in which what is held is in its place again, where axes have turned beside it."""
-        if not self._wander:
+        if self._led is None:
             return state
         step = np.zeros(self.model.n)
         step[self.fixed] = self.gap(state)
         return self.model.advance(state, step, self.still, 0.0)
 
     @cached_property
-    def _wander(self) -> bool:
-        """Whether sums of steps need not tell where the held coordinates are."""
-        return self.model.large and not places_of(self.model).simple(self.fixed)
+    def _led(self) -> Places | None:
+        """The places of those held coordinates which sums of steps do not tell; None if there are none."""
+        if not (self.model.large and self.held):
+            return None
+        found = places_of(self.model).among(self.fixed.tolist())
+        return None if found.simple else found
 
     def astray(self, state: State) -> float:
         """Return the largest of these, in radians or sizes of the machine."""

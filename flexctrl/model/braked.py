@@ -22,7 +22,7 @@ from flexctrl.model.equilibrium import Rest, equilibrium, settled
 from flexctrl.model.holding import own_coordinate, raw_place
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
-from flexctrl.model.places import places_of, standing
+from flexctrl.model.places import standing
 from flexctrl.model.rounding import force_rounding, slope_terms
 from flexctrl.model.state import State
 from flexctrl.model.units import geared, units
@@ -56,8 +56,8 @@ class Braked(Balance):
         away = np.zeros(self.model.n)
         own = np.setdiff1d(self.fixed, self.pivots)
         away[own] = [self.held[int(i)] for i in own] - self.places(state)[own]
-        if self._wander:
-            away[own] = places_of(self.model).steps(state, own, away[own])
+        if self._led:
+            away[own] = self._led.steps(state, own, away[own])
         away[self.pivots] = la.solve(self._leads(state), self.wanted - stands(self.model, self.cells, state))
         return away[self.fixed]
 
@@ -202,8 +202,7 @@ def balance_of(rest: Rest) -> Balance:
     """
     model, state = rest.model, rest.state
     numbers = {model.coordinate(name) for name in rest.held if name in model.coordinates}
-    where = standing(model, state)
-    own = {i: float(where[i]) for i in sorted(numbers | set(model.motion.frozen))}
+    own = standing(model, state, sorted(numbers | set(model.motion.frozen)))
     if not rest.brakes:
         return Balance(model, rest.inputs, own)
     cells = [raw_place(model, name) for name, _ in rest.brakes]

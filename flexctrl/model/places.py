@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,33 +33,49 @@ class Places:
     ----------
     chart : Chart
         About the drawn shape.
-    n : int
-        Degrees of freedom.
+    rotations : tuple of TurningNode
+    hinges, slides : tuple of Follower
+        What is looked at: all of the chart's, or those of some degrees of freedom.
     """
 
     chart: Chart
-    n: int
+    rotations: tuple[TurningNode, ...]
+    hinges: tuple[Follower, ...]
+    slides: tuple[Follower, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self.chart.model.n
 
     def at(self, state: State) -> np.ndarray:
         """Return where all degrees of freedom are in a state, shape (n,)."""
         found = state.q.copy()
-        for turning in self.chart.rotations:
+        for turning in self.rotations:
             theta = self.turned(turning, state)
             for k, number in enumerate(turning.coordinates):
                 if 0 <= number < self.n:
                     found[number] = theta[k]
-        for hinge in self.chart.hinges:
+        for hinge in self.hinges:
             found[hinge.freedom] = self._hinged(hinge, state)
-        for slide in self.chart.slides:
+        for slide in self.slides:
             found[slide.freedom] = self._slid(slide, state)
         return found
 
-    def simple(self, numbers: np.ndarray) -> bool:
-        """Tell whether sums of steps are the places of some degrees of freedom."""
-        chart = self.chart
-        turning = {k for rotation in chart.rotations for k in rotation.coordinates}
-        riding = {follower.freedom for follower in (*chart.hinges, *chart.slides)}
-        return not (turning | riding) & set(numbers.tolist())
+    def among(self, numbers: Iterable[int]) -> Places:
+        """Return the places of some degrees of freedom."""
+        wanted = set(numbers)
+        return replace(
+            self,
+            rotations=tuple(r for r in self.rotations if wanted & set(r.coordinates)),
+            hinges=tuple(h for h in self.hinges if h.freedom in wanted),
+            slides=tuple(s for s in self.slides if s.freedom in wanted),
+        )
+
+    @property
+    def simple(self) -> bool:
+        """Whether sums of steps are the places."""
+        return not (self.rotations or self.hinges or self.slides)
 
     def steps(self, state: State, numbers: np.ndarray, away: np.ndarray) -> np.ndarray:
         """Return which steps of some degrees of freedom move them by some displacements, all others standing still."""
@@ -79,34 +96,40 @@ class Places:
         order = {int(number): i for i, number in enumerate(numbers)}
         rates = np.zeros((len(order), self.n))
         rates[np.arange(len(order)), numbers] = 1.0
-        for turning in self.chart.rotations:
+        for turning in self.rotations:
             known = [k for k, number in enumerate(turning.coordinates) if 0 <= number < self.n]
             own = [turning.coordinates[k] for k in known]
             tangent = _inverse_tangent(self.turned(turning, state))[:, known]
             for k, number in zip(known, own, strict=True):
                 if number in order:
                     rates[order[number], own] = tangent[k]
-        for follower in (*self.chart.hinges, *self.chart.slides):
-            if follower.freedom in order:
-                rates[order[follower.freedom]] += self._carried(follower, state)
+        # what carries a hinge or a slide moves its place, too, beside its own step
+        for hinge in (h for h in self.hinges if h.freedom in order):
+            now, drawn, J = self._master(hinge, state)
+            rates[order[hinge.freedom]] += (
+                drawn @ _inverse_tangent(_since(self.chart, state, hinge.master)) - now
+            ) @ J[3:]
+        for slide in (s for s in self.slides if s.freedom in order):
+            now, drawn, J = self._master(slide, state)
+            size, moved = (
+                float(np.linalg.norm(now + drawn)),
+                state.x[slide.master] - self.chart.reference.x[slide.master],
+            )
+            mean = (now + drawn) / size
+            across = moved - mean * (mean @ moved)
+            rates[order[slide.freedom]] += (mean - now) @ J[:3] + np.cross(now, across) @ J[3:] / size
         return rates
 
-    def _carried(self, follower: Follower, state: State) -> np.ndarray:
-        """How fast a hinge's or slide's place changes with what carries it, beside its own step, shape (n,)."""
-        m, reference = follower.master, self.chart.reference
-        J = self.chart.model.motion.jacobian(self.chart.model.place(state))[6 * m : 6 * m + 6].toarray()
-        now, drawn = state.R[m] @ follower.axis, reference.R[m] @ follower.axis
-        if follower in self.chart.hinges:
-            return np.asarray((drawn @ _inverse_tangent(_since(self.chart, state, m)) - now) @ J[3:])
-        size = float(np.linalg.norm(now + drawn))
-        mean, moved = (now + drawn) / size, state.x[m] - reference.x[m]
-        across = moved - mean * (mean @ moved)
-        return np.asarray((mean - now) @ J[:3] + np.cross(now, across) @ J[3:] / size)
+    def _master(self, follower: Follower, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The axis of a hinge or slide now and as drawn, and the rates of the node that carries it."""
+        m, model = follower.master, self.chart.model
+        J = model.motion.jacobian(model.place(state))[6 * m : 6 * m + 6].toarray()
+        return state.R[m] @ follower.axis, self.chart.reference.R[m] @ follower.axis, J
 
     def wandered(self, state: State) -> tuple[float, str]:
         """Return by how much a rotation has wandered about an axis about which its spin is held, and which has most."""
         found = [(0.0, "")]
-        for turning in self.chart.rotations:
+        for turning in (r for r in self.rotations if max(r.coordinates) >= self.n):
             theta = self.turned(turning, state)
             for k, number in enumerate(turning.coordinates):
                 if number >= self.n:
@@ -141,19 +164,22 @@ class Places:
         return along + float(mean @ (state.x[m] - reference.x[m]))
 
 
-def standing(model: Model, state: State) -> np.ndarray:
-    """Return where all degrees of freedom are, from the drawn shape, shape (n,).
+def standing(model: Model, state: State, numbers: Sequence[int]) -> dict[int, float]:
+    """Return where some degrees of freedom are, from the drawn shape.
 
     Parameters
     ----------
     model : Model
     state : State
+    numbers : sequence of int
 
     Returns
     -------
-    numpy.ndarray, shape (n,)
+    dict of int to float
+        By number.
     """
-    return places_of(model).at(state) if model.large else state.q
+    where = places_of(model).among(numbers).at(state) if model.large else state.q
+    return {number: float(where[number]) for number in numbers}
 
 
 def wandered(model: Model, *states: State) -> str:
@@ -210,5 +236,6 @@ def places_of(model: Model) -> Places:
 
     known: Places | None = model.__dict__.get("_places")
     if known is None:
-        known = model.__dict__["_places"] = Places(chart_of(model, model.rest), model.n)
+        chart = chart_of(model, model.rest)
+        known = model.__dict__["_places"] = Places(chart, chart.rotations, chart.hinges, chart.slides)
     return known
