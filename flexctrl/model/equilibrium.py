@@ -14,7 +14,7 @@ from flexctrl.errors import EquilibriumError, StructureError, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.model import Model
-from flexctrl.model.overturned import displaced_beyond, overturned
+from flexctrl.model.overturned import bent, displaced_beyond, overturned
 from flexctrl.model.places import wandered
 from flexctrl.model.search import SMALLEST_PART, Found, Newton, follow
 from flexctrl.model.state import State
@@ -82,6 +82,12 @@ class Rest:
     def stable(self) -> bool:
         """Whether no small disturbance alone makes the machine leave, be it by divergence or by flutter."""
         return self.unstable == 0
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of it: an element that bends by more than a radian, which is too far for one."""
+        said = bent(self.model, [self.state]) if self.model.large else ""
+        return (said,) if said else ()
 
     def plot(self) -> Figure:
         """Draw the machine at rest over the machine as drawn; small displacements are enlarged.

@@ -37,6 +37,16 @@ def test_an_end_held_at_an_angle_bends_the_beam_to_an_arc(elements, angle):
     rest = fc.equilibrium(cantilever(elements), hold={f"b_{elements}_ry": -angle})
     arc = np.array([np.sin(angle), 1.0 - np.cos(angle)]) / angle
     assert list(rest.outputs.values()) == pytest.approx(arc, abs=4e-3 / elements)
+    assert not rest.notes
+
+
+@pytest.mark.parametrize(("angle", "told"), [(0.9, False), (1.2, True)])
+def test_an_element_that_bends_too_far_is_told(angle, told):
+    model = cantilever(1)
+    rest = fc.equilibrium(model, hold={"b_1_ry": -angle})
+    run = fc.simulate(model, until=1e-3, start=rest)
+    for notes in (rest.notes, run.report.notes):
+        assert any("element 1 of b is turned by 1.2 rad" in note for note in notes) == told
 
 
 @pytest.mark.parametrize("effects", [(), (fc.Gravity(),)], ids=["alone", "with its weight"])
