@@ -122,19 +122,34 @@ class Balance:
 
     def among(self, state: State, force: np.ndarray) -> np.ndarray:
         """Return what forces on all coordinates come to on the free ones."""
-        return force[self.free]
+        return force[self.free] if self._led is None else np.asarray(self._change(state).T @ force)[self.free]
 
     def whole(self, state: State, step: np.ndarray) -> np.ndarray:
         """Return the step of all coordinates in which the free ones and those that are held go theirs."""
-        return step
+        return step if self._led is None else np.asarray(self._change(state) @ step)
 
     def basis(self, state: State) -> sp.csc_matrix:
         """Return the steps of all coordinates for one of each free one, shape (n, free)."""
-        return sp.identity(self.model.n, format="csc")[:, self.free]
+        return self._change(state).tocsc()[:, self.free]
 
     def seen(self, state: State, A: sp.spmatrix) -> sp.csr_matrix:
         """Return what a matrix on all coordinates comes to on the free ones."""
-        return self.among_free(A.tocsr())
+        if self._led is None:
+            return self.among_free(A.tocsr())
+        change = self._change(state)
+        return self.among_free((change.T @ A @ change).tocsr())
+
+    def _change(self, state: State) -> sp.csr_matrix:
+        """Steps of the coordinates from steps in which what is held keeps its place, beside its own."""
+        if self._led is None:
+            return sp.identity(self.model.n, format="csr")
+        return self._led.change(state, self.fixed)
+
+    def turning(self, state: State, force: np.ndarray) -> sp.csr_matrix:
+        """Return how what holds against forces on all coordinates turns with their steps."""
+        if self._led is None:
+            return sp.csr_matrix((self.model.n, self.model.n))
+        return self._led.turning(state, self.fixed, force)
 
     def gap(self, state: State) -> np.ndarray:
         """Return which steps of the held coordinates would bring them to their places."""
@@ -144,18 +159,6 @@ class Balance:
     def places(self, state: State) -> np.ndarray:
         """Return where all coordinates are, as far as that matters to those that are held."""
         return self._led.at(state) if self._led else state.q
-
-    @cached_property
-    def moments(self) -> tuple[str, ...]:
-        """Rotations held about axes of space, of nodes that turn about others: what holds them has no potential."""
-        several = {k for turning in (self._led.rotations if self._led else ()) for k in turning.coordinates}
-        return tuple(self.model.coordinates[i] for i in self.fixed if int(i) in several)
-
-    def led(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
-        """Return a stiffness of all coordinates on the free ones, those that are held keeping their places."""
-        if self._led is None:
-            return self.among_free(K)
-        return (K @ self._led.led(state, self.fixed)).tocsr()[self.free][:, self.free]
 
     def put_back(self, state: State) -> State:
         """Return the state in which what is held is in its place again, where axes have turned beside it."""
@@ -178,8 +181,15 @@ class Balance:
         return float(np.abs(self.gap(state) / self.unit[self.fixed]).max(initial=0.0))
 
     def slope(self, state: State, excess: Excess | None = None) -> sp.csr_matrix:
-        """Return K of all coordinates, geometric stiffness included."""
-        return -self.model.slope(state, self.still, self.still, (1.0, 0.0, 0.0), self.u, excess)
+        """Return K of all coordinates, geometric stiffness included; what holds turns with what it holds."""
+        K = -self.model.slope(state, self.still, self.still, (1.0, 0.0, 0.0), self.u, excess)
+        if self._led is None:
+            return K
+        force = self.whole_force(state)
+        if excess is not None:
+            force = force + self.model.motion.collect(state, excess.raw)
+        change = self._change(state)
+        return (change.T @ (K - self.turning(state, force)) @ change).tocsr()
 
     def among_free(self, K: sp.csr_matrix) -> sp.csr_matrix:
         """Return the rows and columns of the free coordinates."""
@@ -246,7 +256,7 @@ class Balance:
 
     def round_off(self, state: State) -> np.ndarray:
         """Return the largest forces on the free coordinates that may be rounding alone."""
-        return self.among(state, force_rounding(self.model, state, self.u))
+        return np.asarray(abs(self._change(state)).T @ force_rounding(self.model, state, self.u))[self.free]
 
     def holds(self, state: State, K: sp.csr_matrix) -> bool:
         """Tell whether a stiffness K of all coordinates resists every displacement of the free ones."""
@@ -258,7 +268,11 @@ class Balance:
         return negative_pivots(self.among_free(K), self._terms(state, K))
 
     def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
-        return self.among_free(slope_terms(self.model, state, self.u, K))
+        terms = slope_terms(self.model, state, self.u, K)
+        if self._led is None:
+            return self.among_free(terms)
+        change = abs(self._change(state))
+        return self.among_free((change.T @ terms @ change).tocsr())
 
     def linear_step(self, state: State, K: sp.csr_matrix) -> np.ndarray:
         """Return where the forces and the held coordinates would lead all coordinates, did K stay as it is."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
@@ -22,7 +23,7 @@ from flexctrl.model.equilibrium import Rest, equilibrium, settled
 from flexctrl.model.holding import own_coordinate, raw_place
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
-from flexctrl.model.places import standing
+from flexctrl.model.places import Places, places_of, standing
 from flexctrl.model.rounding import force_rounding, slope_terms
 from flexctrl.model.state import State
 from flexctrl.model.units import geared, units
@@ -56,10 +57,24 @@ class Braked(Balance):
         away = np.zeros(self.model.n)
         own = np.setdiff1d(self.fixed, self.pivots)
         away[own] = [self.held[int(i)] for i in own] - self.places(state)[own]
-        if self._led:
-            away[own] = self._led.steps(state, own, away[own])
+        if self.model.large and own.size:
+            away[own] = self._own.steps(state, own, away[own])
         away[self.pivots] = la.solve(self._leads(state), self.wanted - stands(self.model, self.cells, state))
         return away[self.fixed]
+
+    def places(self, state: State) -> np.ndarray:
+        """Return where all coordinates are, as far as that matters to those that are held."""
+        return self._own.at(state) if self.model.large else state.q
+
+    @cached_property
+    def _own(self) -> Places:
+        """The places of coordinates that are held by themselves."""
+        return places_of(self.model).among(np.setdiff1d(self.fixed, self.pivots).tolist())
+
+    @cached_property
+    def _led(self) -> None:
+        """Coordinates that are held by themselves are so by what works on their steps."""
+        return None
 
     def among(self, state: State, force: np.ndarray) -> np.ndarray:
         """Return what forces on all coordinates come to on the free ones, the others giving way."""

@@ -26,12 +26,6 @@ _ROUND_OFF = 1e-12
 _LOWEST = 20
 _VANISHING, _CAUTION = (1e-12, 3e-13), 100.0
 
-_EFFECT = "an effect whose force is not the gradient of its energy"
-_HOLDING = (
-    "the moment that holds {} about an axis of space has none, as the node turns about others too; hold all its "
-    "rotations, or let go and take the moment for an input (Torque)"
-)
-
 
 def taylor_slope(force: Callable[[np.ndarray], np.ndarray], K: sp.spmatrix, scale: np.ndarray) -> float:
     """Return the slope of the Taylor remainder of a force along a fixed, mixed direction, to and fro.
@@ -79,24 +73,22 @@ def certify(
     residual: float,
     asymmetry: float,
     slope: float,
-    unsymmetric: tuple[tuple[str, ...], tuple[str, ...]],
+    loads: tuple[str, ...],
     motion: Motion,
     state: State,
 ) -> Certificate:
     """Return the certificate of a linear model.
-
-    What makes K unsymmetric are loads without a potential; moments that hold rotations may be in the way.
 
     Raises
     ------
     LinearizationError
         If a point of it fails: says which and what to do.
     """
-    definiteness, (loads, moments) = _smallest_pivot(linear.M), unsymmetric
+    definiteness = _smallest_pivot(linear.M)
     if asymmetry > _ASYMMETRY and not loads:
         raise LinearizationError(
             f"linearize: K is not symmetric ({asymmetry:.1e} of its largest entry) though every load has a potential: "
-            + (_HOLDING.format(" and ".join(moments)) if moments else _EFFECT)
+            "an effect whose force is not the gradient of its energy"
         )
     if definiteness < -1e-10:
         raise LinearizationError(f"linearize: M is not positive (pivot {definiteness:.1e} after scaling)")

@@ -121,8 +121,8 @@ def equilibrium(
     ----------
     model : Model
     hold : mapping of str to float, optional
-        Coordinates held at a displacement from the drawn shape [m or rad], as `Model.displace` takes it. Of a node that
-        turns about several axes these are components of its rotation vector, held by moments about the axes of space.
+        Coordinates held at a displacement from the drawn shape [m or rad], as `Model.displace` takes it: of a node that
+        turns about several axes these are components of its rotation vector.
     inputs : mapping of str to float, optional
         Constant inputs; what is not named is zero.
     start : State, optional

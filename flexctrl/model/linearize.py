@@ -98,7 +98,7 @@ def _about(balance: Balance, state: State) -> LinearModel:
     loads = without_energy(model, balance.u)
     linear, asymmetry = _derivative(balance, state, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
-    return linear.certified(certify(linear, residual, asymmetry, slope, (loads, balance.moments), model.motion, state))
+    return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state))
 
 
 def all_free(linear: LinearModel, rest: Rest) -> LinearModel:
@@ -183,7 +183,10 @@ def _refuse_spins(model: Model, held: Sequence[str]) -> None:
 
 def _derivative(balance: Balance, state: State, unsymmetric: bool) -> tuple[LinearModel, float]:
     model, u, unit = balance.model, balance.u, sp.diags(balance.unit[balance.free])
-    M, C, K = (balance.seen(state, A) for A in tangents(model, state, u))
+    M, C, K = tangents(model, state, u)
+    if (held := balance.turning(state, balance.whole_force(state))).nnz:
+        K = K - held
+    M, C, K = (balance.seen(state, A) for A in (M, C, K))
     largest = float(abs(unit @ K @ unit).max()) if K.nnz else 0.0
     asymmetry = float(abs(unit @ (K - K.T) @ unit).max()) / max(largest, 1e-300) if K.nnz else 0.0
     pull = 0.0 if balance.idle(model.rest) else balance.pull(state)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Places", "places_of", "standing", "wandered"]
 
 _TURN = 2.0 * np.pi
-_STILL, _WANDERED = 1e-9, 0.02
+_STILL, _WANDERED, _SMALL = 1e-9, 0.02, 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,15 +81,31 @@ class Places:
         """Return which steps of some degrees of freedom move them by some displacements, all others standing still."""
         return np.asarray(np.linalg.solve(self._rates(state, numbers)[:, numbers], away))
 
-    def led(self, state: State, numbers: np.ndarray) -> sp.csr_matrix:
-        """Return how all degrees of freedom step as others do where some keep their places, shape (n, n)."""
+    def change(self, state: State, numbers: np.ndarray) -> sp.csr_matrix:
+        """Return the steps of all in which some keep their places, beside steps of their own, shape (n, n)."""
         rates = self._rates(state, numbers)
         follow = -np.linalg.solve(rates[:, numbers], rates)
         follow[:, numbers] = 0.0
         rows = sp.csr_matrix((np.ones(len(numbers)), (numbers, np.arange(len(numbers)))), (self.n, len(numbers)))
-        keep = np.ones(self.n)
-        keep[numbers] = 0.0
-        return (sp.diags(keep) + rows @ sp.csr_matrix(follow)).tocsr()
+        return (sp.identity(self.n) + rows @ sp.csr_matrix(follow)).tocsr()
+
+    def turning(self, state: State, numbers: np.ndarray, force: np.ndarray) -> sp.csr_matrix:
+        """Return how what holds some degrees of freedom against forces turns with the steps of all, shape (n, n).
+
+        That is Σ λ ∂R/∂q with R the rates of places and f + Rᵀ λ = 0 on what is held; by differences.
+        """
+        rates = self._rates(state, numbers)
+        pulls = -np.linalg.solve(rates[:, numbers].T, force[numbers])
+        found = sp.lil_matrix((self.n, self.n))
+        for j in np.flatnonzero((rates != 0.0).any(axis=0)) if pulls.any() else ():
+            step = np.zeros(self.n)
+            step[j] = _SMALL
+            ahead, behind = (self._rates(self._moved(state, sign * step), numbers) for sign in (1.0, -1.0))
+            found[:, j] = ((ahead - behind).T @ pulls / (2.0 * _SMALL))[:, None]
+        return found.tocsr()
+
+    def _moved(self, state: State, step: np.ndarray) -> State:
+        return self.chart.model.advance(state, step, state.v, state.t)
 
     def _rates(self, state: State, numbers: np.ndarray) -> np.ndarray:
         """How fast the places of some degrees of freedom change with the steps of all, shape (some, n)."""

@@ -41,7 +41,10 @@ def leaving(balance: Balance, state: State) -> int:
         Under loads without a potential, if the motions cannot be told; see `growing`.
     """
     if without_energy(balance.model, balance.u):
-        M, C, K = (balance.seen(state, A).tocsc() for A in tangents(balance.model, state, balance.u))
+        M, C, K = tangents(balance.model, state, balance.u)
+        if (held := balance.turning(state, balance.whole_force(state))).nnz:
+            K = K - held
+        M, C, K = (balance.seen(state, A).tocsc() for A in (M, C, K))
         if K.shape[0] and asymmetry(K, symmetric(K)[0]) > ROUND_OFF:
             return growing(_unseen(balance, M, C, K))
     return balance.unstable(state)

@@ -107,11 +107,28 @@ def test_what_rides_on_a_beam_is_held_in_one_place(joint, at):
         assert places_of(model).at(found.state)[model.coordinate(f"car_0_{joint}")] == pytest.approx(at, abs=1e-9)
 
 
-def test_a_linear_model_about_a_moment_without_a_potential_says_so():
-    model = beam()
-    rest = fc.equilibrium(model, hold={"b_8_rz": 1.0}, inputs={"Fz": 40.0})
-    with pytest.raises(fc.errors.LinearizationError, match="the moment that holds b_8_rz about an axis of space"):
-        fc.linearize(model, at=rest)
+def test_a_linear_model_about_a_held_rotation_is_the_slope_of_what_is_held_there():
+    """What holds turns with the machine: by differences of equilibria under a force beside."""
+    model, hold = beam(), {"b_8_rz": 1.0}
+    rest = fc.equilibrium(model, hold=hold, inputs={"Fz": 40.0})
+    linear = fc.linearize(model, at=rest)
+    pushed = [fc.equilibrium(model, hold=hold, inputs={"Fz": 40.0, "Fy": d}, start=rest.state) for d in (1e-4, -1e-4)]
+    moved = (pushed[0].outputs["py"] - pushed[1].outputs["py"]) / 2e-4
+    flexible = linear.Cq @ np.linalg.solve(linear.K.toarray(), linear.B)
+    fy, py = model.inputs.index("Fy"), model.outputs.index("py")
+    assert flexible[py, fy] == pytest.approx(moved, rel=1e-5)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.2])
+def test_holding_two_of_three_rotations_does_not_hang_on_how_the_frame_is_turned(turn):
+    """A circular arc of √5 rad under a constant moment, its plane turned about the beam; the twist is left free."""
+    away = np.sqrt(5.0) * np.array([np.sin(turn), np.cos(turn)])
+    rest = fc.equilibrium(beam(), hold={"b_8_ry": away[0], "b_8_rz": away[1]})
+    size = np.hypot(*away)
+    along, across = 2.0 * np.sin(size) / size, 2.0 * (1.0 - np.cos(size)) / size
+    side = np.array([away[1], -away[0]]) / size
+    assert list(rest.outputs.values()) == pytest.approx([along, *(across * side)], abs=2e-3)
+    assert rest.iterations < 100
 
 
 def test_a_rotation_that_a_support_holds_alone_is_told_where_it_wanders():

@@ -101,12 +101,12 @@ class Course:
 
     def push(self, state: State) -> np.ndarray:
         """Return ∂f/∂λ on the free coordinates."""
-        return self.balance.model.loads(state, self.load)[self.balance.free]
+        return self.balance.among(state, self.balance.model.loads(state, self.load))
 
     def stiffness(self, state: State, factor: float, excess: Excess | None = None) -> sp.csr_matrix:
         """Return K of the free coordinates."""
         balance = self.at(factor)
-        return balance.led(state, balance.slope(state, excess))
+        return balance.among_free(balance.slope(state, excess))
 
     def solve(self, K: sp.csr_matrix, state: State, along: Direction, force: np.ndarray, way: float) -> Direction:
         """Return the displacement and change of λ that balance a force, ``way`` far along a direction.
@@ -132,13 +132,12 @@ class Course:
         """Return the state after a step of the free coordinates, in which those that are held keep their places."""
         balance, full = self.balance, np.zeros(self.balance.model.n)
         full[balance.free] = step
-        after = balance.model.advance(state, full, balance.still, 0.0)
+        after = balance.model.advance(state, balance.whole(state, full), balance.still, 0.0)
         return balance.put_back(after)
 
     def station(self, state: State, factor: float, along: Direction, iterations: int) -> Station:
         """Return an equilibrium with its tangent."""
-        balance = self.at(factor)
-        K = balance.among_free(balance.slope(state))
+        K = self.stiffness(state, factor)
         return Station(state, factor, self.tangent(state, factor, along), turned(K), iterations)
 
     def step(self, start: Station, along: Direction, length: float, most: int = 12) -> Station | None:
@@ -176,6 +175,6 @@ class Course:
             return after, None
         full = np.zeros(model.n)
         full[balance.free] = delta.place
-        _, target = mixed.stress(state, full)
+        _, target = mixed.stress(state, balance.whole(state, full))
         now, _ = mixed.stress(after, balance.still)
         return after, mixed.excess(after, target - now)

@@ -185,8 +185,8 @@ def equilibrium_path(
     inputs : mapping of str to float, optional
         Constant inputs.
     hold : mapping of str to float, optional
-        Coordinates held at a displacement from the drawn shape [m or rad], as `Model.displace` takes it. Of a node that
-        turns about several axes these are components of its rotation vector, held by moments about the axes of space.
+        Coordinates held at a displacement from the drawn shape [m or rad], as `Model.displace` takes it: of a node that
+        turns about several axes these are components of its rotation vector.
     start : State or PathPoint, optional
         Where to begin: a shape near the first equilibrium; a point of another path; or a `BranchPoint`, from
         which the path leaves along its mode. Default: the shape as drawn.
