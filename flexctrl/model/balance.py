@@ -149,7 +149,7 @@ class Balance:
         """Return how what holds against forces on all coordinates turns with their steps."""
         if self._led is None:
             return sp.csr_matrix((self.model.n, self.model.n))
-        return self._led.turning(state, self.fixed, force)
+        return self._led.turning(state, self.fixed, self._led.holding(state, self.fixed, force))
 
     def gap(self, state: State) -> np.ndarray:
         """Return which steps of the held coordinates would bring them to their places."""
@@ -174,7 +174,7 @@ class Balance:
         if not (self.model.large and self.held):
             return None
         found = places_of(self.model).among(self.fixed.tolist())
-        return None if found.simple else found
+        return found if found.led else None
 
     def astray(self, state: State) -> float:
         """Return the largest of these, in radians or sizes of the machine."""

@@ -21,6 +21,7 @@ from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.balance import Balance
 from flexctrl.model.equilibrium import Rest, equilibrium, settled
 from flexctrl.model.holding import own_coordinate, raw_place
+from flexctrl.model.linkages.chart import inverse_tangents
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.places import Places, places_of, standing
@@ -31,7 +32,7 @@ from flexctrl.structure.freedoms import check_finite
 
 __all__ = ["balance_of", "bearing", "borne", "rest_held"]
 
-_INDEPENDENT, _CLOSE = 1e-9, 1e-9
+_INDEPENDENT, _CLOSE, _LEANING = 1e-9, 1e-9, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +56,10 @@ class Braked(Balance):
     def gap(self, state: State) -> np.ndarray:
         """Return how far what is held is from its place, in displacements of the coordinates that give way to it."""
         away = np.zeros(self.model.n)
-        own = np.setdiff1d(self.fixed, self.pivots)
-        away[own] = [self.held[int(i)] for i in own] - self.places(state)[own]
-        if self.model.large and own.size:
-            away[own] = self._own.steps(state, own, away[own])
-        away[self.pivots] = la.solve(self._leads(state), self.wanted - stands(self.model, self.cells, state))
+        where = self.places(state)
+        away[self.fixed] = np.array(list(self.held.values())) - where[self.fixed]
+        off = np.concatenate([self.wanted - stands(self.model, self.cells, state), away[self._turning]])
+        away[self._given] = la.solve(self._rows(state)[:, self._given], off)
         return away[self.fixed]
 
     def places(self, state: State) -> np.ndarray:
@@ -72,8 +72,34 @@ class Braked(Balance):
         return places_of(self.model).among(np.setdiff1d(self.fixed, self.pivots).tolist())
 
     @cached_property
+    def _turning(self) -> np.ndarray:
+        """Those of them which sums of steps do not tell."""
+        own = np.setdiff1d(self.fixed, self.pivots)
+        return np.array([i for i in own if self.model.large and int(i) in self._own.led], dtype=int)
+
+    @cached_property
+    def _given(self) -> np.ndarray:
+        """The coordinates that give way to what is held."""
+        return np.concatenate([self.pivots, self._turning])
+
+    def _rows(self, state: State) -> np.ndarray:
+        """How what is held follows the coordinates, shape (held, n)."""
+        G = _slope(self.model, self.cells, state)
+        return np.vstack([G, self._own.rates(state, self._turning)]) if self._turning.size else G
+
+    def _pulls(self, state: State, force: np.ndarray) -> np.ndarray:
+        """The forces on what is held that hold it against forces on all coordinates."""
+        return np.asarray(-la.solve(self._rows(state)[:, self._given].T, force[self._given]))
+
+    def turning(self, state: State, force: np.ndarray) -> sp.csr_matrix:
+        """Return how what holds coordinates against forces on all of them turns with their steps."""
+        if not self._turning.size:
+            return sp.csr_matrix((self.model.n, self.model.n))
+        return self._own.turning(state, self._turning, self._pulls(state, force)[len(self.pivots) :])
+
+    @cached_property
     def _led(self) -> None:
-        """Coordinates that are held by themselves are so by what works on their steps."""
+        """Nothing beside: all that is held is in `_rows`."""
         return None
 
     def among(self, state: State, force: np.ndarray) -> np.ndarray:
@@ -99,14 +125,14 @@ class Braked(Balance):
         if excess is not None:
             force = force + motion.collect(state, excess.raw)
         if self.model.large and not motion.plain:
-            K = K - sp.csr_matrix(motion.stiffening(state, self.brakes(state, force)))
+            K = K - sp.csr_matrix(motion.stiffening(state, self.brakes(state, force))) - self.turning(state, force)
         change = self._change(state)
         return (change.T @ K @ change).tocsr()
 
     def brakes(self, state: State, force: np.ndarray) -> np.ndarray:
         """Return the raw forces that hold against forces on all coordinates."""
         raw = np.zeros(self.model.motion.raw)
-        raw[self.cells] = -la.solve(self._leads(state).T, force[self.pivots])
+        raw[self.cells] = self._pulls(state, force)[: len(self.pivots)]
         return raw
 
     def round_off(self, state: State) -> np.ndarray:
@@ -126,17 +152,13 @@ class Braked(Balance):
         change = abs(self._change(state))
         return self.among_free((change.T @ slope_terms(self.model, state, self.u, K) @ change).tocsr())
 
-    def _leads(self, state: State) -> np.ndarray:
-        """How what is held follows the coordinates that give way, shape (k, k)."""
-        return _slope(self.model, self.cells, state)[:, self.pivots]
-
     def _change(self, state: State) -> sp.csr_matrix:
         """Steps of the coordinates from steps in which what is held stands in for those that give way: B."""
-        G = _slope(self.model, self.cells, state)
-        follow = -la.solve(G[:, self.pivots], G)
-        follow[:, self.pivots] = 0.0
-        rows = sp.csr_matrix((np.ones(len(self.pivots)), (self.pivots, np.arange(len(self.pivots)))), (G.shape[1],) * 2)
-        return (sp.identity(G.shape[1], format="csr") + rows[:, : len(self.pivots)] @ sp.csr_matrix(follow)).tocsr()
+        given, rows = self._given, self._rows(state)
+        follow = -la.solve(rows[:, given], rows)
+        follow[:, given] = 0.0
+        at = sp.csr_matrix((np.ones(given.size), (given, np.arange(given.size))), (self.model.n, given.size))
+        return (sp.identity(self.model.n, format="csr") + at @ sp.csr_matrix(follow)).tocsr()
 
 
 def rest_held(model: Model, hold: Mapping[str, float], inputs: Mapping[str, float]) -> Rest:
@@ -320,3 +342,23 @@ def _check_places(model: Model, lost: Mapping[str, float], state: State) -> None
                 state,
                 0.0,
             )
+    for name, cell in zip(lost, cells.tolist(), strict=True):
+        if model.large and cell < model.motion.source_base and cell % 6 > 2 and _leaning(model, cells, state, cell):
+            raise EquilibriumError(
+                f"no equilibrium found with {name} held: it turns about other axes, too, and is no coordinate, so that "
+                "a moment about an axis of space would hold a spin, no angle; hold all its rotations, or those of the "
+                "node that carries it and the hinge's turn",
+                state,
+                0.0,
+            )
+
+
+def _leaning(model: Model, cells: np.ndarray, state: State, cell: int) -> bool:
+    """Whether a spin is not the rate of the component of a rotation vector, some of which are free."""
+    first = cell - cell % 6 + 3
+    if {first, first + 1, first + 2} <= set(cells.tolist()):
+        return False
+    theta = Rotation.from_matrix(state.R[cell // 6]).as_rotvec()
+    rates = inverse_tangents(np.tile(theta, (3, 1)), np.eye(3)).T[cell % 6 - 3]
+    rates[cell % 6 - 3] -= 1.0
+    return bool(np.abs(rates).max() > _LEANING)

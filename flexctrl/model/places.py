@@ -73,42 +73,46 @@ class Places:
         )
 
     @property
-    def simple(self) -> bool:
-        """Whether sums of steps are the places."""
-        return not (self.rotations or self.hinges or self.slides)
+    def led(self) -> set[int]:
+        """Degrees of freedom whose places are no sums of steps."""
+        turning = {k for rotation in self.rotations for k in rotation.coordinates if 0 <= k < self.n}
+        return turning | {follower.freedom for follower in (*self.hinges, *self.slides)}
 
     def steps(self, state: State, numbers: np.ndarray, away: np.ndarray) -> np.ndarray:
         """Return which steps of some degrees of freedom move them by some displacements, all others standing still."""
-        return np.asarray(np.linalg.solve(self._rates(state, numbers)[:, numbers], away))
+        return np.asarray(np.linalg.solve(self.rates(state, numbers)[:, numbers], away))
 
     def change(self, state: State, numbers: np.ndarray) -> sp.csr_matrix:
         """Return the steps of all in which some keep their places, beside steps of their own, shape (n, n)."""
-        rates = self._rates(state, numbers)
+        rates = self.rates(state, numbers)
         follow = -np.linalg.solve(rates[:, numbers], rates)
         follow[:, numbers] = 0.0
         rows = sp.csr_matrix((np.ones(len(numbers)), (numbers, np.arange(len(numbers)))), (self.n, len(numbers)))
         return (sp.identity(self.n) + rows @ sp.csr_matrix(follow)).tocsr()
 
-    def turning(self, state: State, numbers: np.ndarray, force: np.ndarray) -> sp.csr_matrix:
-        """Return how what holds some degrees of freedom against forces turns with the steps of all, shape (n, n).
+    def holding(self, state: State, numbers: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return the forces λ on the places of some degrees of freedom that hold them, f + Rᵀ λ = 0."""
+        return np.asarray(-np.linalg.solve(self.rates(state, numbers)[:, numbers].T, force[numbers]))
 
-        That is Σ λ ∂R/∂q with R the rates of places and f + Rᵀ λ = 0 on what is held; by differences.
+    def turning(self, state: State, numbers: np.ndarray, pulls: np.ndarray) -> sp.csr_matrix:
+        """Return how forces λ on the places of some degrees of freedom turn with the steps of all, shape (n, n).
+
+        That is Σ λ ∂R/∂q with R the rates of places; by differences.
         """
-        rates = self._rates(state, numbers)
-        pulls = -np.linalg.solve(rates[:, numbers].T, force[numbers])
+        rates = self.rates(state, numbers)
         found = sp.lil_matrix((self.n, self.n))
         for j in np.flatnonzero((rates != 0.0).any(axis=0)) if pulls.any() else ():
             step = np.zeros(self.n)
             step[j] = _SMALL
-            ahead, behind = (self._rates(self._moved(state, sign * step), numbers) for sign in (1.0, -1.0))
+            ahead, behind = (self.rates(self._moved(state, sign * step), numbers) for sign in (1.0, -1.0))
             found[:, j] = ((ahead - behind).T @ pulls / (2.0 * _SMALL))[:, None]
         return found.tocsr()
 
     def _moved(self, state: State, step: np.ndarray) -> State:
         return self.chart.model.advance(state, step, state.v, state.t)
 
-    def _rates(self, state: State, numbers: np.ndarray) -> np.ndarray:
-        """How fast the places of some degrees of freedom change with the steps of all, shape (some, n)."""
+    def rates(self, state: State, numbers: np.ndarray) -> np.ndarray:
+        """Return how fast the places of some degrees of freedom change with the steps of all, shape (some, n)."""
         order = {int(number): i for i, number in enumerate(numbers)}
         rates = np.zeros((len(order), self.n))
         rates[np.arange(len(order)), numbers] = 1.0

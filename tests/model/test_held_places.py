@@ -67,7 +67,7 @@ def test_rates_of_places_are_their_differences(joint):
         return places.at(model.advance(state, step, np.zeros(model.n), 0.0))
 
     found = np.array([(at(d * e) - at(-d * e)) / (2.0 * d) for e in np.eye(model.n)]).T
-    assert places._rates(state, np.arange(model.n)) == pytest.approx(found, abs=1e-8)
+    assert places.rates(state, np.arange(model.n)) == pytest.approx(found, abs=1e-8)
 
 
 @pytest.mark.parametrize("start", [{}, {"b_8_rx": 1.0}, {"b_8_ry": -0.7}])
@@ -147,3 +147,48 @@ def test_a_rotation_that_a_support_holds_alone_is_an_angle_in_a_plane():
     run = fc.simulate(model, until=0.5, inputs={"Fz": 80.0})
     assert rest.outputs["py"] == pytest.approx(0.0, abs=1e-12)
     assert not any("is held" in note for note in run.report.notes)
+
+
+def hub(shaft: float) -> tuple[fc.Structure, tuple[fc.effects.Effect, ...]]:
+    """A beam on a hub that a motor turns; its shaft is rigid (0), or of some stiffness."""
+    base = fc.RigidBody("hub", (0, 0, 0), 1.0, (0.1, 0.1, 0.1))
+    b = fc.Beam("b", (0, 0, 0), (1.5, 0, 0), SECTION, elements=3)
+    motor = fc.RotaryDrive("m", base.node, axis="z", stiffness=shaft or 1.0, inertia=0.1)
+    joints = [fc.Support(base.node, "u v w rx ry"), fc.Weld(base.node, b.start)]
+    structure = fc.Structure(
+        [base, b],
+        joints,
+        [motor],
+        [fc.Force("F", b.end, "z")],
+        [fc.Position("p" + a, b.end, a) for a in "xyz"],
+    )
+    elastic = (fc.ShaftElasticity(),) if shaft else ()
+    return structure, (fc.BeamFlexibility(), fc.LargeRotation(), *elastic)
+
+
+@pytest.mark.parametrize("hold", [{"b.end.rx": 0.5, "b.end.rz": 0.2}, {"b.end.ry": -0.7}, {"b.end.rx": 0.4}])
+def test_a_motor_behind_a_rigid_shaft_is_held_beside_rotations_as_behind_a_stiff_one(hold):
+    """0.24 m off on 1.5 m: beside a brake, rotations were held by moments about axes of space."""
+    rests = []
+    for shaft in (0.0, 1e8):
+        structure, effects = hub(shaft)
+        scene = fc.Scene(structure, effects, hold={"m_source": 0.8, **hold}, rest_inputs={"F": 15.0})
+        rests.append((scene.rest, scene.linear.modes().frequencies))
+    (rigid, slow), (stiff, same) = rests
+    assert list(rigid.outputs.values()) == pytest.approx(list(stiff.outputs.values()), abs=1e-5)
+    assert slow[:3] == pytest.approx(same[: len(slow)][:3], rel=1e-4, abs=1e-3)
+
+
+def test_a_rotation_that_follows_from_others_is_not_held_alone():
+    b = fc.Beam("b", (0, 0, 0), (2, 0, 0), SECTION, elements=3)
+    arm = fc.Beam("arm", (2, 0, 0), (3, 0, 0), SECTION, elements=2)
+    joints = [fc.Support(b.start), fc.Hinge(b.end, arm.start, "z")]
+    spring = fc.Spring("spring", arm.end, (4, 1, 0.5), stiffness=40.0, length=1.0)
+    joints += [fc.Pin(arm.end, spring.start), fc.Support(spring.end)]
+    scene = fc.Scene(
+        fc.Structure([b, arm, spring], joints),
+        (fc.BeamFlexibility(), fc.LargeRotation()),
+        hold={"arm.start.rx": 0.5},
+    )
+    with pytest.raises(fc.errors.EquilibriumError, match="would hold a spin, no angle"):
+        _ = scene.rest
