@@ -35,8 +35,9 @@ _LASTING = (
     "_raw_lever",
     "_weights",
     "_led",
+    "weighed",
 )
-_STILL, _UNFELT = 1e-12, 1e-7
+_STILL, _UNFELT, _CARRIED = 1e-12, 1e-7, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +253,22 @@ class Balance:
     @property
     def loaded(self) -> bool:
         """Whether loads or weights are at work."""
-        return bool(self.u.any()) or any(isinstance(e, Gravity | RotatingFrame) for e in self.model.effects)
+        return bool(self.u.any()) or self.weighed
+
+    @cached_property
+    def weighed(self) -> bool:
+        """Whether weights, or centrifugal forces, work on coordinates: what turns about the vertical has none."""
+        effects = self.model.effects
+        pull = max((float(np.linalg.norm(e.g)) for e in effects if isinstance(e, Gravity)), default=0.0)
+        weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
+        felt = bool(pull) and bool(weights > _CARRIED * pull * self.felt.sum())
+        return felt or any(isinstance(e, RotatingFrame) for e in effects)
+
+    def called_forth(self, state: State) -> float:
+        """Return the largest force on a coordinate if what is held went to its place and all else stood still [N]."""
+        step = np.zeros(self.model.n)
+        step[self.fixed] = self.gap(state)
+        return float(np.abs(self.slope(state) @ step / self.lever).max(initial=0.0))
 
     def round_off(self, state: State) -> np.ndarray:
         """Return the largest forces on the free coordinates that may be rounding alone."""

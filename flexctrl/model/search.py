@@ -18,7 +18,7 @@ _TARGET, _SETTLED = 1e-12, 1e-9
 _REACH = 1.0
 _CONTRACTION = 0.6
 SMALLEST_PART, _JUMP = 1e-4, 30.0
-_FREE_MOTIONS, _DUST, _TOO_FAR = 6, 8.0, 0.1
+_FREE_MOTIONS, _DUST, _TOO_FAR, _DUST_OF = 6, 8.0, 0.1, 1e-12
 _SPREAD = 100.0
 
 
@@ -153,10 +153,10 @@ class _Search:
 
     def __init__(self, newton: Newton, start: State, shift: float) -> None:
         balance = newton.balance
-        force, self.scale = balance.force(start), balance.scale(start)
+        force, there = balance.force(start), balance.astray(start) == 0.0
+        self.scale = max(balance.scale(start), 0.0 if there else _DUST_OF * balance.called_forth(start))
         self.newton, self.balance = newton, balance
         self.shift, self.floor = shift, 1e-7 * shift
-        there = balance.astray(start) == 0.0
         all_left = float(not there and not balance.loaded)  # nothing is at work but what is not yet in its place
         self.best, self.least = start, max(balance.relative(force, self.scale), all_left)
         self.here = _Iterate(start, None, force, self.least)
