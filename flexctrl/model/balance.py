@@ -123,11 +123,11 @@ class Balance:
 
     def among(self, state: State, force: np.ndarray) -> np.ndarray:
         """Return what forces on all coordinates come to on the free ones."""
-        return force[self.free] if self._led is None else np.asarray(self._change(state).T @ force)[self.free]
+        return force[self.free] if self._plain else np.asarray(self._change(state).T @ force)[self.free]
 
     def whole(self, state: State, step: np.ndarray) -> np.ndarray:
         """Return the step of all coordinates in which the free ones and those that are held go theirs."""
-        return step if self._led is None else np.asarray(self._change(state) @ step)
+        return step if self._plain else np.asarray(self._change(state) @ step)
 
     def basis(self, state: State) -> sp.csc_matrix:
         """Return the steps of all coordinates for one of each free one, shape (n, free)."""
@@ -135,10 +135,15 @@ class Balance:
 
     def seen(self, state: State, A: sp.spmatrix) -> sp.csr_matrix:
         """Return what a matrix on all coordinates comes to on the free ones."""
-        if self._led is None:
+        if self._plain:
             return self.among_free(A.tocsr())
         change = self._change(state)
         return self.among_free((change.T @ A @ change).tocsr())
+
+    @property
+    def _plain(self) -> bool:
+        """Whether what is held takes no free coordinate along: steps are as they are."""
+        return self._led is None
 
     def _change(self, state: State) -> sp.csr_matrix:
         """Steps of the coordinates from steps in which what is held keeps its place, beside its own."""
@@ -151,6 +156,10 @@ class Balance:
         if self._led is None:
             return sp.csr_matrix((self.model.n, self.model.n))
         return self._led.turning(state, self.fixed, self._led.holding(state, self.fixed, force))
+
+    def _bearing(self, state: State, force: np.ndarray) -> sp.csr_matrix:
+        """The same, with what nothing else bears."""
+        return self.turning(state, force)
 
     def gap(self, state: State) -> np.ndarray:
         """Return which steps of the held coordinates would bring them to their places."""
@@ -184,13 +193,13 @@ class Balance:
     def slope(self, state: State, excess: Excess | None = None) -> sp.csr_matrix:
         """Return K of all coordinates, geometric stiffness included; what holds turns with what it holds."""
         K = -self.model.slope(state, self.still, self.still, (1.0, 0.0, 0.0), self.u, excess)
-        if self._led is None:
+        if self._plain:
             return K
         force = self.whole_force(state)
         if excess is not None:
             force = force + self.model.motion.collect(state, excess.raw)
         change = self._change(state)
-        return (change.T @ (K - self.turning(state, force)) @ change).tocsr()
+        return (change.T @ (K - self._bearing(state, force)) @ change).tocsr()
 
     def among_free(self, K: sp.csr_matrix) -> sp.csr_matrix:
         """Return the rows and columns of the free coordinates."""
@@ -285,7 +294,7 @@ class Balance:
 
     def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
         terms = slope_terms(self.model, state, self.u, K)
-        if self._led is None:
+        if self._plain:
             return self.among_free(terms)
         change = abs(self._change(state))
         return self.among_free((change.T @ terms @ change).tocsr())

@@ -22,10 +22,9 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.equilibrium import Rest, equilibrium, settled
 from flexctrl.model.holding import own_coordinate, raw_place
 from flexctrl.model.linkages.chart import inverse_tangents
-from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.places import Places, places_of, standing
-from flexctrl.model.rounding import force_rounding, slope_terms
+from flexctrl.model.rounding import slope_terms
 from flexctrl.model.state import State
 from flexctrl.model.units import geared, units
 from flexctrl.structure.freedoms import check_finite
@@ -97,47 +96,22 @@ class Braked(Balance):
             return sp.csr_matrix((self.model.n, self.model.n))
         return self._own.turning(state, self._turning, self._pulls(state, force)[len(self.pivots) :])
 
-    @cached_property
-    def _led(self) -> None:
-        """Nothing beside: all that is held is in `_rows`."""
-        return None
+    @property
+    def _plain(self) -> bool:
+        return False
 
-    def among(self, state: State, force: np.ndarray) -> np.ndarray:
-        """Return what forces on all coordinates come to on the free ones, the others giving way."""
-        return np.asarray(self._change(state).T @ force)[self.free]
-
-    def whole(self, state: State, step: np.ndarray) -> np.ndarray:
-        """Return the step of all coordinates in which what is held goes to its place."""
-        return np.asarray(self._change(state) @ step)
-
-    def basis(self, state: State) -> sp.csc_matrix:
-        """Return the steps of all coordinates for one of each free one, shape (n, free)."""
-        return self._change(state).tocsc()[:, self.free]
-
-    def seen(self, state: State, A: sp.spmatrix) -> sp.csr_matrix:
-        """Return what a matrix on all coordinates comes to on the free ones."""
-        change = self._change(state)
-        return self.among_free((change.T @ A @ change).tocsr())
-
-    def slope(self, state: State, excess: Excess | None = None) -> sp.csr_matrix:
-        """Return K of all coordinates and of what takes the place of some; what holds turns with its levers."""
-        K, motion, force = super().slope(state, excess), self.model.motion, self.whole_force(state)
-        if excess is not None:
-            force = force + motion.collect(state, excess.raw)
-        if self.model.large and not motion.plain:
-            K = K - sp.csr_matrix(motion.stiffening(state, self.brakes(state, force))) - self.turning(state, force)
-        change = self._change(state)
-        return (change.T @ K @ change).tocsr()
+    def _bearing(self, state: State, force: np.ndarray) -> sp.csr_matrix:
+        """How all that holds turns: brakes with their levers, too."""
+        turning, motion = self.turning(state, force), self.model.motion
+        if not self.model.large or motion.plain:
+            return turning
+        return turning + sp.csr_matrix(motion.stiffening(state, self.brakes(state, force)))
 
     def brakes(self, state: State, force: np.ndarray) -> np.ndarray:
         """Return the raw forces that hold against forces on all coordinates."""
         raw = np.zeros(self.model.motion.raw)
         raw[self.cells] = self._pulls(state, force)[: len(self.pivots)]
         return raw
-
-    def round_off(self, state: State) -> np.ndarray:
-        """Return the largest forces on the free coordinates that may be rounding alone."""
-        return np.asarray(abs(self._change(state)).T @ force_rounding(self.model, state, self.u))[self.free]
 
     def part(self, start: State, holding: np.ndarray, done: float) -> Braked:
         """Return the way to this balance from a start that forces ``holding`` hold: 0 there, 1 here."""
@@ -148,7 +122,7 @@ class Braked(Balance):
 
     def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
         if not self.model.large or self.model.motion.plain:
-            return super()._terms(state, K)
+            return self.among_free(slope_terms(self.model, state, self.u, K))
         change = abs(self._change(state))
         return self.among_free((change.T @ slope_terms(self.model, state, self.u, K) @ change).tocsr())
 
