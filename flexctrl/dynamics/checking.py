@@ -14,10 +14,12 @@ from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
-from flexctrl.dynamics.notes.beside import PARTED, kept_short, told_beside
+from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, kept_short, told_beside
+from flexctrl.dynamics.notes.gap import Gap, between
 from flexctrl.dynamics.records.record import InMemory
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.setting_out import travelled
+from flexctrl.dynamics.steps import Fixed
 from flexctrl.errors import FlexctrlError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
@@ -26,6 +28,10 @@ __all__ = ["Beginning", "laid_beside"]
 
 _LONGER, _SECONDS = 2.0, 0.2
 _NEARER, _LITTLE = 0.5, 0.01
+_FARTHER = 5.0 / 3.0
+"""How far the last one is, in powers: 243 times the tolerance."""
+_ASTRAY, _FASTER = 0.1, 1.3
+"""It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
 _UNCHECKED = "how far small differences have grown is not told by another run"
 
 
@@ -109,6 +115,9 @@ def _copied(law: Controller | None) -> Controller | None:
 def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> Run:
     """Return the run with what a coarser one tells of it; where that is much, a second one has the last word.
 
+    Where they tell little, a note says whether one far coarser goes elsewhere; of steps of one length the others know
+    enough.
+
     Parameters
     ----------
     run : Run
@@ -124,19 +133,46 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     tolerance = journey.plan.tolerance
     if kept_short(journey):
         return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time), beginning)[0]
-    coarser, order = method.coarser(tolerance), run.report.order
+    coarser = method.coarser(tolerance)
     told, other = _told(run, journey, coarser, beginning)
-    quiet = told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes)
-    if quiet or other is None or other.status is Status.INTERRUPTED:
+    if other is None or other.run.status is Status.INTERRUPTED:
         return told
-    run = replace(run, checkpoint=told.checkpoint)
-    parted = told.report.error > PARTED
-    feared = told.report.error / (coarser.longer**order - 1.0) if parted else 0.0
-    nearby = method.coarser(tolerance, _NEARER)
-    nearer, second = _told(run, journey, nearby, beginning, feared)
-    if second is None or _reached(second) < _reached(other):
-        return told if second is None else _standing(told, second.checkpoint, nearby)
-    return nearer
+    quiet = told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes)
+    parted = not quiet and told.report.error > PARTED
+    if not quiet:
+        feared = told.report.error / (coarser.longer**run.report.order - 1.0) if parted else 0.0
+        told = _nearer(run, told, other, journey, method.coarser(tolerance, _NEARER), beginning, feared)
+    if told.report.error > TOLD:
+        return told
+    if parted:
+        return elsewhere(told, other.gap, journey, coarser.said)
+    if isinstance(method.pace, Fixed):
+        return told
+    farther = method.coarser(tolerance, _FARTHER)
+    standing, third = _made(told, journey, farther, beginning)
+    if third is None:
+        return told
+    grown = (farther.longer**run.report.order - 1.0) / (coarser.longer**run.report.order - 1.0)
+    astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
+    return elsewhere(standing, third.gap, journey, farther.said) if astray else standing
+
+
+@dataclass(frozen=True)
+class _Other:
+    """A run beside, and how far it is from the first: nothing where it has ended at once."""
+
+    run: Run
+    gap: Gap
+
+
+def _nearer(
+    run: Run, told: Run, other: _Other, journey: Journey, nearby: Beside, beginning: Beginning, feared: float
+) -> Run:
+    """What a second one tells, unless it ended before the first."""
+    nearer, second = _told(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning, feared)
+    if second is None:
+        return told
+    return _standing(told, second.run.checkpoint, nearby) if _reached(second.run) < _reached(other.run) else nearer
 
 
 def _reached(other: Run) -> float:
@@ -146,8 +182,18 @@ def _reached(other: Run) -> float:
 
 def _told(
     run: Run, journey: Journey, beside: Beside, beginning: Beginning, feared: float = 0.0
-) -> tuple[Run, Run | None]:
-    """The run with what one other tells, and that one, ended where it takes far longer; None if there is none."""
+) -> tuple[Run, _Other | None]:
+    """The run with what one other tells, and that one; None if there is none."""
+    run, other = _made(run, journey, beside, beginning)
+    if other is None:
+        return run, None
+    if other.run.final.t <= beginning.t:
+        return _noted(run, f"{_UNCHECKED}, which ended at t = {other.run.final.t:.3g} s"), other
+    return told_beside(run, other.run, other.gap, journey, beside.longer, feared), other
+
+
+def _made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, _Other | None]:
+    """The run with where one other stands, and that one, ended where it takes far longer; None if it tells nothing."""
     if run.final.t <= beginning.t:
         return run, None
     end, feed, start = run.final.t, beginning.again, beginning.beside(beside)
@@ -172,13 +218,13 @@ def _told(
     first = journey.origin.u
     if len(first) and len(other.u) and other.t[0] == 0.0 and not np.array_equal(first, other.u[0]):
         return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
-    run = _standing(run, other.checkpoint, beside)
+    standing = _standing(run, other.checkpoint, beside)
     if other.final.t <= beginning.t:
-        return _noted(run, f"{_UNCHECKED}, which ended at t = {other.final.t:.3g} s"), other
+        return standing, _Other(other, Gap.unseen(run))
     try:
-        return told_beside(run, other, journey, beside.longer, run.report.steps - beginning.steps, feared), other
+        return standing, _Other(other, between(run, other, journey, run.report.steps - beginning.steps))
     except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
-        return _noted(run, f"{_UNCHECKED}, whose numbers fail ({fault})"), None
+        return _noted(standing, f"{_UNCHECKED}, whose numbers fail ({fault})"), None
 
 
 def _standing(run: Run, other: Checkpoint, beside: Beside) -> Run:

@@ -21,7 +21,10 @@ from flexctrl.dynamics.march.stepper import MarchingStepper
 pytest.importorskip("llvmlite")
 
 TIGHT = fc.Tolerance(relative=1e-3, absolute=1e-10)
-PACES = {"fixed": fc.GeneralizedAlpha(2e-3), "controlled": fc.AdaptiveAlpha(first_step=1e-3)}
+PACES = {
+    "fixed": fc.Unchecked(fc.GeneralizedAlpha(2e-3)),
+    "controlled": fc.Unchecked(fc.AdaptiveAlpha(first_step=1e-3)),
+}
 LAG = fc.MotorLag({"motor": 0.02, "winch": 0.03})
 BRISTLES = fc.LuGreFriction({"motor": fc.LuGre(200.0, 0.05, 0.08, 0.1, 0.2, 0.01)})
 ADDED = {"lag": [LAG], "bristles": [BRISTLES], "both": [LAG, BRISTLES]}

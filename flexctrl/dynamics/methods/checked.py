@@ -28,11 +28,14 @@ class Beside:
     tolerance : Tolerance
     longer : float
         By how much its steps are longer, where nothing else keeps them short.
+    said : str
+        In which steps it is made.
     """
 
     method: Integrator
     tolerance: Tolerance
     longer: float
+    said: str
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,8 @@ class Checked(_Wrapped):
     for, it is therefore run once more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or
     in steps of twice the length. Of what the two are apart, a method of order p leaves 1/(rᵖ − 1) where steps are r
     times as long. It stands in ``report.error``; above 3 % a note says so, and until when the run is right to that.
-    What would be noted is asked of a second run first, half as far away (in powers): its word counts.
+    What would be noted is asked of a second run first, half as far away (in powers): its word counts. Where they tell
+    little, a note says whether a third one, under 243 times the tolerance, goes elsewhere: two may be off alike.
 
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so and for corners. Nothing is run
@@ -134,9 +138,10 @@ class Checked(_Wrapped):
         if isinstance(self.pace, Controlled):
             looser = _LOOSER**share
             easier = Tolerance(looser * tolerance.relative, looser * tolerance.absolute)
-            return Beside(self.method, easier, looser ** (1.0 / self.pace.steepness))
-        longer = 2.0**share
-        return Beside(_stepping(self.method, lambda step: longer * step), tolerance, longer)
+            said = f"under {looser:.3g} times the tolerance"
+            return Beside(self.method, easier, looser ** (1.0 / self.pace.steepness), said)
+        longer, said = 2.0**share, f"in steps {2.0**share:.2g} times as long"
+        return Beside(_stepping(self.method, lambda step: longer * step), tolerance, longer, said)
 
     def finer(self, tolerance: Tolerance, sample: float) -> Beside:
         """Return how a run is made whose steps are half as long as those that samples keep short.
@@ -153,7 +158,8 @@ class Checked(_Wrapped):
         """
         if not _changeable(self.method):
             return self.coarser(tolerance)
-        return Beside(_stepping(self.method, lambda step: 0.5 * min(step, sample)), tolerance, 0.5)
+        halved = _stepping(self.method, lambda step: 0.5 * min(step, sample))
+        return Beside(halved, tolerance, 0.5, "in half the steps")
 
 
 def _changeable(method: Any) -> bool:
