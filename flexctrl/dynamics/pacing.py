@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["controlled", "fixed"]
 
 _NEAR = 1e-9
+_HALVED = 64
+"""A step under a continuous law that falls apart into more pieces chatters: only generalised alpha slides."""
 _CAPS, _SHORTER = 2.0, 0.25
 """Steps in which a law is hit are no longer than that many that follow the impact; longer ones are cut to a share."""
 
@@ -31,13 +33,14 @@ def fixed(journey: Journey, stop: float, until: float) -> None:
         length = journey.plan.method.pace.step  # type: ignore[union-attr]
         count = max(1, math.ceil((stop - t) / length - 1e-6)) if math.isfinite(stop) else 0
         mark.size, mark.left = (stop - t) / count if count else length, count or -1
+    most = mark.rejected + _HALVED if journey.plan.feed.reacting else math.inf
     room = math.floor((until - t) / mark.size + _NEAR)
     if not room:
         if not ends_before(journey, stop):
-            _take(journey, until - t, stop)
+            _take(journey, until - t, stop, most)
         return
     lengthen(journey, mark.size)
-    _take(journey, mark.size, stop)
+    _take(journey, mark.size, stop, most)
     if mark.left > 0:
         mark.left -= 1
 
@@ -103,14 +106,18 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
         size = h = h * max(0.2, factor)
 
 
-def _take(journey: Journey, h: float, stop: float) -> None:
-    """A step of fixed length; where it does not converge, in halves."""
+def _take(journey: Journey, h: float, stop: float, most: float) -> None:
+    """A step of fixed length; where it does not converge, in halves, until so many tries are rejected in all."""
     try:
         after = journey.step(journey.point, h)
     except StepError as failure:
         journey.mark.rejected += 1
+        if journey.mark.rejected > most:
+            why = f"a step of {journey.mark.size:.3g} s fell apart into more than {_HALVED}: {failure}"
+            remedy = "the law may jump with what it reads: take AdaptiveAlpha or GeneralizedAlpha, which slide there"
+            raise StepError(failure.worst, f"{why}; {remedy}") from failure
         if h >= 2e-3 * journey.mark.size:
-            return _halved(journey, h, stop)
+            return _halved(journey, h, stop, most)
         after = _short_of_its_end(journey, h, failure)
     try:
         journey.accept(after, stop)
@@ -118,7 +125,7 @@ def _take(journey: Journey, h: float, stop: float) -> None:
         journey.mark.rejected += 1
         if h < 2e-3 * journey.mark.size:
             raise
-        _halved(journey, h, stop)
+        _halved(journey, h, stop, most)
 
 
 def _short_of_its_end(journey: Journey, h: float, failure: StepError) -> Point:
@@ -132,9 +139,9 @@ def _short_of_its_end(journey: Journey, h: float, failure: StepError) -> Point:
     raise StepError(failure.worst, why) from failure
 
 
-def _halved(journey: Journey, h: float, stop: float) -> None:
+def _halved(journey: Journey, h: float, stop: float, most: float) -> None:
     """Take a step in two; what ends the first short of its half is made up by the second."""
     end = journey.point.state.t + h
-    _take(journey, 0.5 * h, stop)
+    _take(journey, 0.5 * h, stop, most)
     if journey.status is Status.FINISHED and (left := end - journey.point.state.t) > SMALLEST * h:
-        _take(journey, left, stop)
+        _take(journey, left, stop, most)

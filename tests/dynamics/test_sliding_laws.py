@@ -184,3 +184,24 @@ def test_a_smooth_law_steps_as_it_did():
     assert run.status is fc.Status.FINISHED
     assert run["x0"] == pytest.approx(slid(run.t), abs=5e-3)
     assert not run.checkpoint.point.supply.slid
+
+
+def test_what_cannot_slide_says_so_at_once():
+    """It took an hour's chatter in steps of 20 µs; what it found until then is kept."""
+    run = fc.simulate(carts(2.0), SLIDING, until=5.0, method=fc.ConservingMidpoint(0.005))
+    assert run.status is fc.Status.FAILED
+    assert "fell apart into more than 64" in run.report.message
+    assert "take AdaptiveAlpha or GeneralizedAlpha" in run.report.message
+    assert REACHED - 0.005 < run.final.t < REACHED + 0.1
+    assert run["x0"] == pytest.approx(slid(run.t), abs=5e-3)
+
+
+def test_what_goes_through_a_jump_needs_no_sliding():
+    """The force falls from 5 to 2 N at 0.5 m: no way back."""
+    law = Law(("x0",), ("f0",), lambda t, x, y: 5.0 if y[0] < 0.5 else 2.0)
+    run = fc.simulate(carts(2.0), law, until=1.0, method=fc.ConservingMidpoint(0.005))
+    passed = np.sqrt(0.4)
+    late = run.t - passed
+    true = np.where(late < 0.0, 1.25 * run.t**2, 0.5 + 2.5 * passed * late + 0.5 * late**2)
+    assert run.status is fc.Status.FINISHED
+    assert run["x0"] == pytest.approx(true, abs=5e-3)
