@@ -11,8 +11,9 @@ import numpy as np
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.places import by_place, finite
 from flexctrl.errors import StructureError
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, viscous_force
+from flexctrl.mechanics.beam import BeamForce, viscous_force
 from flexctrl.mechanics.beam_inertia import drag
+from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion, space_inertia
 from flexctrl.structure.freedoms import check_finite, listed
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, no_force
+from flexctrl.mechanics.beam import BeamForce, no_force
+from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
@@ -65,7 +66,7 @@ class Effect:
         return _nothing()
 
     def beam_stress(self, m: BeamMotion) -> ca.SX:
-        """Stresses of a beam element that follow its strains by a linear law, in the order of `beam.stresses`."""
+        """Stresses of a beam element that follow its strains by a linear law, in the order of `strains.stresses`."""
         return _nothing(6)
 
     def spring(self, m: LineMotion) -> ca.SX:

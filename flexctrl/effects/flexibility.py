@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, elastic_force, strain_energy, stresses
+from flexctrl.mechanics.beam import BeamForce, elastic_force
+from flexctrl.mechanics.corotation import BeamMotion
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion, rope_energy, shaft_energy, shaft_force, spring_tension
+from flexctrl.mechanics.strains import strain_energy, stresses
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Part

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.effects.effect import Effect
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion
+from flexctrl.mechanics.beam import BeamForce
 from flexctrl.mechanics.beam_inertia import height_energy, weight
+from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
 from flexctrl.structure.freedoms import Vector, parse_point
 
 if TYPE_CHECKING:

@@ -13,8 +13,9 @@ from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, NodeMotion, no_force
+from flexctrl.mechanics.beam import BeamForce, no_force
 from flexctrl.mechanics.beam_inertia import offset, offset_force
+from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
 from flexctrl.structure.freedoms import Vector, parse_point
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.mechanics import component_modes
-from flexctrl.mechanics.beam import BeamForce, BeamMotion, components, work_of
+from flexctrl.mechanics.beam import BeamForce, work_of
+from flexctrl.mechanics.corotation import BeamMotion, components
 from flexctrl.mechanics.matrices import PlaneMass
 
 if TYPE_CHECKING:

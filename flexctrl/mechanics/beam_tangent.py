@@ -12,15 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from flexctrl.mechanics.beam import (
-    BeamForce,
-    BeamMotion,
-    NodeMotion,
-    OwnMotion,
-    beam_motion,
-    framed_motion,
-    whole_force,
-)
+from flexctrl.mechanics.beam import BeamForce, whole_force
+from flexctrl.mechanics.corotation import BeamMotion, NodeMotion, OwnMotion, beam_motion, framed_motion
 from flexctrl.mechanics.rotation import inverse_tangent
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from flexctrl.mechanics.matrices import PlaneMass
 if TYPE_CHECKING:
     import casadi as ca
 
-    from flexctrl.mechanics.beam import BeamMotion, OwnMotion
+    from flexctrl.mechanics.corotation import BeamMotion, OwnMotion
 
 _PLANES = ((2, 1.0, "z"), (1, -1.0, "y"))
 """Of deflection along y and along z: the end rotation that goes with it, its sign, and the axis of bending."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from flexctrl.mechanics.beam import NodeMotion, reach
+from flexctrl.mechanics.corotation import NodeMotion, reach
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -11,7 +11,7 @@ from flexctrl.effects.backlash import gaps_of
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.kernels.native import Reals, Runs, Wholes
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.mechanics.pieces import LINE_PARAMETERS, line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS
 from flexctrl.model.laws.families import winch_parameters

@@ -17,7 +17,7 @@ import numpy as np
 
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
-from flexctrl.mechanics import beam, pieces, winch
+from flexctrl.mechanics import beam, corotation, pieces, strains, winch
 from flexctrl.mechanics.beam_tangent import beam_slope
 from flexctrl.model.laws import part_kinds
 from flexctrl.model.laws.kinds import NODE_SLOT, Kind, Physics, moved, symbols_of
@@ -50,13 +50,13 @@ def _beam_stress(kind: Kind, effects: tuple[Effect, ...], symbols: ca.SX, parame
     import casadi as ca
 
     first, second = moved(kind, symbols, ca.SX(kind.width, 1), ca.SX(3, 1))
-    m = beam.beam_motion(
+    m = corotation.beam_motion(
         first, second, parameters, part_kinds.modes_in(symbols[NODE_SLOT * kind.nodes :], part_kinds.along_of(kind))
     )
-    seen, local = beam.seen_deformed(m)
+    seen, local = strains.seen_deformed(m)
     now = ca.vertcat(m.stretch, *m.theta, *m.modal[:1])
     stress = sum((e.beam_stress(local) for e in effects), ca.SX(6, 1))
-    change = ca.jtimes(stress, seen, ca.vertcat(beam.deformation_rates(m), *m.modal[1:2]))
+    change = ca.jtimes(stress, seen, ca.vertcat(strains.deformation_rates(m), *m.modal[1:2]))
     return ca.substitute(ca.vertcat(stress, change), seen, now)
 
 
@@ -70,7 +70,7 @@ def _beam_geometric(
     if modal:
         modal = modal._replace(rates=0.0 * modal.rates, accelerations=0.0 * modal.accelerations)
     slope = beam_slope(first, second, parameters, ca.SX([1, 0, 0]), lambda m: beam.stress_force(m, stress), modal)
-    m = beam.beam_motion(first, second, parameters, modal)
+    m = corotation.beam_motion(first, second, parameters, modal)
     return slope, beam.whole_force(m, beam.stress_force(m, stress))
 
 

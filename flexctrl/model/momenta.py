@@ -16,7 +16,7 @@ import numpy as np
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.mechanics.beam import PARAMETERS, NodeMotion, reach
+from flexctrl.mechanics.corotation import PARAMETERS, NodeMotion, reach
 from flexctrl.mechanics.pieces import named
 from flexctrl.model.laws.families import Family
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, moved, symbols_of

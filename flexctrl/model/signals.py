@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from flexctrl.effects.backlash import gaps_of
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.motor_lag import MotorLag
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.mechanics.pieces import line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS, paid_out
 from flexctrl.model.laws.families import winch_parameters

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 
 SLOT = 24
 

@@ -10,7 +10,7 @@ from numpy.polynomial.legendre import leggauss
 from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
-from flexctrl.mechanics import beam, beam_inertia
+from flexctrl.mechanics import beam, beam_inertia, corotation, strains
 from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, bending, plane_masses, to_space
 
 SECTION = fc.Section(
@@ -31,7 +31,7 @@ def parameters(section: fc.Section = SECTION, L: float = L, axes: np.ndarray = A
 
 
 def motion(a, b):
-    return beam.beam_motion(a, b, ca.SX(parameters()))
+    return corotation.beam_motion(a, b, ca.SX(parameters()))
 
 
 def force(share):
@@ -51,7 +51,7 @@ def height(a, b):
 
 
 def strain(a, b):
-    return beam.strain_energy(motion(a, b))
+    return strains.strain_energy(motion(a, b))
 
 
 def kinetic(a, b):
@@ -177,7 +177,7 @@ def test_a_wire_that_bends_along_arcs_is_damped_as_bending(theta):
     length, rate, wire = 2.0, 3.0, fc.Section(EA=4e6, EI_y=1.0, EI_z=1.0, GJ=1.0, rhoA=1.0, rhoJ=0.1)
 
     def share(a, b):
-        m = beam.beam_motion(a, b, ca.SX(parameters(wire, length, np.eye(3))))
+        m = corotation.beam_motion(a, b, ca.SX(parameters(wire, length, np.eye(3))))
         return beam.nodal_force(m, beam.viscous_force(m))
 
     half = 0.5 * theta

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
 from flexctrl.errors import StructureError
-from flexctrl.mechanics import beam
+from flexctrl.mechanics import beam, corotation, strains
 from flexctrl.mechanics.matrices import beam_stiffness, bending, coupling, plain_law, plane_masses, to_space
 
 RNG = np.random.default_rng(4)
@@ -33,7 +33,7 @@ def parameters() -> ca.DM:
 
 
 def motion(a, b):
-    return beam.beam_motion(a, b, ca.SX(parameters()))
+    return corotation.beam_motion(a, b, ca.SX(parameters()))
 
 
 def elastic(a, b):
@@ -42,7 +42,7 @@ def elastic(a, b):
 
 
 def strain(a, b):
-    return beam.strain_energy(motion(a, b))
+    return strains.strain_energy(motion(a, b))
 
 
 ELASTIC = kernel(elastic, 2)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
 from flexctrl.mechanics import friction
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.model.laws.kinds import DRIVE_SLOT, Kind, Shares
 from flexctrl.structure.contacts import MotorSide, Sliding, Spinning, Turning
 

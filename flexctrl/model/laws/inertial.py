@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexctrl.effects.effect import Effect
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 
 __all__ = ["seen_outside", "standing", "turning"]
 

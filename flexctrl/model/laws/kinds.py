@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
 from flexctrl.kernels.kernel import Kernel
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.model.laws.inertial import turning
 
 if TYPE_CHECKING:

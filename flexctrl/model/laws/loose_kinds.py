@@ -12,7 +12,7 @@ from flexctrl.effects.backlash import gaps_of
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import ShaftElasticity
 from flexctrl.mechanics import pieces, play
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.model.laws.families import Family, drives_family, lines_family
 from flexctrl.model.laws.kinds import Kind, Shares
 from flexctrl.model.laws.part_kinds import drive_shares, spring_pull

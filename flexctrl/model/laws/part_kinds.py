@@ -8,9 +8,9 @@ from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
-from flexctrl.mechanics import beam, beam_inertia, pieces, winch
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics import beam, beam_inertia, corotation, pieces, winch
 from flexctrl.mechanics.beam_tangent import beam_slope
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.model.laws.inertial import seen_outside, standing, turning
 from flexctrl.model.laws.kinds import DRIVE_SLOT, Kind, Shares
 
@@ -24,7 +24,7 @@ def _beam(
     import casadi as ca
 
     modal = modes_in(slot, along)
-    m = beam.beam_motion(nodes[0], nodes[1], parameters, modal)
+    m = corotation.beam_motion(nodes[0], nodes[1], parameters, modal)
     force, middle = beam.no_force(), 0.5 * (nodes[0].x + nodes[1].x)
     for effect in effects:
         force = force + effect.beam(m)
@@ -32,18 +32,18 @@ def _beam(
     felt, carried = m, ca.SX(1, 1)
     if turning(effects):
         first, second = nodes
-        felt = beam.beam_motion(seen_outside(effects, first), seen_outside(effects, second), parameters, modal)
+        felt = corotation.beam_motion(seen_outside(effects, first), seen_outside(effects, second), parameters, modal)
         parked = (seen_outside(effects, standing(first)), seen_outside(effects, standing(second)))
         still = modal._replace(rates=0.0 * modal.rates, accelerations=0.0 * modal.accelerations) if modal else ()
-        carried = beam_inertia.kinetic_energy(beam.beam_motion(*parked, parameters, still))
+        carried = beam_inertia.kinetic_energy(corotation.beam_motion(*parked, parameters, still))
     inertia = beam.whole_force(felt, beam_inertia.inertial_force(felt))
     return Shares(inertia, beam.whole_force(m, force), beam_inertia.kinetic_energy(m), stored - carried)
 
 
-def modes_in(slot: ca.SX, along: int = 0) -> beam.OwnMotion | tuple[()]:
+def modes_in(slot: ca.SX, along: int = 0) -> corotation.OwnMotion | tuple[()]:
     """Return the motion of an element's own modes; nothing where it has none."""
     values, rates, accelerations = (slot[k::DRIVE_SLOT] for k in range(3))
-    return beam.OwnMotion(values, rates, accelerations, along) if slot.numel() else ()
+    return corotation.OwnMotion(values, rates, accelerations, along) if slot.numel() else ()
 
 
 def _beam_slope(
@@ -54,7 +54,7 @@ def _beam_slope(
     seeds: ca.SX,
     along: int = 0,
 ) -> ca.SX:
-    def force(m: beam.BeamMotion) -> beam.BeamForce:
+    def force(m: corotation.BeamMotion) -> beam.BeamForce:
         return sum((e.beam(m) for e in effects), beam_inertia.inertial_force(m))
 
     return beam_slope(nodes[0], nodes[1], parameters, seeds, force, modes_in(slot, along))
@@ -179,8 +179,8 @@ def _winch(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX
     return Shares(inertia, force + ca.vertcat(ca.SX(6, 1), drag), kinetic, stored)
 
 
-BEAM = Kind("beam", 2, 6, 0, len(beam.PARAMETERS), _beam, _beam_slope)
-SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(beam.PARAMETERS + beam.SHEARING), _beam, _beam_slope)
+BEAM = Kind("beam", 2, 6, 0, len(corotation.PARAMETERS), _beam, _beam_slope)
+SHEARING_BEAM = Kind("shearing_beam", 2, 6, 0, len(corotation.PARAMETERS + corotation.SHEARING), _beam, _beam_slope)
 
 
 @cache
@@ -188,7 +188,7 @@ def modal_beam(count: int, along: int) -> Kind:
     """Return the kind of beam elements with some of their own modes in each plane, and along them."""
     name = f"beam_with_{count}_modes" + (f"_and_{along}_along" if along else "")
     physics, slope = partial(_beam, along=along), partial(_beam_slope, along=along)
-    return Kind(name, 2, 6, 2 * (count + along), len(beam.PARAMETERS), physics, slope)
+    return Kind(name, 2, 6, 2 * (count + along), len(corotation.PARAMETERS), physics, slope)
 
 
 def along_of(kind: Kind) -> int:

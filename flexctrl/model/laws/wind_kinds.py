@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.wind import Wind
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.model.laws.families import Family, family
 from flexctrl.model.laws.inertial import seen_outside
 from flexctrl.model.laws.kinds import Kind, Shares

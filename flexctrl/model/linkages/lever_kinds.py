@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.kernels.kernel import Kernel
-from flexctrl.mechanics.beam import NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
 from flexctrl.model.linkages.open_linkage import attitude, drive_motion, twist
 from flexctrl.structure.drives import Drive
