@@ -225,6 +225,9 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
     shift = 10.0 * load / (balance.heaviest * balance.size) if force.size else 0.0
     soft = Newton(balance, tolerance, _SOFT_REACH).run(start, 240, shift)
     found = soft if soft.done else follow(balance, start, tolerance, strict=False)[0]
+    if not found.done and shift:
+        down = Newton(balance, tolerance, _SOFT_REACH, downhill=True).run(start, 240, shift)
+        found = down if down.done else found
     if not found.done:
         raise EquilibriumError(_complaint(balance, found), found.state, found.residual)
     return found

@@ -19,7 +19,7 @@ _REACH = 1.0
 _CONTRACTION = 0.6
 SMALLEST_PART, _JUMP = 1e-4, 30.0
 _FREE_MOTIONS, _DUST, _TOO_FAR, _DUST_OF = 6, 8.0, 0.1, 1e-12
-_SPREAD = 100.0
+_SPREAD, _FASTEST = 100.0, 1e12
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,12 @@ class Newton:
     """Newton's method on one balance.
 
     The residual that steers it is that with the predicted stresses (`mixed`): the true one is ruled by how
-    stiff the stiffest part is. It ends where the step is lost in round-off or the true residual is.
+    stiff the stiffest part is. It ends where the step is lost in round-off or the true residual is. ``downhill`` adds
+    masses until no way is one that the machine leaves by itself: against the forces it would go to and fro for ever.
     """
 
-    def __init__(self, balance: Balance, tolerance: float, reach: float = _REACH) -> None:
-        self.balance, self.tolerance, self.reach = balance, tolerance, reach
+    def __init__(self, balance: Balance, tolerance: float, reach: float = _REACH, downhill: bool = False) -> None:
+        self.balance, self.tolerance, self.reach, self.downhill = balance, tolerance, reach, downhill
         self.mixed = balance.model.forces.mixed if balance.model.large else None
         self._plan: Plan | None = None
 
@@ -172,6 +173,8 @@ class _Search:
         if watch and not self.balance.holds(here.state, K):
             self.steady = False
             return False
+        if newton.downhill:
+            self._hold_uphill(K)
         try:
             step, _ = newton.step(K, here, self.shift)
         except SingularMatrixError:
@@ -184,6 +187,12 @@ class _Search:
         if not there.left <= 1e3 * max(here.left, newton.tolerance):
             return self._held_faster()
         return self._moved(there, size, share)
+
+    def _hold_uphill(self, K: sp.csr_matrix) -> None:
+        """Add masses until they and K resist every displacement."""
+        inertia, most = sp.diags(self.balance.inertia), _FASTEST * self.shift
+        while self.shift < most and not self.balance.holds(self.here.state, (K + self.shift * inertia).tocsr()):
+            self._held_faster()
 
     def _held_faster(self) -> bool:
         self.shift = 10.0 * max(self.shift, self.floor)

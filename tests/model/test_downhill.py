@@ -1,0 +1,39 @@
+"""Equilibria far from where the machine is drawn, in a shape that it leaves by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import flexctrl as fc
+
+G, ARM, MASS, EA = 9.81, 1.0, 3.0, 1e4
+
+
+def hoist(spin: float) -> fc.Model:
+    """A load on a winch at the end of an arm of 1 m, in a frame that turns."""
+    arm, load = fc.PointMass("arm", (ARM, 0, 0), 1.0), fc.PointMass("load", (ARM, 0, -2.0), MASS)
+    winch = fc.Winch("winch", load.node, arm.node, EA=EA, radius=0.1, ratio=2.0, inertia=0.1)
+    outputs = [fc.Position("x", load.node, "x"), fc.Position("z", load.node, "z")]
+    plan = fc.Structure([arm, load], [fc.Support(arm.node)], [winch], outputs=outputs)
+    return fc.assemble(plan, [fc.Gravity(), fc.LargeRotation(), fc.RotatingFrame((0, 0, spin)), fc.RopeStretch()])
+
+
+@pytest.mark.parametrize("wound", [0.0, 6.0])
+@pytest.mark.parametrize("spin", [2.0, 2.5, 3.5])
+def test_a_load_is_thrown_out_by_a_turning_arm(spin, wound):
+    """Above √(g/l) = 2.2 rad/s it leaves the vertical by itself; the search went to and fro, and found nothing."""
+    rest = fc.equilibrium(hoist(spin), hold={"winch_source": wound})
+    drawn = 2.0 + 0.05 * wound
+
+    def length(lean: float) -> float:
+        return drawn * (1.0 + MASS * G / np.cos(lean) / EA)
+
+    def left(lean: float) -> float:
+        return np.tan(lean) - spin**2 * (ARM + length(lean) * np.sin(lean)) / G
+
+    lean = brentq(left, 0.0, 1.55)
+    assert rest.outputs["x"] == pytest.approx(ARM + length(lean) * np.sin(lean), abs=1e-9)
+    assert rest.outputs["z"] == pytest.approx(-length(lean) * np.cos(lean), abs=1e-9)
+    assert not rest.unstable
