@@ -76,7 +76,7 @@ class Newton:
 
         ``watch`` ends it at the first tangent that does not resist every displacement.
         """
-        search = _Search(self, start, shift)
+        search = _Search(self, start, shift, watch)
         while not search.small and search.iterations < most and search.iterate(watch):
             pass
         return search.found()
@@ -152,13 +152,14 @@ class Newton:
 class _Search:
     """A search under way: the iterate, the best state met, and how the steps went."""
 
-    def __init__(self, newton: Newton, start: State, shift: float) -> None:
+    def __init__(self, newton: Newton, start: State, shift: float, watched: bool) -> None:
         balance = newton.balance
         force, there = balance.force(start), balance.astray(start) == 0.0
         self.scale = max(balance.scale(start), 0.0 if there else _DUST_OF * balance.called_forth(start))
         self.newton, self.balance = newton, balance
         self.shift, self.floor = shift, 1e-7 * shift
-        all_left = float(not there and not balance.loaded)  # nothing is at work but what is not yet in its place
+        # what is not yet in its place calls forth what no force at the start tells of
+        all_left = float(not there and (watched or not balance.loaded))
         self.best, self.least = start, max(balance.relative(force, self.scale), all_left)
         self.here = _Iterate(start, None, force, self.least)
         self.before, self.iterations, self.stalled = np.inf, 0, 0

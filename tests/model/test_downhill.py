@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
 
@@ -36,4 +37,21 @@ def test_a_load_is_thrown_out_by_a_turning_arm(spin, wound):
     lean = brentq(left, 0.0, 1.55)
     assert rest.outputs["x"] == pytest.approx(ARM + length(lean) * np.sin(lean), abs=1e-9)
     assert rest.outputs["z"] == pytest.approx(-length(lean) * np.cos(lean), abs=1e-9)
+    assert not rest.unstable
+
+
+@pytest.mark.parametrize("turn", [(0.3, 0.2, 0.5), (2.0, -1.0, 1.5), (5.0, -4.0, 3.0)])
+def test_a_weight_on_a_hinge_whose_carrier_is_held_turned(turn):
+    """It hangs as low as the hinge lets it; that took thousands of steps, or nothing was found."""
+    base = fc.RigidBody("base", (0, 0, 0), 2.0, (0.3, 0.5, 0.7), points={"tip": (1, 0, 0)})
+    link = fc.RigidBody("link", (1, 0, 0), 1.0, (0.3, 0.5, 0.7), points={"end": (1, 0, -1)})
+    load = fc.PointMass("load", (1, 0, -1), 3.0)
+    hinge = fc.Hinge(base.point("tip"), link.node, axis="y")
+    joints = [fc.Support(base.node, "u v w"), hinge, fc.Pin(link.point("end"), load.node)]
+    plan = fc.Structure([base, link, load], joints, outputs=[fc.Position("z", load.node, "z")])
+    model = fc.assemble(plan, [fc.Gravity(), fc.LargeRotation()])
+    rest = fc.equilibrium(model, hold=dict(zip(("base_0_rx", "base_0_ry", "base_0_rz"), turn, strict=True)))
+    along, _, up = Rotation.from_rotvec(turn).as_matrix()[2]
+    assert rest.outputs["z"] == pytest.approx(along - np.hypot(along, up), abs=1e-9)
+    assert rest.iterations <= 20
     assert not rest.unstable
