@@ -27,7 +27,7 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
     """Note what happens over a step; end it where the run stops, a law of force switches or has a corner."""
     watch, curve = journey.watch, journey.track.curve(before, after)
     found = met(watch, journey.track.curve, before, after, journey.rows.every)
-    landing = next((c for c in found if watch.stops(c.gauge) and not journey.is_over(c)), None)
+    landing = _first(journey, found, before)
     switch = -1 if landing is None else landing.gauge - len(watch.events)
     if 0 <= switch < len(watch.names) and journey.mark.stuck >= _CHATTER:
         name = watch.names[switch]
@@ -58,6 +58,21 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
     if switch >= len(watch.names):
         return after, landing
     return _switched(journey, after, landing, switch, brief), None
+
+
+def _first(journey: Journey, found: Sequence[Crossing], before: Point) -> Crossing | None:
+    """Return what a step is to end at, if anything.
+
+    What sticks may be torn loose by a rope that is caught: the corner comes first then, as forces jump there and there
+    is no end at which just so much is borne. What breaks loose before it is seen in the step that is left.
+    """
+    watch, laws = journey.watch, len(journey.watch.events)
+    ends = [c for c in found if watch.stops(c.gauge) and not journey.is_over(c)]
+    if not ends or not laws <= ends[0].gauge < laws + len(watch.names):
+        return ends[0] if ends else None
+    if journey.plan.model.switches.phases(before.state)[ends[0].gauge - laws] != STUCK:
+        return ends[0]
+    return next((c for c in ends if c.gauge >= laws + len(watch.names)), ends[0])
 
 
 def _note_before(journey: Journey, before: Point, after: Point, there: set[int], near: float) -> None:

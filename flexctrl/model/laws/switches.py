@@ -37,7 +37,7 @@ T = TypeVar("T")
 
 _FADING = 1e4
 _STILL = 1e-10
-_SLACK = 1e-9
+_SLACK, _OVERCOME = 1e-9, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,7 +300,8 @@ class Switches:
         phases = self.phases(state).copy()
         if phases[contact] == STUCK:
             held = self._holding(state, u)[0][np.flatnonzero(phases == STUCK).tolist().index(contact)]
-            phases[contact] = -np.sign(held)
+            if abs(held) > _OVERCOME * self.static[contact]:  # else a force that jumps will tear it loose, not yet
+                phases[contact] = -np.sign(held)
         else:
             speed, W = self.slips.speeds(state), self.slips.rows(state)
             state = state.with_(v=state.v - hold(W[[contact]], self.ease).back @ speed[[contact]])
