@@ -45,7 +45,7 @@ class Remembered:
     Attributes
     ----------
     tangent, mass : numpy.ndarray
-        What they are made again from, or they themselves; see `_written`. Empty if they have not been made.
+        What they are made again from, or they themselves; see `_parts`. Empty if they have not been made.
     made_for : float
         Step of the tangent [s].
     numbers : tuple of float
@@ -133,8 +133,8 @@ class Loops:
         """Return what another march needs to go on with the same bits."""
         m, kept = self.march, self._kept
         if (m.factorisations, m.weighings) != kept[0]:
-            tangent = _written(m.tangent, self._whole) if m.made_for > 0.0 else np.zeros(0)
-            mass = _written(m.mass, self._whole) if m.mass_for == 1.0 else np.zeros(0)
+            tangent = np.concatenate(self._parts(False)) if m.made_for > 0.0 else np.zeros(0)
+            mass = np.concatenate(self._parts(True)) if m.mass_for == 1.0 else np.zeros(0)
             self._kept = kept = ((m.factorisations, m.weighings), tangent, mass)
         return Remembered(kept[1], kept[2], m.made_for, tuple(getattr(m, name) for name in _HABITS))
 
@@ -142,12 +142,14 @@ class Loops:
         """Go on as the march whose memory this is."""
         m, f = self.march, self.flattened.flat
         made = m.factorisations
-        for kept, factors, mass in ((memory.tangent, m.tangent, False), (memory.mass, m.mass, True)):
+        for kept, mass in ((memory.tangent, False), (memory.mass, True)):
             if kept.size and not self._whole:
                 f.z[:], m.h = kept[: f.z.size], memory.made_for
                 self._make(mass)
             if kept.size:
-                _read(factors, kept, self._whole)
+                parts = self._parts(mass)
+                for part, old in zip(parts, np.split(kept, np.cumsum([p.size for p in parts])[:-1]), strict=True):
+                    part[:] = old
         m.factorisations, m.made_for = made, memory.made_for
         m.mass_for = 1.0 if memory.mass.size else 0.0
         self._kept = (made, m.weighings), memory.tangent, memory.mass
@@ -160,26 +162,15 @@ class Loops:
         m = self.march
         return bool(m.probes.groups > 0 or m.asking or m.fronts.beyond > 0)
 
+    def _parts(self, mass: bool) -> list[np.ndarray]:
+        """What is remembered of a matrix: where it was made, on which side of jumps, and itself where that is kept."""
+        m = self.march
+        f = m.mass if mass else m.tangent
+        whole = [f.down, f.up, f.diagonal, f.made] if self._whole else []
+        return [f.place, f.angles, *([] if mass else [m.corners.made]), *whole]
+
     def _make(self, mass: bool) -> None:
         if self.march.asking:
             self._made((0.0, 0.0, 1.0) if mass else self._seeds, WEIGH if mass else REFACTOR)
         else:
             self._do(WEIGHED if mass else REMADE)
-
-
-def _parts(factors: Packed, whole: bool) -> list[np.ndarray]:
-    """What is remembered of a factorised matrix."""
-    f = factors
-    return [f.place, f.angles, *([f.down, f.up, f.diagonal, f.made] if whole else [])]
-
-
-def _written(factors: Packed, whole: bool) -> np.ndarray:
-    """Return the workspace of a factorised matrix and the turns when it was made, and itself where that is kept."""
-    return np.concatenate(_parts(factors, whole))
-
-
-def _read(factors: Packed, kept: np.ndarray, whole: bool) -> None:
-    """Put back what was written."""
-    parts = _parts(factors, whole)
-    for part, old in zip(parts, np.split(kept, np.cumsum([p.size for p in parts])[:-1]), strict=True):
-        part[:] = old
