@@ -365,6 +365,11 @@ class Balance:
         u = np.where(self._following, done * self.u, self.u)
         return self._again(replace(self, u=u, held=held, kept=(1.0 - done) * holding))
 
+    def held_as(self, state: State) -> Balance:
+        """Return the same balance with what is held where it is in a state."""
+        there = self.places(state)
+        return self._again(replace(self, held={i: float(there[i]) for i in self.held}))
+
     @cached_property
     def _following(self) -> np.ndarray:
         turning = {f.input for f in self.model.signals.follows}

@@ -216,7 +216,11 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
         straight = Newton(balance, tolerance).run(start, 60, watch=True)
         if straight.done and straight.steady:
             return straight
-        followed, share = follow(balance, start, tolerance, strict=True)
+        followed, share = follow(balance, start, tolerance, strict=True, watch=True)
+        if not followed.done and balance.astray(start):
+            followed, share = _loads_first(balance, start, followed, share, tolerance)
+        if not followed.done:  # it gives way, or stays where it is and is left by itself from there on
+            followed, share = follow(balance, start, tolerance, strict=True)
         if not followed.done:
             raise EquilibriumError(_gave_way(balance, followed, share), followed.state, followed.residual)
         return followed
@@ -231,6 +235,18 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
     if not found.done:
         raise EquilibriumError(_complaint(balance, found), found.state, found.residual)
     return found
+
+
+def _loads_first(balance: Balance, start: State, found: Found, share: float, tolerance: float) -> tuple[Found, float]:
+    """What the loads lead to first and what is held then; what was found if these do not lead on.
+
+    Pressed together and loaded from the side at once, a column is loaded from the side too late.
+    """
+    here = balance.held_as(start)
+    loaded = Newton(here, tolerance).run(start, 60, watch=True)
+    if not (loaded.done and loaded.steady):
+        loaded = follow(here, start, tolerance, strict=True, watch=True)[0]
+    return follow(balance, loaded.state, tolerance, strict=True, watch=True) if loaded.done else (found, share)
 
 
 def _stands(balance: Balance, start: State) -> bool:

@@ -233,7 +233,7 @@ class _Search:
         return self.balance.relative(left, self.scale) <= tolerance
 
 
-def follow(balance: Balance, start: State, tolerance: float, strict: bool) -> tuple[Found, float]:
+def follow(balance: Balance, start: State, tolerance: float, strict: bool, watch: bool = False) -> tuple[Found, float]:
     """Let go of what holds a start in equilibrium, part by part, and stay with it.
 
     Parameters
@@ -243,6 +243,8 @@ def follow(balance: Balance, start: State, tolerance: float, strict: bool) -> tu
     tolerance : float
     strict : bool
         Whether each part must lead to a neighbour of the state before, or just anywhere.
+    watch : bool
+        Whether all on the way must resist every displacement.
 
     Returns
     -------
@@ -254,11 +256,11 @@ def follow(balance: Balance, start: State, tolerance: float, strict: bool) -> tu
     state, done, part, total, rate = start, 0.0, 0.25, 0, 0.0
     while done < 1.0 and part >= SMALLEST_PART:
         goal = min(1.0, done + part)
-        found = Newton(balance.part(start, holding, goal), tolerance).run(state, 15 if strict else 120)
+        found = Newton(balance.part(start, holding, goal), tolerance).run(state, 15 if strict else 120, watch=watch)
         total += found.iterations
         moved = balance.moved(found.state.q - state.q)
         near = found.contracting or (part < 2.0 * SMALLEST_PART and moved <= _JUMP * rate * part)
-        if found.done and (near or not strict):
+        if found.done and (near or not strict) and (found.steady or not watch):
             rate = moved / (goal - done) if rate == 0.0 else 0.5 * (rate + moved / (goal - done))
             state, done, part = found.state, goal, (2.0 if found.iterations < 8 else 1.2) * part
         else:

@@ -55,3 +55,27 @@ def test_a_weight_on_a_hinge_whose_carrier_is_held_turned(turn):
     assert rest.outputs["z"] == pytest.approx(along - np.hypot(along, up), abs=1e-9)
     assert rest.iterations <= 20
     assert not rest.unstable
+
+
+@pytest.mark.parametrize("slender", [1e4, 1e6])
+@pytest.mark.parametrize("pressed", [0.01, 0.05, 0.2])
+def test_a_column_pressed_down_bends_to_the_side_it_is_pushed_to(slender, pressed):
+    """One stable branch, as a path of loads follows it; it was found straight and unstable, or not at all."""
+    stiffness, length = 100.0, 2.0
+    section = fc.Section(
+        EA=slender * stiffness / length**2, EI_y=stiffness, EI_z=stiffness, GJ=stiffness, rhoA=1.0, rhoJ=1e-3
+    )
+    beam = fc.Beam("c", (0, 0, 0), (0, 0, length), section, elements=16, up=(1, 0, 0))
+    joints = [fc.Support(beam.start), *(fc.Support(node, "v rx rz") for node in beam.nodes[1:])]
+    inputs = [fc.Force("press", beam.end, "-z"), fc.Force("push", beam.end, "x")]
+    outputs = [fc.Position("x", beam.end, "x"), fc.Position("z", beam.end, "z")]
+    model = fc.assemble(
+        fc.Structure([beam], joints, inputs=inputs, outputs=outputs), [fc.Flexible(), fc.LargeRotation()]
+    )
+    euler = np.pi**2 * stiffness / (4.0 * length**2)
+    push = {"push": 0.01 * euler}
+    path = fc.equilibrium_path(model, {"press": euler}, until={"z": (1.0 - pressed) * length}, inputs=push)
+    for start in (None, fc.equilibrium(model, inputs=push).state):
+        rest = fc.equilibrium(model, hold={"c_16_w": -pressed * length}, inputs=push, start=start)
+        assert rest.outputs["x"] == pytest.approx(path.points[-1].outputs["x"], rel=1e-6)
+        assert rest.stable

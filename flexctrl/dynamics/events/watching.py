@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from flexctrl.dynamics.events.crossings import met, offset
-from flexctrl.dynamics.events.landing import landed
+from flexctrl.dynamics.events.landing import Missed, landed
 from flexctrl.dynamics.events.switching import anew, is_brief, withheld
 from flexctrl.dynamics.events.watch import Crossing
 from flexctrl.dynamics.records.dense import Curve
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TOGETHER", "watched"]
 
-_CHATTER = 20
+_CHATTER, _LITTLE = 20, 1e-6
 TOGETHER = 1e-7
 
 
@@ -39,6 +39,8 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
         return after, None
     slid = after
     after, landing = landed(journey, before, after, landing)
+    if after is before and _leaves(journey, before, landing):
+        raise Missed(journey.stepper.counts.worst, "the step is longer than the way there and back from a corner")
     switch = landing.gauge - len(watch.events)  # the step ends at another corner now, maybe
     brief = 0 <= switch < len(watch.names) and is_brief(journey, before, after, slid, switch)
     closest = {c.gauge: c for c in sorted(found, key=lambda c: -abs(c.t - landing.t))}.values()
@@ -73,6 +75,17 @@ def _first(journey: Journey, found: Sequence[Crossing], before: Point) -> Crossi
     if journey.plan.model.switches.phases(before.state)[ends[0].gauge - laws] != STUCK:
         return ends[0]
     return next((c for c in ends if c.gauge >= laws + len(watch.names)), ends[0])
+
+
+def _leaves(journey: Journey, at: Point, corner: Crossing) -> bool:
+    """Tell whether a corner met at once is left where the step begins: it is come back to within the step, then."""
+    watch, state = journey.watch, at.firm.state
+    if corner.gauge < len(watch.events) + len(watch.names):
+        return False
+    moved = journey.plan.model.advance(state, _LITTLE * journey.mark.size * state.v, state.v, state.t)
+    side = -1.0 if corner.rising else 1.0
+    here, there = (side * watch.values(s, at.supply.u)[corner.gauge] for s in (state, moved))
+    return bool(there > max(here, watch.dusts[corner.gauge]))
 
 
 def _note_before(journey: Journey, before: Point, after: Point, there: set[int], near: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -34,6 +34,7 @@ class _Flat:
     """What a run asks of a motion: coordinates are places."""
 
     n: int
+    inputs: int
 
     @property
     def raw(self) -> int:
@@ -60,8 +61,19 @@ class _Flat:
         return {}
 
     def counted(self, state: State) -> State:
-        """Return the state: nothing is wound up."""
-        return state
+        """Return the state with room for the inputs in force: one of the machine itself has none.
+
+        Raises
+        ------
+        StructureError
+            For a state of another number of degrees of freedom.
+        """
+        if state.q.size != self.n:
+            raise StructureError(
+                f"simulate: start has {state.q.size} degrees of freedom; the linear model has {self.n}: give a state "
+                "of the model that it was made from, or leave out what has been condensed or reduced"
+            )
+        return state if state.driven.size == self.inputs else replace(state, driven=np.zeros(self.inputs))
 
     def jacobian(self, state: State) -> sp.csr_matrix:
         """Return the identity."""
@@ -219,7 +231,7 @@ class LinearPlant:
 
     @cached_property
     def motion(self) -> _Flat:
-        return _Flat(self.n)
+        return _Flat(self.n, len(self.inputs))
 
     @cached_property
     def signals(self) -> _Signals:
