@@ -23,7 +23,7 @@ from flexctrl.structure.freedoms import check_finite, check_number
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SOFT_REACH = 0.3
+_SOFT_REACH, _NEAR = 0.3, 0.1
 
 
 @dataclass(frozen=True)
@@ -229,12 +229,18 @@ def _found(balance: Balance, start: State, tolerance: float) -> Found:
     shift = 10.0 * load / (balance.heaviest * balance.size) if force.size else 0.0
     soft = Newton(balance, tolerance, _SOFT_REACH).run(start, 240, shift)
     found = soft if soft.done else follow(balance, start, tolerance, strict=False)[0]
-    if not found.done and shift:
+    if shift and not (found.done and _is_meant(balance, start, found.state)):
         down = Newton(balance, tolerance, _SOFT_REACH, downhill=True).run(start, 240, shift)
-        found = down if down.done else found
+        lasts = down.done and (not found.done or balance.unstable(down.state) < balance.unstable(found.state))
+        found = down if lasts else found
     if not found.done:
         raise EquilibriumError(_complaint(balance, found), found.state, found.residual)
     return found
+
+
+def _is_meant(balance: Balance, start: State, found: State) -> bool:
+    """Whether an equilibrium lasts, or the start is near it: elsewhere a machine would not stay with it."""
+    return not balance.unstable(found) or balance.moved(found.q - start.q) < _NEAR
 
 
 def _loads_first(balance: Balance, start: State, found: Found, share: float, tolerance: float) -> tuple[Found, float]:

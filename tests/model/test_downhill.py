@@ -12,9 +12,10 @@ import flexctrl as fc
 G, ARM, MASS, EA = 9.81, 1.0, 3.0, 1e4
 
 
-def hoist(spin: float) -> fc.Model:
-    """A load on a winch at the end of an arm of 1 m, in a frame that turns."""
-    arm, load = fc.PointMass("arm", (ARM, 0, 0), 1.0), fc.PointMass("load", (ARM, 0, -2.0), MASS)
+def hoist(spin: float, drawn: float = 0.0) -> fc.Model:
+    """A load on a winch at the end of an arm of 1 m, drawn in some direction, in a frame that turns."""
+    tip = (ARM * np.cos(drawn), ARM * np.sin(drawn))
+    arm, load = fc.PointMass("arm", (*tip, 0), 1.0), fc.PointMass("load", (*tip, -2.0), MASS)
     winch = fc.Winch("winch", load.node, arm.node, EA=EA, radius=0.1, ratio=2.0, inertia=0.1)
     outputs = [fc.Position("x", load.node, "x"), fc.Position("z", load.node, "z")]
     plan = fc.Structure([arm, load], [fc.Support(arm.node)], [winch], outputs=outputs)
@@ -38,6 +39,14 @@ def test_a_load_is_thrown_out_by_a_turning_arm(spin, wound):
     assert rest.outputs["x"] == pytest.approx(ARM + length(lean) * np.sin(lean), abs=1e-9)
     assert rest.outputs["z"] == pytest.approx(-length(lean) * np.cos(lean), abs=1e-9)
     assert not rest.unstable
+
+
+@pytest.mark.parametrize("drawn", [0.0, 0.5, 1.5])
+def test_what_lasts_is_found_in_every_direction(drawn):
+    """Drawn at half a radian it was found hanging inwards, where it does not stay."""
+    rest = fc.equilibrium(hoist(4.0, drawn), hold={"winch_source": 20.0})
+    assert np.linalg.norm(rest.state.x[1, :2]) == pytest.approx(4.0237077725, rel=1e-9)
+    assert rest.stable
 
 
 @pytest.mark.parametrize("turn", [(0.3, 0.2, 0.5), (2.0, -1.0, 1.5), (5.0, -4.0, 3.0)])
