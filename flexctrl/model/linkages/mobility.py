@@ -25,7 +25,7 @@ from flexctrl.structure.relations import Closure, Fit, Follow, Group, Ride, Ties
 from flexctrl.structure.structure import Structure
 from flexctrl.structure.ties import tie
 
-_INDEPENDENT = 1e-9
+_INDEPENDENT, _FELT_ON_RAILS = 1e-9, 1e-3
 _PROBE, _OPENS = 1e-4, 1e-5
 _HARMLESS = "it is one condition too many, which is harmless: where they can move they do not open it"
 _LOCKS = (
@@ -223,7 +223,7 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
     turned = _openings(motion, moved, ties.closures)
     kept = np.abs(rows).max(axis=1, initial=0.0) + np.abs(turned).max(axis=1, initial=0.0) > 0.0
     chosen = _independent(rows.T, _INDEPENDENT)
-    dependent = _independent(rows[chosen], _INDEPENDENT)
+    dependent = _independent(rows[chosen] * _lasting(ties, motion.n), _INDEPENDENT)
     spare = [i for i in range(len(rows)) if kept[i] and i not in chosen]
     opens = _opens(motion, ties.closures, rows, chosen)
     labels = [_label(structure, c) for c in ties.closures]
@@ -233,6 +233,17 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
         notes.append(f"{tied} given by the others through " + ", ".join(labels[i] for i in chosen))
     closures, left = ([ties.closures[i] for i in some] for some in (chosen, spare))
     return _Loops(tuple(closures), tuple(dependent), tuple(left), tuple(notes))
+
+
+def _lasting(ties: Ties, count: int) -> np.ndarray:
+    """Return what to weigh each degree of freedom with where some are to follow from others.
+
+    Those of a rail least: a trolley feels the node behind it less and less, and beyond the next one not at all.
+    """
+    rails = {node for f in ties.follows if isinstance(f, Track) for node in f.rail}
+    weights = np.ones(count)
+    weights[[k - 1 for node in rails for k in ties.cells[node] if k > 0]] = _FELT_ON_RAILS
+    return weights
 
 
 def _opens(motion: Motion, closures: tuple[Closure | Fit, ...], rows: np.ndarray, chosen: list[int]) -> np.ndarray:
