@@ -111,6 +111,8 @@ class Journey:
         Events up to this time have been told by the run that this one goes on from [s].
     balked : bool
         Whether many steps at once have just ended before one that is to be taken by itself.
+    crumbled : int
+        How many steps of one length in a row have fallen apart into many pieces.
     horizon : float
         Until when the law is known to follow a line, with what it reads held [s]; infinity if nothing is in sight.
     seen : tuple of int and float
@@ -137,6 +139,7 @@ class Journey:
     bent: str = ""
     told: float = -math.inf
     balked: bool = False
+    crumbled: int = 0
     horizon: float = math.inf
     seen: tuple[int, float] = (0, 0.0)
     saved: Checkpoint | None = None

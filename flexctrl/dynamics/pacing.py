@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["controlled", "fixed"]
 
 _NEAR = 1e-9
-_HALVED = 64
-"""A step under a continuous law that falls apart into more pieces chatters: only generalised alpha slides."""
+_HALVED, _CRUMBLED = 64, 2
+"""Where steps under a continuous law fall apart into more pieces, after so many in a row, it chatters."""
 _CAPS, _SHORTER = 2.0, 0.25
 """Steps in which a law is hit are no longer than that many that follow the impact; longer ones are cut to a share."""
 
@@ -33,7 +33,8 @@ def fixed(journey: Journey, stop: float, until: float) -> None:
         length = journey.plan.method.pace.step  # type: ignore[union-attr]
         count = max(1, math.ceil((stop - t) / length - 1e-6)) if math.isfinite(stop) else 0
         mark.size, mark.left = (stop - t) / count if count else length, count or -1
-    most = mark.rejected + _HALVED if journey.plan.feed.reacting else math.inf
+    before = mark.rejected
+    most = before + _HALVED if journey.plan.feed.reacting and journey.crumbled >= _CRUMBLED else math.inf
     room = math.floor((until - t) / mark.size + _NEAR)
     if not room:
         if not ends_before(journey, stop):
@@ -41,6 +42,7 @@ def fixed(journey: Journey, stop: float, until: float) -> None:
         return
     lengthen(journey, mark.size)
     _take(journey, mark.size, stop, most)
+    journey.crumbled = journey.crumbled + 1 if mark.rejected - before > _HALVED else 0
     if mark.left > 0:
         mark.left -= 1
 
@@ -113,7 +115,7 @@ def _take(journey: Journey, h: float, stop: float, most: float) -> None:
     except StepError as failure:
         journey.mark.rejected += 1
         if journey.mark.rejected > most:
-            why = f"a step of {journey.mark.size:.3g} s fell apart into more than {_HALVED}: {failure}"
+            why = f"steps of {journey.mark.size:.3g} s fall apart into more than {_HALVED} pieces: {failure}"
             remedy = "the law may jump with what it reads: take AdaptiveAlpha or GeneralizedAlpha, which slide there"
             raise StepError(failure.worst, f"{why}; {remedy}") from failure
         if h >= 2e-3 * journey.mark.size:
