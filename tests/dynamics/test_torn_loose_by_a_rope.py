@@ -8,11 +8,12 @@ import pytest
 import flexctrl as fc
 
 G, MASS, RADIUS, RATIO, INERTIA = 9.81, 400.0, 0.3, 6.0, 0.14
+PLAIN = fc.Unchecked(fc.AdaptiveAlpha())
 METHODS = [
-    {"tolerance": fc.Tolerance(1e-7, 1e-10)},
-    {},
-    {"method": fc.GeneralizedAlpha(1e-3)},
-    {"method": fc.ExplicitRungeKutta(), "tolerance": fc.Tolerance(1e-6, 1e-9)},
+    {"method": PLAIN, "tolerance": fc.Tolerance(1e-7, 1e-10)},
+    {"method": PLAIN},
+    {"method": fc.Unchecked(fc.GeneralizedAlpha(1e-3))},
+    {"method": fc.Unchecked(fc.ExplicitRungeKutta()), "tolerance": fc.Tolerance(1e-6, 1e-9)},
 ]
 
 
