@@ -222,7 +222,14 @@ class _Search:
         return Found(best, least, self.iterations, done, self.steady, self.contracting)
 
     def _in_balance(self, state: State) -> bool:
-        return self.balance.astray(state) <= _TARGET and self.balance.settled(state, self.newton.tolerance)
+        balance = self.balance
+        if balance.astray(state) > _TARGET:
+            return False
+        # where a pendulum hangs nothing is at work any more; what was at the start measures what is left
+        return (
+            balance.settled(state, self.newton.tolerance)
+            or balance.relative(balance.force(state), self.scale) <= _TARGET
+        )
 
     def _in_balance_but_for_drift(self) -> bool:
         """Whether free motions have carried what is left from where it is round-off to heavier places."""

@@ -88,3 +88,15 @@ def test_a_column_pressed_down_bends_to_the_side_it_is_pushed_to(slender, presse
         rest = fc.equilibrium(model, hold={"c_16_w": -pressed * length}, inputs=push, start=start)
         assert rest.outputs["x"] == pytest.approx(path.points[-1].outputs["x"], rel=1e-6)
         assert rest.stable
+
+
+@pytest.mark.parametrize("lean", [0.15, 0.5, 1.0, 1.3, 2.0])
+def test_a_pendulum_let_go_far_from_upright_hangs(lean):
+    """Where it hangs nothing is at work: what was left of a search was measured by itself, and it went back upright."""
+    body = fc.RigidBody("body", (0, 0, 1), 3.0, (0.1, 0.1, 0.1), {"hub": (0, 0, 0)})
+    plan = fc.Structure([body], [fc.Support(body.point("hub"), "u v w rx rz")])
+    model = fc.assemble(plan, [fc.Gravity(), fc.LargeRotation()])
+    rest = fc.equilibrium(model, start=model.displace([lean]))
+    assert rest.stable
+    assert rest.state.q[0] == pytest.approx(np.pi, abs=1e-9)
+    assert fc.equilibrium(model).unstable == 1
