@@ -45,7 +45,7 @@ def test_a_load_is_thrown_out_by_a_turning_arm(spin, wound):
 def test_what_lasts_is_found_in_every_direction(drawn):
     """Drawn at half a radian it was found hanging inwards, where it does not stay."""
     rest = fc.equilibrium(hoist(4.0, drawn), hold={"winch_source": 20.0})
-    assert np.linalg.norm(rest.state.x[1, :2]) == pytest.approx(4.0237077725, rel=1e-9)
+    assert np.linalg.norm(rest.state.x[1, :2]) == pytest.approx(4.0237077725, rel=1e-9)  # as `left` above has it
     assert rest.stable
 
 
