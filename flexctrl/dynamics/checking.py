@@ -14,7 +14,7 @@ from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
-from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, kept_short, told_beside
+from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, halved, told_beside
 from flexctrl.dynamics.notes.gap import Gap, between
 from flexctrl.dynamics.records.record import InMemory
 from flexctrl.dynamics.run import Run, Status
@@ -131,7 +131,7 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     Run
     """
     tolerance = journey.plan.tolerance
-    if kept_short(journey):
+    if halved(journey):
         return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time), beginning)[0]
     coarser = method.coarser(tolerance)
     told, other = _told(run, journey, coarser, beginning)

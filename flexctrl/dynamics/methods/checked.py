@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
@@ -95,10 +96,11 @@ class Checked(_Wrapped):
     pendulum that goes over. Where a machine has swung by more than a quarter of a radian, gone farther than a
     fiftieth of its size, met corners of its laws of force or followed a continuous law, and wherever this is asked
     for, it is therefore run once more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or
-    in steps of twice the length. Of what the two are apart, a method of order p leaves 1/(rᵖ − 1) where steps are r
-    times as long. It stands in ``report.error``; above 3 % a note says so, and until when the run is right to that.
-    What would be noted is asked of a second run first, half as far away (in powers): its word counts. Where they tell
-    little, a note says whether a third one, under 243 times the tolerance, goes elsewhere: two may be off alike.
+    in steps of twice the length, or of half of it past corners. Of what the two are apart, a method of order p
+    leaves 1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 % a note says so, and
+    until when the run is right to that. What would be noted is asked of a second run first, half as far away (in
+    powers): its word counts. Where they tell little, a note says whether a third one, under 243 times the
+    tolerance, goes elsewhere: two may be off alike.
 
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so and for corners. Nothing is run
@@ -144,13 +146,13 @@ class Checked(_Wrapped):
         return Beside(_stepping(self.method, lambda step: longer * step), tolerance, longer, said)
 
     def finer(self, tolerance: Tolerance, sample: float) -> Beside:
-        """Return how a run is made whose steps are half as long as those that samples keep short.
+        """Return how a run is made whose steps are half as long, also as those that samples keep short.
 
         Parameters
         ----------
         tolerance : Tolerance
         sample : float
-            Time between samples [s].
+            Time between samples [s]; 0 where there are none.
 
         Returns
         -------
@@ -158,7 +160,7 @@ class Checked(_Wrapped):
         """
         if not _changeable(self.method):
             return self.coarser(tolerance)
-        halved = _stepping(self.method, lambda step: 0.5 * min(step, sample))
+        halved = _stepping(self.method, lambda step: 0.5 * min(step, sample or math.inf))
         return Beside(halved, tolerance, 0.5, "in half the steps")
 
 

@@ -18,7 +18,7 @@ from flexctrl.model.model import Model
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["PARTED", "TOLD", "can_be_told", "elsewhere", "kept_short", "may_grow", "told_beside"]
+__all__ = ["PARTED", "TOLD", "can_be_told", "elsewhere", "halved", "kept_short", "may_grow", "told_beside"]
 
 _SWUNG, _FAR = 0.25, 0.02
 """What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
@@ -72,6 +72,28 @@ def kept_short(journey: Journey) -> bool:
     return sample > 0.0 and journey.mark.steps < _MORE * journey.point.state.t / sample
 
 
+def halved(journey: Journey) -> bool:
+    """Tell whether the run beside is to be one in half the steps, not in longer ones.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    bool
+        Where samples keep steps short, and in steps of one length past corners: whether a contact with little to spare
+        breaks loose is decided by a finer run, where two coarse ones may be wrong alike.
+    """
+    fixed = isinstance(journey.plan.method.pace, Fixed)
+    return kept_short(journey) or (fixed and _cornered(journey, {*journey.watch.corner_names}))
+
+
+def _cornered(journey: Journey, names: set[str]) -> bool:
+    return any(event.name in names for event in journey.events)
+
+
 def may_grow(journey: Journey) -> bool:
     """Tell whether small differences may have grown of themselves.
 
@@ -96,7 +118,7 @@ def may_grow(journey: Journey) -> bool:
     swung = sums.moved > least
     if short or isinstance(plan.method.pace, Fixed):
         swung &= sums.path > _OFTEN * least
-    return bool(swung.any()) or feed.reacting or any(event.name in own for event in journey.events)
+    return bool(swung.any()) or feed.reacting or _cornered(journey, own)
 
 
 def told_beside(run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float, feared: float = 0.0) -> Run:
