@@ -17,7 +17,7 @@ from flexctrl.model.state import State
 _TARGET, _SETTLED = 1e-12, 1e-9
 _REACH = 1.0
 _CONTRACTION = 0.6
-SMALLEST_PART, _JUMP = 1e-4, 30.0
+SMALLEST_PART, _FINER, _JUMP = 1e-4, 1e-2, 30.0
 _FREE_MOTIONS, _DUST, _TOO_FAR, _DUST_OF = 6, 8.0, 0.1, 1e-12
 _SPREAD, _FASTEST = 100.0, 1e12
 
@@ -261,12 +261,13 @@ def follow(balance: Balance, start: State, tolerance: float, strict: bool, watch
     bare = balance.part(start, np.zeros(0), 0.0)
     holding = bare.force(start)
     state, done, part, total, rate = start, 0.0, 0.25, 0, 0.0
-    while done < 1.0 and part >= SMALLEST_PART:
+    least = (_FINER if watch else 1.0) * SMALLEST_PART
+    while done < 1.0 and part >= least:
         goal = min(1.0, done + part)
         found = Newton(balance.part(start, holding, goal), tolerance).run(state, 15 if strict else 120, watch=watch)
         total += found.iterations
         moved = balance.moved(found.state.q - state.q)
-        near = found.contracting or (part < 2.0 * SMALLEST_PART and moved <= _JUMP * rate * part)
+        near = found.contracting or (part < 2.0 * least and moved <= _JUMP * rate * part)
         if found.done and (near or not strict) and (found.steady or not watch):
             rate = moved / (goal - done) if rate == 0.0 else 0.5 * (rate + moved / (goal - done))
             state, done, part = found.state, goal, (2.0 if found.iterations < 8 else 1.2) * part

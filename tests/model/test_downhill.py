@@ -67,7 +67,7 @@ def test_a_weight_on_a_hinge_whose_carrier_is_held_turned(turn):
 
 
 @pytest.mark.parametrize("slender", [1e4, 1e6])
-@pytest.mark.parametrize("pressed", [0.01, 0.05, 0.2])
+@pytest.mark.parametrize("pressed", [0.01, 0.05, 0.2, 0.7])
 def test_a_column_pressed_down_bends_to_the_side_it_is_pushed_to(slender, pressed):
     """One stable branch, as a path of loads follows it; it was found straight and unstable, or not at all."""
     stiffness, length = 100.0, 2.0
