@@ -79,11 +79,15 @@ def test_few_modes_are_a_reduced_linear_model():
         # links that turn about themselves at 2.5e-4 Hz are told from free motion to a ten-millionth
         assert np.allclose(moved, told.y, rtol=0.0, atol=1e-7 if count == 0 else 1e-9)
         assert few.report.energy_residual < 1e-6
+        slowest = linear.modes().frequencies[linear.modes().rigid + count]
+        [said] = [note for note in few.report.notes if "no error told counts" in note]
+        assert f"from {slowest:.2g}" in said.replace(f"{slowest:.3g}", f"{slowest:.2g}")
 
 
 def test_all_modes_are_the_whole_model_and_few_march_as_they_step(monkeypatch):
     model, how = crane(fc.RayleighDamping(0.1, 1e-3)), {"inputs": {"push": 300.0}, "until": 0.05}
     whole = fc.simulate(model, method=fc.Exact(H), **how)
+    assert not any("no error told counts" in note for note in whole.report.notes)
     assert np.array_equal(fc.simulate(model, method=fc.Exact(H, modes=1000), **how).y, whole.y)
     a, b = both(model, monkeypatch, method=fc.Exact(H, modes=4), controller=law(), until=0.05)
     assert np.allclose(a.y, b.y, rtol=1e-9, atol=1e-10)

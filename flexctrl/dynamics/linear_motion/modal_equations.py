@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +38,8 @@ class ModalEquations:
     read : numpy.ndarray, shape (modes, 2 n)
         These states from (q, v) less what inputs do at once: of what has mass its place and rate, of what has damping
         alone its place.
+    slowest_left : float
+        Angular frequency of the slowest vibration left out [rad/s]; infinite where none is.
     """
 
     first: FirstOrder
@@ -44,6 +47,7 @@ class ModalEquations:
     direct: np.ndarray
     modes: int
     read: np.ndarray
+    slowest_left: float = math.inf
 
 
 def opened(model: Plant, modes: int | None = None) -> ModalEquations:
@@ -80,15 +84,15 @@ def opened(model: Plant, modes: int | None = None) -> ModalEquations:
     )
     system = replace(modal_system(linear), jump=np.zeros((2 * n, m + 1)))
     first = first_order(system)
-    read = _reading(M, C, first, len(system.modes))
+    read, slowest = _reading(M, C, first, len(system.modes)), math.inf
     always = system.modes.unstable + system.modes.rigid
     if modes is not None and always + modes < len(system.modes):
         first, kept = _truncated(system, always + modes)
-        read = read[kept]
+        read, slowest = read[kept], float(np.sqrt(abs(system.modes.omega_squared[always + modes])))
     drawn = np.zeros_like(first.D)
     drawn[:n, -1] = rest.q
     first = replace(first, D=first.D + drawn)
-    return ModalEquations(first, np.zeros((m, len(first.A))), np.eye(m, m + 1), len(first.A), read)
+    return ModalEquations(first, np.zeros((m, len(first.A))), np.eye(m, m + 1), len(first.A), read, slowest)
 
 
 def _truncated(system: ModalSystem, count: int) -> tuple[FirstOrder, np.ndarray]:
@@ -134,7 +138,7 @@ def closed(plant: ModalEquations, model: LinearPlant, feed: Feed) -> ModalEquati
     D[n:] += first.D[:n, :m] @ gain @ B
     states = (*first.states, *(f"controller{i + 1}" for i in range(k)))
     whole = FirstOrder(A, _unloaded(B), C, _unloaded(D), states, (slice(0, d + k),))
-    return ModalEquations(whole, gain, _unloaded(solved), d, plant.read)
+    return ModalEquations(whole, gain, _unloaded(solved), d, plant.read, plant.slowest_left)
 
 
 def feels_at_once(plant: ModalEquations, model: LinearPlant, feed: Feed) -> bool:
