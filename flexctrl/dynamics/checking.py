@@ -172,7 +172,16 @@ def _nearer(
     nearer, second = _told(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning, feared)
     if second is None:
         return told
-    return _standing(told, second.run.checkpoint, nearby) if _reached(second.run) < _reached(other.run) else nearer
+    if _reached(second.run) < _reached(other.run):
+        return _standing(told, second.run.checkpoint, nearby)
+    return _as_much(nearer, told) if nearer.report.error == told.report.error == run.report.drift else nearer
+
+
+def _as_much(run: Run, other: Run) -> Run:
+    """The run with no less told of outputs than another one tells: where sums have the word, both are guesses."""
+    shares, others = run.report.output_errors, other.report.output_errors
+    most = {name: max(share, others.get(name, 0.0)) for name, share in shares.items()}
+    return replace(run, report=replace(run.report, output_errors=most))
 
 
 def _reached(other: Run) -> float:

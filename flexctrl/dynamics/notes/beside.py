@@ -147,10 +147,10 @@ def told_beside(run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float
     Returns
     -------
     Run
-        As it is where the coarser one tells nothing: it took no step, nearly all its steps are the same, or it has
-        parted from the finer one so far that sums of local errors tell more. Of one that ended before the run did it
-        keeps what these sums tell, and says so; one that reached its end and was called unresolved there is as good
-        as others.
+        As it is where the coarser one took no step. Where nearly all its steps are the same, or it has parted from
+        the finer one so far that sums of local errors tell more, it tells of outputs alone. Of one that ended before
+        the run did it keeps what these sums tell, and says so; one that reached its end and was called unresolved
+        there is as good as others.
     """
     if not coarse.report.steps:
         return run
@@ -159,15 +159,18 @@ def told_beside(run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float
     left = min(max(free, _LEAST), 1.0) * abs(longer**report.order - 1.0)
     told, parted = gap.most / left, gap.most > PARTED
     origin = journey.origin
-    if max(told, origin.error) < report.drift and (free < _LEAST or parted):
-        return run
+    summed = max(told, origin.error) < report.drift and (free < _LEAST or parted)
     left = 1.0 if parted else left / max(1.0, math.sqrt(feared / max(told, 1e-300)))
     told = gap.most / left
     early = coarse.status not in (Status.FINISHED, Status.STOPPED) and coarse.final.t < (1.0 - 1e-9) * run.final.t
     error = max(told, origin.error, report.drift if early else journey.drift.ran)
-    right = min(origin.right, _right(run, gap, left))
     kind = "coarser" if longer > 1.0 else "finer"
+    if summed:  # nobody knows which share of what the two are apart is this one's
+        outputs = by_rows(journey, run.y, gap.outputs, report.drift, kind)
+        notes = tuple(note for note in report.notes if note not in journey.outputs.notes) + outputs.notes
+        return replace(run, report=replace(report, output_errors=outputs.shares, notes=notes))
     outputs = by_rows(journey, run.y, gap.outputs / left, error, kind)
+    right = min(origin.right, _right(run, gap, left))
     said = (journey.drift.note, journey.bent, *journey.outputs.notes)
     notes = tuple(note for note in report.notes if note not in said)
     notes += tuple({gap.bent or journey.bent} - {""})
