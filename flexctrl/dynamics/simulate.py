@@ -19,7 +19,7 @@ from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.notes.beside import can_be_told, may_grow
 from flexctrl.dynamics.records.record import InMemory, Record
-from flexctrl.dynamics.run import Run, Tolerance
+from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.errors import StructureError
@@ -134,6 +134,12 @@ def simulate(
     )
     with np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
         journey, run = travelled(plan, start, events_of(events), record, spacing)
+        if beginning and feed.sample_time:
+            from flexctrl.dynamics.notes.sampled_growth import of_sampled_loop  # brings all that modes need
+
+            run = of_sampled_loop(run, journey, beginning.again)
+        if run.status is Status.FAILED:
+            return run
         if check and beginning and can_be_told(journey) and (isinstance(method, Checked) or may_grow(journey)):
             return laid_beside(run, journey, check, beginning)
     return run

@@ -1,0 +1,183 @@
+"""A machine under a sampled law from sample to sample: as it moves, and as steps have it move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from flexctrl.dynamics.alpha.point import Coefficients
+from flexctrl.linear.modal import modal_system
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.statespace import first_order
+
+__all__ = ["Answers", "SampledLoop"]
+
+_DUST = 1e-13
+_SURE = 0.1
+
+
+class Answers(NamedTuple):
+    """How a law's commands u and its next state x⁺ change with what it reads and with its state."""
+
+    u_y: np.ndarray
+    u_x: np.ndarray
+    x_y: np.ndarray
+    x_x: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLoop:
+    """A machine, linear about a state, under a sampled law.
+
+    Attributes
+    ----------
+    M, C, K : numpy.ndarray, shape (n, n)
+        M q̈ + C q̇ + K q = B u.
+    B : numpy.ndarray, shape (n, inputs)
+    reads, reads_rate : numpy.ndarray, shape (read, n)
+        What the law reads of q and of q̇.
+    law : Answers
+    sample : float
+        [s]
+    heavy : numpy.ndarray of bool, shape (n,)
+        What has mass.
+    """
+
+    M: np.ndarray
+    C: np.ndarray
+    K: np.ndarray
+    B: np.ndarray
+    reads: np.ndarray
+    reads_rate: np.ndarray
+    law: Answers
+    sample: float
+    heavy: np.ndarray
+
+    def poles(self, least: float) -> np.ndarray:
+        """Return the loop's own poles, from sample to sample; the machine moves exactly between.
+
+        Parameters
+        ----------
+        least : float
+            Those farther out than this, at least 1.
+
+        Returns
+        -------
+        numpy.ndarray of complex
+        """
+        return _firm(self._closed(*(self._modal() if self.heavy.all() else self._descriptor())), least)
+
+    def _modal(self) -> tuple[np.ndarray, ...]:
+        """The machine over a sample in coordinates (ω η, η̇) of its undamped modes; (η, η̇) where ω is round-off."""
+        L, n, span = np.linalg.cholesky(self.M), len(self.M), self.sample
+        normal = la.solve_triangular(L, la.solve_triangular(L, self.K, lower=True).T, lower=True).T
+        squares, modes = np.linalg.eigh(0.5 * (normal + normal.T))
+        squares[abs(squares) < _DUST * abs(squares).max()] = 0.0
+        shapes = la.solve_triangular(L, modes, lower=True, trans=1)
+        size = np.sqrt(abs(squares))
+        size[size == 0.0] = 1.0
+        turning = modes.T @ (0.5 * (normal - normal.T)) @ modes
+        A = np.block(
+            [
+                [np.zeros((n, n)), np.diag(size)],
+                [-(np.diag(squares) + turning) / size, -shapes.T @ self.C @ shapes],
+            ]
+        )
+        B = np.vstack([np.zeros_like(self.B), shapes.T @ self.B])
+        C = np.hstack([self.reads @ shapes / size, self.reads_rate @ shapes])
+        return (*_over(A, B, span), C, np.zeros((len(C), B.shape[1])))
+
+    def _descriptor(self) -> tuple[np.ndarray, ...]:
+        """The same where something has no mass."""
+        linear = LinearModel(
+            sp.csc_matrix(self.M),
+            sp.csc_matrix(self.C),
+            sp.csc_matrix(self.K),
+            self.B,
+            self.reads,
+            self.reads_rate,
+            np.zeros((len(self.reads), self.B.shape[1])),
+            tuple(f"q{i}" for i in range(len(self.M))),
+            tuple(f"u{i}" for i in range(self.B.shape[1])),
+            tuple(f"y{i}" for i in range(len(self.reads))),
+        )
+        system = modal_system(linear)
+        first = first_order(replace(system, jump=np.zeros_like(system.jump)))
+        return (*_over(first.A, first.B, self.sample), first.C, first.D)
+
+    def stepped(self, rho: float, count: int, least: float) -> np.ndarray:
+        """Return the poles of the loop as steps of generalised alpha have it.
+
+        Parameters
+        ----------
+        rho : float
+            Their spectral radius at infinite frequency.
+        count : int
+            Steps in a sample.
+        least : float
+            As for `poles`.
+
+        Returns
+        -------
+        numpy.ndarray of complex
+        """
+        n, m, h = len(self.M), self.B.shape[1], self.sample / count
+        step, pushed = self._step(rho, h)
+        leap, heavy = np.zeros((n, m)), self.heavy
+        leap[heavy] = h**2 * np.linalg.solve(self.M[np.ix_(heavy, heavy)], self.B[heavy])
+        leap = np.vstack([np.zeros((2 * n, m)), leap, leap])
+        total, force = np.eye(4 * n), np.zeros((4 * n, m))
+        for _ in range(count):
+            total, force = step @ total, step @ force + pushed
+        reads = np.hstack([self.reads, self.reads_rate / h, np.zeros((len(self.reads), 2 * n))])
+        return _firm(self._closed(total, force, reads, np.zeros((len(reads), m)), total @ leap), least)
+
+    def _step(self, rho: float, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """One step of (q, h q̇, h² a, h² q̈), and what held inputs do over it."""
+        c, n = Coefficients.of(rho), len(self.M)
+        eye, zero, share = np.eye(n), np.zeros((n, n)), 1.0 / (1.0 - c.alpha_f)
+        place = np.hstack([eye, eye, (0.5 - c.beta) * eye, zero])
+        rate = np.hstack([zero, eye, (1.0 - c.gamma) * eye, zero])
+        lag = np.hstack([zero, zero, c.alpha_m * eye, -c.alpha_f * eye])
+        mass, drag, stiff = self.M, h * self.C, h**2 * self.K
+        tangent = la.lu_factor(share * (1.0 - c.alpha_m) * mass + c.gamma * drag + c.beta * stiff)
+        own = la.lu_solve(tangent, -stiff @ place - drag @ rate - share * mass @ lag)
+        own_u = la.lu_solve(tangent, h**2 * self.B)
+        true, true_u = share * ((1.0 - c.alpha_m) * own + lag), share * (1.0 - c.alpha_m) * own_u
+        whole = np.vstack([place + c.beta * own, rate + c.gamma * own, own, true])
+        return whole, np.vstack([c.beta * own_u, c.gamma * own_u, own_u, true_u])
+
+    def _closed(
+        self, moved: np.ndarray, force: np.ndarray, C: np.ndarray, D: np.ndarray, leap: np.ndarray | None = None
+    ) -> np.ndarray:
+        """From sample to sample: (machine, inputs in force, law); ``leap`` is what a change of inputs does at once."""
+        law, m = self.law, len(force[0])
+        u = np.hstack([law.u_y @ C, law.u_y @ D, law.u_x])
+        jump = np.zeros((m, u.shape[1]))
+        jump[:, len(moved) : len(moved) + m] = np.eye(m)
+        machine = np.hstack([moved, np.zeros((len(moved), m + law.u_x.shape[1]))]) + force @ u
+        if leap is not None:
+            machine += leap @ (u - jump)
+        return np.vstack([machine, u, np.hstack([law.x_y @ C, law.x_y @ D, law.x_x])])
+
+
+def _over(A: np.ndarray, B: np.ndarray, span: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where ẋ = A x + B u goes over a time, and what held inputs do over it."""
+    n, m = B.shape
+    moved = la.expm(span * np.block([[A, B], [np.zeros((m, n + m))]]))
+    return moved[:n, :n], moved[:n, n:]
+
+
+def _firm(loop: np.ndarray, least: float) -> np.ndarray:
+    """The poles farther out that round-off does not move by much of how far outside the unit circle they are."""
+    poles = la.eigvals(loop)
+    poles = poles[abs(poles) > least]
+    if not poles.size:
+        return poles
+    scale = 2.0 ** np.random.default_rng(0).integers(-4, 5, len(loop))
+    again = la.eigvals(loop * scale / scale[:, None])
+    return np.array([z for z in poles if abs(again - z).min() <= _SURE * (abs(z) - 1.0)], dtype=complex)

@@ -1,0 +1,158 @@
+"""Sampled loops that grow as steps do not see: carts on a spring against the exponential of their own matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+import flexctrl as fc
+from flexctrl.design import MinimumJerk, pd
+from flexctrl.dynamics.feed import feed_of
+from flexctrl.dynamics.notes.sampled_growth import _answers, _loop
+
+NEAR, FAR, OMEGA, ZETA = 1.79, 1.76, 83.46, 0.0057
+SAMPLE, KP, KD = 1.49 / 83.46, 46.2, 13.5
+MU = NEAR * FAR / (NEAR + FAR)
+STIFFNESS, DAMPING = MU * OMEGA**2, 2.0 * ZETA * OMEGA * MU
+
+
+def carts() -> fc.Model:
+    a, b = fc.PointMass("a", (0, 0, 0), NEAR), fc.PointMass("b", (1, 0, 0), FAR)
+    spring = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=STIFFNESS, damping=DAMPING)
+    joints = [fc.Support(a.node, "v w"), fc.Support(b.node, "v w"), fc.Pin(a.node, spring.start)]
+    outputs = [fc.Position("near", a.node, "x"), fc.Position("far", b.node, "x"), fc.Velocity("rate", a.node, "x")]
+    plan = fc.Structure(
+        [a, b, spring],
+        [*joints, fc.Pin(b.node, spring.end)],
+        inputs=[fc.Force("push", a.node, "x")],
+        outputs=outputs,
+    )
+    return fc.assemble(plan, [fc.LargeRotation()])
+
+
+def law(delay: int, sent: bool = False, sample: float = SAMPLE) -> fc.design.Controller:
+    own = pd(KP, KD, measured="near", rate="rate", command="push")
+    move = MinimumJerk(distance=1.0, duration=6.9)
+    whole = fc.Sampled(fc.Tracking(own, {"near": move, "rate": move.derivative}) if sent else own, sample)
+    return fc.Delayed(whole, delay) if delay else whole
+
+
+def by_hand(delay: int, sample: float = SAMPLE) -> np.ndarray:
+    """Poles of (places, rates, commands under way) from sample to sample."""
+    A, k, c = np.zeros((5, 5)), STIFFNESS, DAMPING
+    A[:2, 2:4] = np.eye(2)
+    A[2], A[3] = np.array([-k, k, -c, c, 1.0]) / NEAR, np.array([k, -k, c, -c, 0.0]) / FAR
+    moved, gain = la.expm(sample * A), np.array([-KP, 0.0, -KD, 0.0])
+    Z = np.zeros((4 + delay, 4 + delay))
+    Z[:4, :4] = moved[:4, :4]
+    if not delay:
+        Z[:4, :4] += np.outer(moved[:4, 4], gain)
+        return np.linalg.eigvals(Z)
+    Z[:4, 4], Z[-1, :4] = moved[:4, 4], gain
+    Z[range(4, 3 + delay), range(5, 4 + delay)] = 1.0
+    return np.linalg.eigvals(Z)
+
+
+def loop(delay: int, sample: float = SAMPLE):
+    model = carts()
+    feed = feed_of(model, law(delay, sample=sample), np.zeros(1))
+    answers = _answers(feed, model.rest, np.asarray(feed.controller.initial()))
+    assert answers is not None
+    return _loop(feed, model.rest, np.zeros(1), answers)
+
+
+@pytest.mark.parametrize("delay", [0, 1, 2])
+@pytest.mark.parametrize("share", [0.3, 1.0, 1.7])
+def test_poles_from_sample_to_sample_are_those_by_hand(delay, share):
+    wanted = by_hand(delay, share * SAMPLE)
+    found = loop(delay, share * SAMPLE).poles(1.0)
+    wanted = wanted[abs(wanted) > 1.0]
+    assert len(found) == len(wanted)
+    assert all(abs(found - z).min() < 1e-6 * abs(z) for z in wanted)
+
+
+@pytest.mark.parametrize("rho", [0.6, 0.9, 1.0])
+@pytest.mark.parametrize("count", [3, 8])
+def test_steps_grow_as_their_poles_say(count, rho):
+    """Late in a run the growing pole is all that is left: by so much is each sample larger than the one before."""
+    model, z = carts(), loop(1).stepped(rho, count, 1.0)
+    start = model.rest.with_(v=np.array([0.1, -0.1]))
+    how = {"until": 300 * SAMPLE, "start": start, "every": SAMPLE}
+    run = fc.simulate(model, law(1), method=fc.Unchecked(fc.GeneralizedAlpha(SAMPLE / count, rho)), **how)
+    stretch = run["far"] - run["near"] - 1.0
+    late = np.array([stretch[i : i + 3] for i in range(240, 298)])
+    a, b = np.linalg.lstsq(late[:, :2], late[:, 2], rcond=None)[0]
+    assert np.sort(abs(np.roots([1.0, -b, -a]))) == pytest.approx(np.sort(abs(z)), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        fc.AdaptiveAlpha(),
+        fc.GeneralizedAlpha(SAMPLE),
+        fc.ConservingMidpoint(SAMPLE),
+        fc.Checked(fc.AdaptiveAlpha()),
+    ],
+    ids=repr,
+)
+def test_growth_that_steps_damp_fails_the_run(method):
+    """All were at rest, and said to be right to a ten-thousandth."""
+    run = fc.simulate(carts(), law(1, sent=True), until=22.2, every=SAMPLE, method=method)
+    assert np.ptp((run["far"] - run["near"])[-40:]) < 1e-3
+    assert run.status is fc.Status.FAILED
+    grows = 22.2 / SAMPLE * np.log(abs(by_hand(1)).max())
+    assert f"grows by e^{grows:.3g} over the run" in run.report.message
+
+
+def test_the_steps_it_names_see_it():
+    """A remedy that leaves it unsaid, beside an explicit method that follows the growth."""
+    coarse = fc.simulate(carts(), law(1, sent=True), until=22.2, method=fc.GeneralizedAlpha(SAMPLE))
+    step = float(coarse.report.message.split("take steps of ")[1].split()[0])
+    for method in (fc.GeneralizedAlpha(step), fc.ExplicitRungeKutta()):
+        run = fc.simulate(carts(), law(1, sent=True), until=22.2, method=fc.Checked(method), every=SAMPLE)
+        assert run.status is fc.Status.FINISHED
+        assert np.ptp((run["far"] - run["near"])[-40:]) > 0.3
+        assert not any("sampled loop" in note for note in run.report.notes)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3])
+def test_stable_loops_are_not_told_of(share):
+    own = fc.Sampled(pd(4.0, 4.0, measured="near", rate="rate", command="push"), share * SAMPLE)
+    for method in (fc.AdaptiveAlpha(), fc.GeneralizedAlpha(share * SAMPLE)):
+        start = carts().rest.with_(v=np.array([0.1, 0.0]))
+        run = fc.simulate(carts(), own, until=2.0, start=start, method=fc.Checked(method))
+        assert run.status is fc.Status.FINISHED
+        assert not any("sampled loop" in note for note in run.report.notes)
+
+
+@pytest.mark.parametrize("inertia", [0.0, 4e-3])
+def test_an_arm_behind_a_gear_is_that_of_its_linear_model(inertia):
+    """The README's arm, sampled so slowly that its motor flutters; without inertia the motor follows at once."""
+    tube = fc.Section.tube(fc.STEEL, radius=0.03, thickness=0.002)
+    arm = fc.Beam("arm", (0, 0, 0), (2, 0, 0), tube, elements=2)
+    motor = fc.RotaryDrive("motor", arm.start, axis="z", stiffness=2.0, ratio=100, inertia=inertia, damping=1e-3)
+    plan = fc.Structure(
+        [arm],
+        [fc.Support(arm.start, "u v w rx ry")],
+        [motor],
+        [fc.MotorTorque("torque", motor)],
+        [fc.DriveAngle("angle", motor), fc.DriveSpeed("speed", motor)],
+    )
+    model = fc.assemble(plan, [fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(beta=1e-3)])
+    own = pd(kp=8.0, kd=0.4 if inertia else 0.0, measured="angle", rate="speed", command="torque")
+    feed = feed_of(model, fc.Sampled(own, 0.02), np.zeros(1))
+    answers = _answers(feed, model.rest, np.zeros(0))
+    assert answers is not None
+    found = _loop(feed, model.rest, np.zeros(1), answers).poles(1.0)
+    plant = fc.linearize(model).to_ss()
+    n = plant.nstates
+    moved = la.expm(0.02 * np.block([[plant.A, plant.B], [np.zeros((1, n + 1))]]))
+    gain = -np.array([[8.0, 0.4 if inertia else 0.0]])
+    Z = np.block([[moved[:n, :n] + moved[:n, n:] @ gain @ plant.C, moved[:n, n:] @ gain @ plant.D]])
+    Z = np.vstack([Z, np.hstack([gain @ plant.C, gain @ plant.D])])
+    wanted = np.linalg.eigvals(Z)
+    wanted = wanted[abs(wanted) > 1.0 + 1e-7]
+    assert wanted.size
+    assert len(found) == len(wanted)
+    assert all(abs(found - z).min() < 1e-5 * abs(z) for z in wanted)
