@@ -13,7 +13,7 @@ from flexctrl.cli.program import Request
 from flexctrl.cli.progress import progress
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.model.model import Model
-from flexctrl.plots.machine import add_machine_axes, draw_deformed
+from flexctrl.plots.machine import add_machine_axes, draw_moved
 from flexctrl.plots.pose import pose_of
 from flexctrl.plots.run import comparison_curves, panels, run_curves, units
 from flexctrl.plots.style import FLEXIBLE
@@ -134,7 +134,7 @@ def draw(request: Request, scene: Scene, run: Run, twin: Run | None) -> None:
         title = f"{scene.name} at t = {run.t[-1]:.4g} s"
         pose = pose_of(scene.structure, scene.model.coordinates, run.final)
         ax = add_machine_axes(figure, scene.structure, [pose])
-        draw_deformed(ax, scene.structure, pose, FLEXIBLE, label=title)
+        draw_moved(ax, scene.structure, pose, FLEXIBLE, label=title, length=scene.units.length)
 
     write_picture(request.out, "final.png", final, size=(9.0, 6.5))
 

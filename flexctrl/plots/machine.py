@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -292,7 +293,7 @@ def _frame(ax: Any, structure: Structure, plane: tuple[int, int] | None, length:
     ax.set_box_aspect(sides, zoom=1.15)
 
 
-def draw_deformed(
+def draw_moved(
     ax: Axes,
     machine: Structure | Model,
     pose: Pose,
@@ -300,8 +301,9 @@ def draw_deformed(
     *,
     label: str = "",
     plane: tuple[int, int] | None = None,
+    length: str = "m",
 ) -> Axes:
-    """Draw a machine as it is drawn, pale, and deformed over it.
+    """Draw a machine as it is drawn, pale, and where it is over it.
 
     Parameters
     ----------
@@ -314,16 +316,44 @@ def draw_deformed(
         Title of the axes.
     plane : (int, int), optional
         Axes shown in a plane picture; default: see `best_plane`.
+    length : str
+        Unit of its places, for the axes.
 
     Returns
     -------
     matplotlib.axes.Axes
         The same axes.
     """
-    draw_machine(ax, machine, numbers=False, symbols=False, color=PALE, width=1.4, plane=plane)
-    draw_machine(ax, machine, pose, numbers=False, symbols=False, color=color, plane=plane)
+    bare = partial(draw_machine, ax, machine, numbers=False, symbols=False, plane=plane, length=length)
+    bare(color=PALE, width=1.4)
+    bare(pose, color=color)
     if label:
         ax.set_title(label, fontsize=10, color=INK, pad=2.0)
+    return ax
+
+
+def draw_deformed(
+    ax: Axes,
+    machine: Structure | Model,
+    pose: Pose,
+    color: str,
+    *,
+    label: str = "",
+    plane: tuple[int, int] | None = None,
+) -> Axes:
+    """Draw a machine and a shape of it, on axes without numbers: how far a mode goes is nobody's to say.
+
+    Parameters
+    ----------
+    ax, machine, pose, color, label, plane
+        As for `draw_moved`.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The same axes.
+    """
+    draw_moved(ax, machine, pose, color, label=label, plane=plane)
     for axis in (getattr(ax, f"{name}axis") for name in _NAMES[: 3 if ax.name == "3d" else 2]):
         axis.set_ticklabels([])
         axis.set_label_text(axis.get_label_text().split()[0])
@@ -331,4 +361,4 @@ def draw_deformed(
     return ax
 
 
-__all__ = ["add_machine_axes", "best_plane", "draw_deformed", "draw_machine"]
+__all__ = ["add_machine_axes", "best_plane", "draw_deformed", "draw_machine", "draw_moved"]

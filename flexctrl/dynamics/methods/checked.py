@@ -75,7 +75,8 @@ class _Wrapped:
 class Unchecked(_Wrapped):
     """A method without the coarser run that tells how far it is off: see `Checked`.
 
-    For runs by the hundred, as in a search for parameters, and for races.
+    For runs by the hundred, as in a search for parameters, and for races. Nor is it told whether a sampled loop grows
+    as its steps do not see.
 
     Parameters
     ----------
