@@ -98,6 +98,8 @@ def complete_pairs(
         shifted, lowest = _scouted(pencil, phi, SCOUTS)
         low = int(np.count_nonzero(lam <= np.sqrt(top * max(lowest, 0.0))))
         lam[:low], phi[:, :low] = shifted.ritz(phi[:, :low])
+        if EPS * top > lowest:  # direct ones are blurred past the softest, which then are in all that was found of them
+            lam[:low], phi[:, :low] = shifted.ritz(_orthonormal(pencil.M, phi[:, :low]))
     else:
         shifted = pencil.below_all(-max(top, 1.0))
     return _settled(pencil, _found(pencil, shifted, lam, phi))
