@@ -161,7 +161,7 @@ class LinearModel:
             Cv=(T.T @ self.Cv.T).T,
             coordinates=tuple(coordinates),
             parts=projected_parts(self.parts, T),
-            place=self.place and replace(self.place, basis=sp.csc_matrix(self.place.basis @ T)),
+            place=self.place and self.place.projected(T),
         )
 
     def _rescaled(self, scales: np.ndarray, M: sp.csc_matrix, C: sp.csc_matrix, K: sp.csc_matrix) -> LinearModel:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["PartMatrices", "Parts", "energies_by_part", "parts_of", "projected_parts"]
+__all__ = ["PartMatrices", "Parts", "energies_by_part", "parts_of", "projected_parts", "with_springs"]
 
 
 @dataclass(frozen=True)
@@ -130,6 +130,31 @@ def parts_of(
     blocks = (sp.csr_matrix((data, (rows, columns)), shape=size) for data in (stiffness, mass))
     K, M = (sp.csr_matrix(0.5 * (A + A.T)) for A in blocks)
     return Parts(names, starts, sp.csr_matrix(reach[keys % reach.shape[0]]), K, M)
+
+
+def with_springs(parts: Parts, owners: Mapping[str, int], stiffness: np.ndarray) -> Parts:
+    """Add springs that hold single coordinates to the ground.
+
+    Parameters
+    ----------
+    parts : Parts
+    owners : mapping of str to int
+        The part that each belongs to, and the coordinate.
+    stiffness : numpy.ndarray, shape (n,)
+        By coordinates.
+
+    Returns
+    -------
+    Parts
+    """
+    part = np.array([parts.names.index(name) for name in owners], dtype=int)
+    held, n = np.fromiter(owners.values(), dtype=int), parts.reach.shape[1]
+    rows = np.append(np.repeat(np.arange(len(parts)), np.diff(parts.starts)), part)
+    order = np.argsort(rows, kind="stable")
+    springs, none = sp.diags(stiffness[held]), sp.csr_matrix((held.size, held.size))
+    K, M = (sp.block_diag([A, B], "csr")[order][:, order] for A, B in ((parts.stiffness, springs), (parts.mass, none)))
+    reach = sp.vstack([parts.reach, sp.identity(n, format="csr")[held]], "csr")[order]
+    return Parts(parts.names, np.searchsorted(rows[order], np.arange(len(parts) + 1)), sp.csr_matrix(reach), K, M)
 
 
 def _block_places(own: np.ndarray, cells: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

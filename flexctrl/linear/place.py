@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -38,6 +38,8 @@ class Place(Generic[Machine, Shape]):
         What it is in equilibrium with.
     pull : float
         The ω² at which the machine would swing as a whole under the forces at work [(rad/s)²]; 0 for none.
+    springs : scipy.sparse.csc_matrix, shape (n, n), optional
+        Stiffness on the coordinates that the machine is without: of shafts whose twists they are.
     """
 
     model: Machine
@@ -45,6 +47,17 @@ class Place(Generic[Machine, Shape]):
     basis: sp.csc_matrix
     inputs: np.ndarray
     pull: float
+    springs: sp.csc_matrix | None = None
+
+    def projected(self, basis: sp.spmatrix) -> Place[Machine, Shape]:
+        """Return the same of other coordinates b, q = T b.
+
+        Parameters
+        ----------
+        basis : sparse matrix, shape (n, k)
+        """
+        springs = None if self.springs is None else sp.csc_matrix(basis.T @ self.springs @ basis)
+        return replace(self, basis=sp.csc_matrix(self.basis @ basis), springs=springs)
 
     def strain(self, shapes: np.ndarray) -> np.ndarray:
         """Return ΦᵀKΦ of displacements of the coordinates, from the machine itself.
@@ -57,4 +70,5 @@ class Place(Generic[Machine, Shape]):
         -------
         numpy.ndarray, shape (k, k)
         """
-        return self.model.strain(self.state, self.inputs, self.basis @ shapes)
+        found = self.model.strain(self.state, self.inputs, self.basis @ shapes)
+        return found if self.springs is None else found + shapes.T @ (self.springs @ shapes)

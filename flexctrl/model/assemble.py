@@ -18,6 +18,7 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.rope_mass import RopeMass
 from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.kernels.kernel import Backend, best_backend
+from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
 from flexctrl.model.braked import borne, rest_held
 from flexctrl.model.equations import Small
@@ -25,6 +26,7 @@ from flexctrl.model.laws.frictions import inner_freedoms
 from flexctrl.model.laws.gusts import check_gusts, idle_gusts
 from flexctrl.model.linkages.mobility import motion_of
 from flexctrl.model.model import Model
+from flexctrl.model.tangents import tangents
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.cut import cut_ropes
 from flexctrl.structure.freedoms import listed
@@ -192,7 +194,9 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
     from flexctrl.model.linearize import all_free, released  # brings all that modes need
 
     found = rest_held(large, dict(small.hold), dict(small.inputs))
-    linear = all_free(released(found), found)
+    linear = released(found)
+    _refuse_twists(linear)
+    linear = all_free(linear, found)
     about = Small(np.zeros(large.n), linear.K, linear.C.tocsr(), linear.M, found.inputs)
     motion = replace(large.motion, rest=found.state)
     unloaded = replace(large, effects=parts, motion=motion, viscous=0.0 * large.viscous, about=about)
@@ -202,6 +206,18 @@ def _prestressed(structure: Structure, parts: tuple[Effect, ...], backend: Backe
     unbraked = -large.motion.collect(found.state, borne(found))
     load[held] += (let_go - unbraked)[held]
     return replace(unloaded, about=replace(about, load=load + unbraked))
+
+
+def _refuse_twists(linear: LinearModel) -> None:
+    """Refuse shafts beside which K of a motion about another place would hold nothing."""
+    if linear.place is None or linear.place.springs is None:
+        return
+    stiffness = zip(linear.coordinates, linear.place.springs.diagonal(), strict=True)
+    shafts = [f"{name.removesuffix('_twist')} ({k:.3g} N m/rad)" for name, k in stiffness if k]
+    raise StructureError(
+        f"assemble: with GeometricStiffness the stiffness of what is driven is lost in the rounding of the shaft of "
+        f"{', '.join(shafts)}: leave ShaftElasticity out for it, or give LargeRotation() and linearize"
+    )
 
 
 def _modally_damped(model: Model, damping: ModalDamping) -> Model:
@@ -216,10 +232,12 @@ def _modally_damped(model: Model, damping: ModalDamping) -> Model:
     shapes, omega = modes.shapes[:, first:], modes.omega[first:]
     ratios = np.full(len(omega), damping.ratios) if isinstance(damping.ratios, float) else np.array(damping.ratios)
     count = min(len(ratios), len(omega))
-    momenta = linear.M @ shapes[:, :count]
-    places = [model.coordinate(name) for name in linear.coordinates]
-    spread = sp.csr_matrix((np.ones(len(places)), (places, range(len(places)))), shape=(model.n, len(places)))
-    viscous = sp.csr_matrix(spread @ (momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T @ spread.T)
+    assert linear.place is not None
+    basis = linear.place.basis
+    moving = np.diff(basis.tocsr().indptr) > 0
+    mass = tangents(model, rest.state.loose, rest.inputs)[0]
+    momenta = moving[:, None] * (mass @ (basis @ shapes[:, :count]))
+    viscous = sp.csr_matrix((momenta * (2.0 * ratios[:count] * omega[:count])) @ momenta.T)
     return replace(model, viscous=viscous, modal_about=rest.state)
 
 

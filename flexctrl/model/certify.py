@@ -178,7 +178,7 @@ def rigid_modes(linear: LinearModel, modes: Modes, motion: Motion, state: State)
     shapes = modes.shapes[:, modes.unstable : modes.unstable + modes.rigid]
     left = shapes
     words = []
-    for name, vector in whole_body(linear.coordinates, motion, state):
+    for name, vector in whole_body(_jacobian(linear, motion, state), motion, state):
         momentum = linear.M @ vector
         size = float(np.sqrt(max(vector @ momentum, 0.0)))
         share = shapes.T @ momentum / (size or 1.0)
@@ -199,11 +199,26 @@ def _without(shapes: np.ndarray, share: np.ndarray) -> np.ndarray:
     return shapes @ q[:, 1 : share.size]
 
 
-def whole_body(coordinates: tuple[str, ...], motion: Motion, state: State) -> list[tuple[str, np.ndarray]]:
-    """Return displacements of some coordinates in which the whole machine moves as one, with their names."""
-    number = {name: i for i, name in enumerate(motion.names)}
-    places = [number[name] for name in coordinates]
-    T = motion.jacobian(state)[:, places]
+def _jacobian(linear: LinearModel, motion: Motion, state: State) -> sp.csr_matrix:
+    """Raw motion with the coordinates of a linear model."""
+    assert linear.place is not None
+    return sp.csr_matrix(motion.jacobian(state) @ linear.place.basis)
+
+
+def whole_body(T: sp.csr_matrix, motion: Motion, state: State) -> list[tuple[str, np.ndarray]]:
+    """Return displacements of coordinates in which the whole machine moves as one, with their names.
+
+    Parameters
+    ----------
+    T : scipy.sparse.csr_matrix, shape (raw, k)
+        Raw motion with the coordinates.
+    motion : Motion
+    state : State
+
+    Returns
+    -------
+    list of tuple of str and numpy.ndarray, shape (k,)
+    """
     x = state.x[:-1]
     center = x.mean(axis=0)
     found = []
@@ -217,7 +232,7 @@ def whole_body(coordinates: tuple[str, ...], motion: Motion, state: State) -> li
     projected = []
     nodes = T[: 6 * len(x)]
     elsewhere = np.isin(np.arange(len(x)), motion.gauges)
-    weights = nodes.T @ nodes + 1e-12 * sp.identity(len(places))
+    weights = nodes.T @ nodes + 1e-12 * sp.identity(T.shape[1])
     solve = splu(weights.tocsc()).solve
     for name, everywhere in found:
         field = np.where(elsewhere[:, None], 0.0, everywhere)

@@ -292,11 +292,11 @@ def _pushed_freely(balance: Balance, state: State) -> list[str]:
     model, scale, unit = balance.model, balance.scale(state), balance.unit[balance.free]
     force = unit * balance.force(state)
     K = sp.diags(unit) @ balance.among_free(balance.slope(state)) @ sp.diags(unit)
-    names = tuple(model.coordinates[i] for i in balance.free)
+    T = model.motion.jacobian(state)[:, balance.free]
     pushed = []
     from flexctrl.model.certify import whole_body  # brings all that modes need
 
-    for name, motion in whole_body(names, model.motion, state):
+    for name, motion in whole_body(T, model.motion, state):
         way = motion / unit
         size = float(np.abs(way).max())
         resisted = bool((np.abs(K @ way) > 1e-6 * (abs(K) @ np.abs(way))).any())

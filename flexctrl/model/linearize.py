@@ -19,6 +19,7 @@ from flexctrl.model.consistent import check_state
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
+from flexctrl.model.shafts import with_twists
 from flexctrl.model.stability import without_energy
 from flexctrl.model.state import State
 from flexctrl.model.tangents import tangents
@@ -47,7 +48,9 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     -------
     LinearModel
         In the order of ``model.coordinates``; inputs and outputs are deviations. Its ``certificate``
-        tells why it can be trusted. What a `Rest` holds is held.
+        tells why it can be trusted. What a `Rest` holds is held. Where the shaft of a drive is so stiff that K would
+        hold nothing of what it drives, the coordinate ``<drive>_twist``, θ_d − R s, stands in place of the motor's
+        angle ``<drive>_source``.
 
     Raises
     ------
@@ -98,6 +101,7 @@ def _about(balance: Balance, state: State) -> LinearModel:
     loads = without_energy(model, balance.u)
     linear, asymmetry = _derivative(balance, state, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
+    linear = with_twists(linear, balance, state)
     return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state))
 
 

@@ -277,7 +277,21 @@ class Model:
 
     @cached_property
     def _stiffness(self) -> sp.csc_matrix:
-        loose = loose_names(self.structure, self.effects)
+        return self.stiffness_but(frozenset())
+
+    def stiffness_but(self, without: frozenset[str]) -> sp.csc_matrix:
+        """Return K of small motion about the drawn shape without some parts.
+
+        Parameters
+        ----------
+        without : frozenset of str
+            Their names.
+
+        Returns
+        -------
+        scipy.sparse.csc_matrix, shape (n, n)
+        """
+        loose = loose_names(self.structure, self.effects) | without
         parts = stiffness_blocks(self.structure, self.motion, self._stiff_but(loose))
         modal = modal_blocks(self.structure, self.effects, self.motion)
         own = ((name, (places, stiffness)) for name, (places, _, stiffness) in modal)

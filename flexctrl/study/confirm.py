@@ -202,19 +202,19 @@ def _size(model: Model, at: State, linear: LinearModel, mode: CriticalMode) -> f
     """Largest displacement of the mode over the machine's size, or its largest rotation."""
     largest = 0.0
     for part in (mode.shape.real, mode.shape.imag):
-        raw = model.rates(at.with_(v=_full(model, linear, part)))[: model.motion.source_base].reshape(-1, 6)
+        raw = model.rates(at.with_(v=_full(linear, part)))[: model.motion.source_base].reshape(-1, 6)
         largest = max(largest, np.abs(raw[:, :3]).max() / model.structure.size, np.abs(raw[:, 3:]).max())
     return largest or 1.0
 
 
-def _full(model: Model, linear: LinearModel, values: np.ndarray) -> np.ndarray:
-    full = np.zeros(model.n)
-    full[[model.coordinate(name) for name in linear.coordinates]] = values
-    return full
+def _full(linear: LinearModel, values: np.ndarray) -> np.ndarray:
+    """Displacements of the machine's coordinates."""
+    assert linear.place is not None
+    return np.asarray(linear.place.basis @ values)
 
 
 def _started(model: Model, at: State, linear: LinearModel, mode: CriticalMode, scale: float) -> State:
-    step, v = (_full(model, linear, (scale * part).real) for part in (mode.shape, mode.rate))
+    step, v = (_full(linear, (scale * part).real) for part in (mode.shape, mode.rate))
     return model.advance(at, step, v, 0.0)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
 
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.linear.model import LinearModel
@@ -35,6 +36,7 @@ class _Flat:
 
     n: int
     inputs: int
+    basis: sp.csc_matrix | None = None
 
     @property
     def raw(self) -> int:
@@ -73,6 +75,9 @@ class _Flat:
                 f"simulate: start has {state.q.size} degrees of freedom; the linear model has {self.n}: give a state "
                 "of the model that it was made from, or leave out what has been condensed or reduced"
             )
+        if self.basis is not None and len(state.x) > 1:  # of the machine, whose motors have angles in place of twists
+            q, v = spsolve(self.basis, np.column_stack([state.q, state.v])).T
+            state = replace(state, q=q, v=v)
         return state if state.driven.size == self.inputs else replace(state, driven=np.zeros(self.inputs))
 
     def jacobian(self, state: State) -> sp.csr_matrix:
@@ -231,7 +236,8 @@ class LinearPlant:
 
     @cached_property
     def motion(self) -> _Flat:
-        return _Flat(self.n, len(self.inputs))
+        place = self.linear.place
+        return _Flat(self.n, len(self.inputs), place.basis if place and place.springs is not None else None)
 
     @cached_property
     def signals(self) -> _Signals:

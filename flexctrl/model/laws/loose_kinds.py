@@ -63,6 +63,7 @@ def _loose(effects: tuple[Effect, ...], m: pieces.DriveMotion, gap: ca.SX) -> Sh
 _SPRING = Kind("loose_spring", 2, 3, 0, len(pieces.LINE_PARAMETERS) + 1, _spring)
 _ROTARY = Kind("loose_rotary", 2, 6, 1, len(pieces.DRIVE_PARAMETERS) + 1, _rotary)
 _LINEAR = Kind("loose_linear", 2, 6, 1, len(pieces.DRIVE_PARAMETERS) + 1, _linear)
+LOOSE_DRIVES = (_ROTARY, _LINEAR)
 
 
 def loose_names(structure: Structure, effects: Sequence[Effect]) -> frozenset[str]:

@@ -1,0 +1,180 @@
+"""Linear models of machines with shafts so stiff that K would hold nothing beside them: twists are coordinates.
+
+A shaft adds k R² to the stiffness of what it drives. At 1e18 N m/rad the last digit of a double is 128 N m/rad, and
+what bends beside it is lost. There the twist ψ = θ_d − R s takes the place of the motor's angle θ_d, and what is driven
+takes the motor along. With W what the coordinates move by then, K₀ the stiffness without these shafts and D the
+diagonal of theirs,
+
+Wᵀ K W = Wᵀ K₀ W + D
+
+has both to the last digit. K₀ is that of the same machine with shafts next to nothing, twisted until they bear the same
+torques.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.linear.model import LinearModel
+from flexctrl.linear.parts import with_springs
+from flexctrl.linear.pattern import symmetric
+from flexctrl.model.balance import Balance
+from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.loose_kinds import LOOSE_DRIVES
+from flexctrl.model.laws.part_kinds import LINEAR_DRIVE, ROTARY_DRIVE
+from flexctrl.model.model import Model
+from flexctrl.model.rounding import DIGITS, slope_terms
+from flexctrl.model.state import State
+from flexctrl.model.tangents import tangents
+
+__all__ = ["with_twists"]
+
+_SOFT = 2.0**-100
+_DROWNED = 2.0**-20
+_KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bare:
+    """A machine whose shafts are next to nothing, and the stiffness and damping that they had.
+
+    Attributes
+    ----------
+    model : Model
+    state : State
+        In which its shafts bear the torques that they bore.
+    K, C : scipy.sparse.csr_matrix, shape (n, n)
+        Of the free coordinates, without the shafts.
+    springs, dampers : scipy.sparse.csr_matrix, shape (n, n)
+        What the shafts add.
+    """
+
+    model: Model
+    state: State
+    K: sp.csr_matrix
+    C: sp.csr_matrix
+    springs: sp.csr_matrix
+    dampers: sp.csr_matrix
+
+
+def with_twists(linear: LinearModel, balance: Balance, state: State) -> LinearModel:
+    """Return a linear model with twists in place of the angles of motors whose shafts drown what they drive.
+
+    Parameters
+    ----------
+    linear : LinearModel
+        Of the free coordinates of a balance.
+    balance : Balance
+    state : State
+        In which it is met.
+
+    Returns
+    -------
+    LinearModel
+        The same model if no shaft is that stiff.
+    """
+    model = balance.model
+    motors = _drowning(linear.K, np.flatnonzero(np.isin(balance.free, model.motion.sources)))
+    if model.about or not motors.size:
+        return linear
+    names = tuple(linear.coordinates[i].removesuffix("_source") for i in motors)
+    bare = _bare(linear, balance, state, names)
+    W = _basis(bare.springs, motors)
+    return _written(linear, bare, W, motors) if _drowned(bare, balance, W, motors) else linear
+
+
+def _drowning(K: sp.csc_matrix, motors: np.ndarray) -> np.ndarray:
+    """Motors whose shafts are nearly all that holds something they drive."""
+    own = K.diagonal()
+    found = []
+    for i in motors:
+        beside, pull = K.indices[K.indptr[i] : K.indptr[i + 1]], K.data[K.indptr[i] : K.indptr[i + 1]]
+        left = own[beside] - pull**2 / own[i] if own[i] > 0.0 else own[beside]
+        found.append(bool(((left < _DROWNED * own[beside]) & (beside != i)).any()))
+    return motors[np.array(found, dtype=bool)]
+
+
+def _bare(linear: LinearModel, balance: Balance, state: State, names: tuple[str, ...]) -> _Bare:
+    model, there = _softened(balance.model, names), _twisted(balance.model, state, names)
+    _, C, K = tangents(model, there, balance.u)
+    if (held := balance.turning(state, balance.whole_force(state))).nnz:
+        K = K - held
+    C, K = (balance.seen(there, A) for A in (C, K))
+    return _Bare(model, there, K, C, (linear.K - K).tocsr(), (linear.C - C).tocsr())
+
+
+def _softened(model: Model, names: tuple[str, ...]) -> Model:
+    """The machine with shafts next to nothing in some drives."""
+    soft = replace(model)
+    soft.__dict__.update({name: model.__dict__[name] for name in ("signals", "gusts") if name in model.__dict__})
+    soft.__dict__["forces"] = replace(model.forces, families=tuple(_soft(f, names) for f in model.forces.families))
+    if not model.large:
+        soft.__dict__["_stiffness"] = model.stiffness_but(frozenset(names))
+    return soft
+
+
+def _soft(family: Family, names: tuple[str, ...]) -> Family:
+    if family.kernels.kind not in _KINDS:
+        return family
+    parameters = family.parameters.copy()
+    parameters[np.isin(family.parts, names), :2] *= _SOFT
+    return replace(family, parameters=parameters)
+
+
+def _twisted(model: Model, state: State, names: tuple[str, ...]) -> State:
+    """The state with motors turned until soft shafts bear the torques of stiff ones."""
+    if not model.large:
+        return state
+    still, motion, q = np.zeros(model.n), model.motion, state.q.copy()
+    torques = model.forces.raw(state, still, still)[motion.source_base :]
+    for drive, torque, source in zip(model.structure.drives, torques, motion.sources, strict=False):
+        if drive.name in names:
+            q[source] -= torque * (1.0 / _SOFT - 1.0) / drive.stiffness
+    return replace(state, q=q)
+
+
+def _basis(springs: sp.csr_matrix, motors: np.ndarray) -> sp.csc_matrix:
+    """What the coordinates move by with twists, and with what takes the motors along."""
+    W = sp.lil_matrix(sp.identity(springs.shape[0]))
+    for i in motors:
+        row = springs[i].tocoo()
+        beside = row.col != i
+        W[i, row.col[beside]] = -row.data[beside] / springs[i, i]
+    return sp.csc_matrix(W)
+
+
+def _drowned(bare: _Bare, balance: Balance, W: sp.csc_matrix, motors: np.ndarray) -> bool:
+    """Whether there is anything beside the shafts that would be lost."""
+    terms = DIGITS * balance.seen(bare.state, slope_terms(bare.model, bare.state, balance.u, bare.K))
+    led = np.unique(W[motors].tocoo().col)
+    led = np.setdiff1d(led, motors)
+    own, shafts = np.abs(bare.K.diagonal()), bare.springs.diagonal()
+    return bool(((own > np.abs(terms.diagonal())) & (own < _DROWNED * shafts))[led].any())
+
+
+def _written(linear: LinearModel, bare: _Bare, W: sp.csc_matrix, motors: np.ndarray) -> LinearModel:
+    """The model in other coordinates, its shafts on the diagonal of K and C."""
+    chosen = np.isin(np.arange(W.shape[0]), motors)
+    springs, dampers = (sp.diags(np.where(chosen, A.diagonal(), 0.0)) for A in (bare.springs, bare.dampers))
+    K, C = sp.csc_matrix(W.T @ bare.K @ W + springs), sp.csc_matrix(W.T @ bare.C @ W + dampers)
+    even = symmetric(linear.K)[1] == 0.0
+    names = tuple(
+        name.removesuffix("_source") + "_twist" if twists else name
+        for name, twists in zip(linear.coordinates, chosen, strict=True)
+    )
+    written = linear.projected(W, names)
+    assert written.place is not None
+    place = replace(written.place, model=bare.model, state=bare.state, springs=sp.csc_matrix(springs))
+    reach = bare.model.motion.jacobian(bare.model.place(bare.state)) @ place.basis
+    parts = bare.model.forces.parts(bare.model.place(bare.state), reach)
+    owners = {name.removesuffix("_twist"): int(i) for i, name in enumerate(names) if chosen[i]}
+    return replace(
+        written,
+        K=symmetric(K)[0] if even else K,
+        C=C,
+        place=place,
+        parts=with_springs(parts, owners, springs.diagonal()),
+    )
