@@ -18,7 +18,7 @@ METHODS = {
 
 
 class Growing:
-    """A push that grows, 20 N a second."""
+    """A push that grows, 20.1 N a second."""
 
     inputs, outputs = ("x",), ("push",)
 
@@ -29,7 +29,7 @@ class Growing:
         return np.zeros(0)
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return np.array([20.0 * self.units.force * t / self.units.time])
+        return np.array([20.1 * self.units.force * t / self.units.time])
 
 
 def cart(
@@ -63,7 +63,7 @@ def test_each_of_two_contacts_bears_its_own_load(mass, inertia, units):
     model = cart(units, mass, inertia)
     u = np.array([3.0 * units.force, 0.02 * units.force * units.length])
     state = model.switches.begin(model.rest, u)
-    assert left(model, state, u) == pytest.approx({"cart.u": 0.5, "drive": 0.6}, rel=1e-12)
+    assert left(model, state, u) == pytest.approx({"cart.u": 0.5, "drive": 0.6}, abs=2e-10)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_each_of_two_contacts_bears_its_own_load(mass, inertia, units):
 )
 @pytest.mark.parametrize("units", [OTHERS["µm, µg, ms"], LADDER[-1]], ids=str)
 def test_two_contacts_of_unlike_inertia_break_loose_alike_in_any_units(units, method, backend):
-    """The cart when its push is 6 N, the motor later on by its shaft; compiled and plain."""
+    """The cart when its push has passed 6 N, the motor later on by its shaft; compiled and plain."""
     run, other = (pushed(u, method, backend) for u in (SI, units))
     assert other.status is run.status is fc.Status.FINISHED
     assert other.report.steps == run.report.steps
@@ -90,11 +90,11 @@ def pushed(u: Units, method: str, backend: fc.CasadiVM | None) -> fc.Run:
 
 @pytest.mark.parametrize("units", [SI, *LADDER], ids=str)
 def test_contacts_that_hold_the_same_motion_share_its_load(units):
-    """A rigid shaft ties the motor to the cart, 100 rad a metre: 1 N in all are 0.5 N and 5 mN m."""
+    """A rigid shaft ties the motor to the cart, 100 rad a metre: of 6 N and 0.05 N m, 11 N in all, 1 N is a share."""
     model = cart(units, rigid=True)
     u = np.array([units.force, 0.0])
     state = model.switches.begin(model.rest, u)
-    assert left(model, state, u) == pytest.approx({"cart.u": 1.0 - 0.5 / 6.0, "drive": 0.9}, rel=1e-12)
+    assert left(model, state, u) == pytest.approx({"cart.u": 10.0 / 11.0, "drive": 10.0 / 11.0}, abs=2e-10)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1e-6, 1e-12])

@@ -51,8 +51,6 @@ def is_brief(journey: Journey, before: Point, after: Point, slid: Point, switch:
 def withheld(journey: Journey, at: Point, switch: int) -> Point:
     """Hold for a step what would slip for less than that, whatever pulls; after it, that is tried again."""
     state = journey.plan.model.switches.withheld(at.state, switch)
-    if journey.mark.stuck > 1:  # nothing has happened: it has broken loose and stuck again where the step begins
-        del journey.events[-2:]
     journey.watch.withheld(switch)
     return journey.stepper.renew(
         replace(at, state=state), journey.plan.feed.restart(state, at.supply), journey.mark.size

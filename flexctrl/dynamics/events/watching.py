@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from flexctrl.dynamics.events.crossings import met, offset
 from flexctrl.dynamics.events.landing import Missed, landed
 from flexctrl.dynamics.events.switching import anew, is_brief, withheld
@@ -110,11 +112,17 @@ def _is_there(journey: Journey, crossing: Crossing, before: Point, after: Point,
 
 
 def _switched(journey: Journey, at: Point, landing: Crossing, switch: int, brief: bool) -> Point:
-    """Go on under the law of force that holds from now on; note whether the contact slides under it."""
-    fresh = at if brief else anew(journey, at, switch)
-    slides = not brief and journey.plan.model.switches.phases(fresh.state)[switch] != STUCK
-    journey.happens(replace(landing, rising=bool(slides)), at.state, at.supply.u)
-    return withheld(journey, at, switch) if brief else fresh
+    """Go on under the law of force that holds from now on; note which contacts slide and stick under it."""
+    fresh = withheld(journey, at, switch) if brief else anew(journey, at, switch)
+    slid, slides = (journey.plan.model.switches.phases(p.state) != STUCK for p in (at, fresh))
+    told = [switch, *(int(k) for k in np.flatnonzero(slid != slides) if k != switch)]
+    if brief and journey.mark.stuck > 1:  # nothing has happened: it has broken loose and stuck where the step begins
+        del journey.events[-len(told) :]
+        return fresh
+    for k in told:
+        at_once = replace(landing, gauge=len(journey.watch.events) + k, rising=bool(slides[k]))
+        journey.happens(at_once, at.state, at.supply.u)
+    return fresh
 
 
 def _note(journey: Journey, met: Sequence[Crossing], curve: Curve, before: Point) -> None:

@@ -16,7 +16,7 @@ from flexctrl.model.flat.flat import Flat, carry, clear
 from flexctrl.model.flat.flattening import Flattened, layout_of
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.laws.kinds import DRIVE_SLOT
-from flexctrl.model.state import Dry
+from flexctrl.model.state import State
 
 __all__ = [
     "Contacts",
@@ -54,6 +54,8 @@ class Contacts:
         What they find.
     phases : Wholes
         Where the phases stand in the workspace.
+    spare : Wholes
+        Whether what each holds is held by others, which bear its share.
     anchors, most : Reals
         Where each that sticks is held, and what it bears.
     ease : Reals
@@ -82,6 +84,7 @@ class Contacts:
     slips: Runs
     found: Reals
     phases: Wholes
+    spare: Wholes
     anchors: Reals
     most: Reals
     ease: Reals
@@ -119,6 +122,7 @@ def contacts_of(F: Flattened) -> Contacts:
         slips=switches.slips.each(cells),
         found=np.zeros(count * width),
         phases=phases.astype(np.int64),
+        spare=np.zeros(count, dtype=np.int64),
         anchors=anchors,
         most=switches.static,
         ease=ease,
@@ -134,17 +138,18 @@ def contacts_of(F: Flattened) -> Contacts:
     )
 
 
-def enter_contacts(c: Contacts, F: Flattened, dry: Dry) -> None:
+def enter_contacts(c: Contacts, F: Flattened, state: State) -> None:
     """Take up what the contacts do; `Flattened.enter` has put the phases in their places."""
     if c.count:
-        order = F.model.switches.slips.order
-        c.anchors[:] = dry.anchor[order]
+        switches, dry = F.model.switches, state.dry
+        order = switches.slips.order
+        c.anchors[:], c.spare[:] = dry.anchor[order], switches.spare(state)
         c.stuck, c.known = int((dry.phase[order] == STUCK).sum()), 0
 
 
 def sticks(c: Contacts, f: Flat, k: int) -> bool:
-    """Tell whether a contact sticks."""
-    return f.z[c.phases[k]] == STUCK
+    """Tell whether a contact sticks, and holds what no others do."""
+    return f.z[c.phases[k]] == STUCK and c.spare[k] == 0
 
 
 def feel(c: Contacts, f: Flat) -> None:

@@ -141,7 +141,7 @@ class Marcher(Loops):
         m, F = self.march, self.flattened
         F.enter(point.state)
         self.dry = point.state.dry
-        enter_contacts(self.contacts, F, self.dry)
+        enter_contacts(self.contacts, F, point.state)
         m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
         m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
         m.lean, m.phase, m.attempt, m.t = point.lean, FRESH, 0, point.state.t

@@ -22,6 +22,7 @@ from flexctrl.errors import StructureError
 from flexctrl.model.flows import flowing
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.laws.holds import Hold, easiness, hold
+from flexctrl.model.laws.sharing import evened, led, spare, tied
 from flexctrl.model.laws.slip_scales import SlipScales, slip_scales
 from flexctrl.model.laws.slips import Slips
 from flexctrl.model.solve import factorise
@@ -37,7 +38,7 @@ T = TypeVar("T")
 
 _FADING = 1e4
 _STILL = 1e-10
-_SLACK, _OVERCOME = 1e-9, 0.5
+_MOST, _ALIKE, _OVERCOME = 1.0 + 1e-10, 1e-9, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +162,14 @@ class Switches:
         """Return what holds the contacts that stick."""
         return self._once("hold", state, lambda: hold(self._stuck_rows(state), self.ease))
 
+    def spare(self, state: State) -> np.ndarray:
+        """Tell which contacts that stick hold nothing that stronger ones do not, shape (contacts,)."""
+        stuck = self.phases(state) == STUCK
+        found = np.zeros(stuck.size, dtype=bool)
+        if stuck.sum() > 1:
+            found[stuck] = spare(self._stuck_rows(state) * np.sqrt(self.ease), self.static[stuck])
+        return found
+
     def _stuck_rows(self, state: State) -> np.ndarray:
         return self.slips.rows(state)[self.phases(state) == STUCK]
 
@@ -185,7 +194,7 @@ class Switches:
         -------
         numpy.ndarray, shape (contacts,)
             Sliding: the slip speed in its direction, in `scales`; sticking: the share of the force it bears that is
-            left before it breaks loose.
+            left before it breaks loose. What it can just bear it does, whatever the last digits are.
         """
         phases = self.phases(state)
         gaps = np.where(phases == 0.0, 1.0, phases * self.slips.speeds(state) / self.scales.speeds)
@@ -194,7 +203,7 @@ class Switches:
             held = self._once("gaps", state, lambda: (u, self._holding(state, u)[0]))
             if not np.array_equal(held[0], u):
                 held = (u, self._holding(state, u)[0])
-            gaps[stuck] = 1.0 - np.abs(held[1]) / self.static[stuck]
+            gaps[stuck] = _MOST - np.abs(held[1]) / self.static[stuck]
         return gaps
 
     def gap(self, state: State, u: np.ndarray, contact: int) -> float:
@@ -228,7 +237,8 @@ class Switches:
         _, turning, _ = self.slips.at(state, state.v, a)
         solve = factorise(sp.csr_matrix(held.freed(M) + held.against_slope()))
         a[heavy] = solve(held.freed(force[heavy]) - held.against(turning[stuck]))
-        return held.borne(M @ a[heavy] - force[heavy]), a
+        borne, felt = held.borne(M @ a[heavy] - force[heavy]), held.W * np.sqrt(self.ease[heavy])
+        return evened(felt, borne, self.static[stuck]), a
 
     def begin(self, state: State, u: np.ndarray) -> State:
         """Return a state with the phases it must have: what stands still sticks if it can.
@@ -299,14 +309,30 @@ class Switches:
         """
         phases = self.phases(state).copy()
         if phases[contact] == STUCK:
-            held = self._holding(state, u)[0][np.flatnonzero(phases == STUCK).tolist().index(contact)]
-            if abs(held) > _OVERCOME * self.static[contact]:  # else a force that jumps will tear it loose, not yet
-                phases[contact] = -np.sign(held)
+            torn, held = self._torn(state, u, contact)
+            phases[torn] = -np.sign(held)
         else:
             speed, W = self.slips.speeds(state), self.slips.rows(state)
             state = state.with_(v=state.v - hold(W[[contact]], self.ease).back @ speed[[contact]])
-            phases[contact] = STUCK
+            phases = self._stopped(state, contact)
         return self._settled(state, u, phases)
+
+    def _torn(self, state: State, u: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
+        """What breaks loose with a contact, as it has shared what it bore; and what that bore."""
+        stuck, held = np.flatnonzero(self.phases(state) == STUCK), self._holding(state, u)[0]
+        used, own = np.abs(held) / self.static[stuck], stuck.tolist().index(contact)
+        if used[own] <= _OVERCOME:  # a force that jumps will tear it loose, not yet
+            return stuck[:0], held[:0]
+        group = tied(self._stuck_rows(state) * np.sqrt(self.ease))
+        torn = (group == group[own]) & (used >= (1.0 - _ALIKE) * used[own])
+        return stuck[torn], held[torn]
+
+    def _stopped(self, state: State, contact: int) -> np.ndarray:
+        """Return the phases once a contact sticks, and with it what cannot slip any more."""
+        phases, felt = self.phases(state).copy(), self.slips.rows(state) * np.sqrt(self.ease)
+        phases[contact] = STUCK
+        phases[(phases != 0.0) & led(felt[phases == STUCK], felt)] = STUCK
+        return phases
 
     def withheld(self, state: State, contact: int) -> State:
         """Return a state in which a contact sticks, however large the force on it is.
@@ -320,9 +346,7 @@ class Switches:
         -------
         State
         """
-        phases = self.phases(state).copy()
-        phases[contact] = STUCK
-        state = self._with(state, phases)
+        state = self._with(state, self._stopped(state, contact))
         return state.with_(v=self.still(state, state.v))
 
     def _settled_under(self, state: State, u: np.ndarray, phases: np.ndarray) -> State:
@@ -338,7 +362,7 @@ class Switches:
             held, a = self._holding(state, u)
             _, rates, _ = self.slips.at(state, state.v, a)
             back = [i for i in loosened if phases[i] != STUCK and phases[i] * rates[i] < 0.0]
-            excess = np.abs(held) - self.static[stuck] * (1.0 - _SLACK)
+            excess = np.abs(held) / self.static[stuck] - _MOST
             fresh = [k for k in np.argsort(-excess) if excess[k] > 0.0 and int(stuck[k]) not in loosened]
             if back:
                 phases[back] = STUCK
