@@ -46,6 +46,7 @@ from flexctrl.dynamics.steps import (
     failed_step,
 )
 from flexctrl.dynamics.stops import Stops
+from flexctrl.dynamics.unheld import bare, needed
 from flexctrl.errors import ControllerError
 from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
@@ -162,8 +163,10 @@ class Journey:
         except (ArithmeticError, ValueError) as error:
             failure = self._failure(error, self.point)
             self.stepper.counts.worst = failure.worst
-            worst = self.plan.model.coordinates[failure.worst]
-            self.status, self.message = Status.FAILED, f"{self._cause(str(failure))}; worst freedom: {worst}"
+            model, worst = self.plan.model, failure.worst
+            remedy = f"; {needed(model, worst)}" if bare(model, worst) else ""
+            where = f"worst freedom: {model.coordinates[worst]}{remedy}"
+            self.status, self.message = Status.FAILED, f"{self._cause(str(failure))}; {where}"
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
         self._judge()

@@ -23,6 +23,7 @@ from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.swift.layers import beyond_layers
 from flexctrl.dynamics.swift.settling import quasistatic
 from flexctrl.dynamics.unbegun import UNASKED, unbegun
+from flexctrl.dynamics.unheld import needed
 from flexctrl.errors import MechanismError, SingularMatrixError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
@@ -116,10 +117,7 @@ def _begun(
         point = stepper.start(state, supply, size)
     except SingularMatrixError as error:
         name = model.coordinates[error.where]
-        raise MechanismError(
-            f"simulate: {name} has neither mass nor stiffness; hold it with a Support, or give the part "
-            "rotary inertia (rhoJ, rhoI) or mass"
-        ) from None
+        raise MechanismError(f"simulate: {name} has neither mass nor stiffness; {needed(model, error.where)}") from None
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method, plan.tolerance)
     books.turn(point, size)

@@ -22,8 +22,9 @@ class RopeMass(Effect):
     of the lumped and the consistent one: frequencies of a taut rope are then exact to fourth order in the element's
     length, those of one that hangs free to second (20 elements: the first is off by 3e-4, by 2e-8 with 20 elements of a
     `Beam` of next to no bending stiffness). With `RopeStretch` the elements stretch, without it they are rigid
-    links. In the model the elements of a rope are ropes of their own, ``rope0``, ``rope1`` … from its start, where its
-    `Tension` is measured.
+    links. In the model the elements of a rope are ropes of their own, ``rope0``, ``rope1`` … from its start; outputs
+    name the rope as it is given. Its `Tension` is that of the first element; where another is asked for, draw two ropes
+    with a `Pin` between them, and measure the one that starts there.
 
     Parameters
     ----------

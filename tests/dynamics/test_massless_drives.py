@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flexctrl as fc
-from flexctrl.design import Step, pd
+from flexctrl.design import Step, Sum, pd
 from flexctrl.errors import MechanismError
 
 SHAFT, RATIO, SAMPLE, UNTIL = 50.0, 3.0, 0.02, 1.0
@@ -208,3 +208,30 @@ def test_under_a_continuous_law_that_damps_it_it_keeps_its_place_as_the_referenc
     found = solve_ivp(slope, (0, 0.25), np.zeros(3), t_eval=run.t, method="Radau", rtol=1e-11, atol=1e-14).y[0]
     expected = found if jump == 0.0 else np.append(0.0, found[:-1])
     assert np.abs(run["angle"] - expected).max() <= tolerance * np.abs(expected).max()
+
+
+def test_a_motor_in_its_play_needs_inertia():
+    """It is told so, not what a beam would need."""
+    body = fc.RigidBody("body", (0, 0, 0), 1.0, (1, 1, 1.0))
+    drive = fc.RotaryDrive("drive", body.node, axis="z", stiffness=SHAFT)
+    structure = fc.Structure([body], [fc.Support(body.node, "u v w rx ry")], [drive])
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.ShaftElasticity(), fc.Backlash({"drive": 0.1})])
+    with pytest.raises(MechanismError, match=r"drive_source has neither mass nor stiffness; .*'drive'.*inertia="):
+        fc.simulate(model, until=1.0)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+def test_a_winch_without_inertia_ends_where_its_rope_goes_slack(damping):
+    """After half a second that hold the load its torque pays out: the run says what the winch needs."""
+    top, load = fc.PointMass("top", (0, 0, 0), 1.0), fc.PointMass("load", (0, 0, -2.0), 5.0)
+    winch = fc.Winch("winch", load.node, top.node, EA=1e5, radius=0.1, ratio=20.0, damping=damping)
+    structure = fc.Structure(
+        [top, load], [fc.Support(top.node)], [winch], [fc.MotorTorque("torque", winch)], [fc.Tension("pull", winch)]
+    )
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.Flexible()])
+    pull = fc.OpenLoop({"torque": Sum((Step(-0.25), Step(0.3, at=0.5)))})
+    run = fc.simulate(model, pull, until=1.0)
+    assert run.status is fc.Status.FAILED
+    assert run.t[-1] == pytest.approx(0.5, abs=0.1)
+    assert "nothing holds the motor of 'winch'" in run.report.message
+    assert "inertia=" in run.report.message

@@ -57,6 +57,17 @@ def test_a_rope_a_millionth_of_its_load():
     assert string == pytest.approx(3141.593757, rel=1e-5)
 
 
+def test_tension_is_measured_where_a_rope_is_drawn_to_begin():
+    """A rope drawn in two: each carries what hangs below its start, but for half of its first element."""
+    upper = fc.Rope("upper", (0, 0, 0), (0, 0, -4), EA=1e7, rhoA=2.0, elements=4)
+    lower = fc.Rope("lower", (0, 0, -4), (0, 0, -10), EA=1e7, rhoA=2.0, elements=8)
+    outputs = [fc.Tension("above", upper), fc.Tension("below", lower)]
+    chain = fc.Structure([upper, lower], [fc.Support(upper.start), fc.Pin(upper.end, lower.start)], outputs=outputs)
+    model = fc.assemble(chain, [fc.LargeRotation(), fc.Gravity(), fc.RopeMass(), fc.RopeStretch()])
+    carried = [2.0 * 9.81 * (10.0 - 0.5), 2.0 * 9.81 * (6.0 - 0.375)]
+    assert list(fc.equilibrium(model).outputs.values()) == pytest.approx(carried, rel=1e-7)
+
+
 def test_tension_carries_what_hangs_below():
     """At the start of the rope, at its first element's middle."""
     structure = hanging(10, 1.0)
