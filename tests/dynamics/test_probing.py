@@ -78,3 +78,27 @@ def test_probes_do_not_reach_over_a_corner(flank, side):
     got = m.entries[F.plan.places(rows, columns)]
     assert np.allclose(got, wanted[rows, columns], rtol=1e-6)
     assert (wanted[0, 1] != 0.0) == (flank * side > 0.0)
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1e-6])
+def test_steps_of_whole_turns_are_the_same_about_any_axis(inertia):
+    """A wheel on a hinge and its geared motor turn evenly, 1000 times in 27 steps, about z and about a tilted axis."""
+    runs = [turned_evenly(axis, inertia) for axis in ((0.0, 0.0, 1.0), (-0.61, 0.12, 0.783))]
+    for run in runs:
+        assert run.status is fc.Status.FINISHED
+        assert run.report.rejected_steps == 0
+        assert run["angle"][-1] == pytest.approx(63.0 * 100.0, abs=1e-8)
+        assert run["motor"][-1] == pytest.approx(63.0 * 1e5, abs=1e-5)
+    assert runs[0].report.steps == runs[1].report.steps
+
+
+def turned_evenly(axis: tuple[float, float, float], inertia: float) -> fc.Run:
+    wheel, base = (fc.RigidBody(name, (0, 0, 0), 1.0, (1.0, 1.0, 1.0)) for name in ("wheel", "base"))
+    (hub,), (foot,) = wheel.nodes, base.nodes
+    drive = fc.RotaryDrive("motor", hub, foot, axis=axis, stiffness=1e6, ratio=1e3, inertia=inertia)
+    outputs = [fc.Rotation("angle", hub, axis, minus=foot), fc.DriveAngle("motor", drive)]
+    joints = [fc.Support(foot), fc.Hinge(foot, hub, axis=axis)]
+    structure = fc.Structure([wheel, base], joints, drives=[drive], outputs=outputs)
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.Flexible()])
+    v = np.array([63e3 if name == "motor_source" else 63.0 for name in model.coordinates])
+    return fc.simulate(model, until=100.0, start=model.rest.with_(v=v))

@@ -128,7 +128,7 @@ def probe(
     clear(f.entries, entries)
     for i in range(f.drives):
         p.driven[i] = f.driven[i]
-        f.driven[i] = f.found[i]
+        f.driven[i] = f.found[i] - f.about[i]  # what the step adds to it brings it there, whole turns and all
     for i in range(0, f.padded, 8):
         put(p.step[i:], eight(f.step[i:]))
         put(p.v[i:], eight(f.v[i:]))
