@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha.coning import coning_of
 from flexctrl.dynamics.alpha.point import Coefficients
+from flexctrl.dynamics.floating import floats
 from flexctrl.dynamics.march.answer import no_answer
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
@@ -38,6 +39,8 @@ _SHARE, _KEEPING = 3e-3, 1e-4  # where nothing is damped, what Newton's method l
 _MADE, _ASKED = 5.0, 100.0
 _LOOSEST = 1e-6
 _TIGHT = 0.99e-10
+_ADRIFT = 3e-13
+"""Where nothing holds a part: under a tangent that is kept what is left has one sign in all steps, and is momentum."""
 
 
 @dataclass(frozen=True)
@@ -140,10 +143,11 @@ def _room(F: Flattened) -> dict[str, Any]:
 def _newton(F: Flattened, method: Method, groups: int) -> dict[str, Any]:
     """How exactly Newton's method solves steps, and with which tangents."""
     flat = F.flat
+    least = min(method.least, _ADRIFT) if floats(F.model) else method.least
     return {
-        "least": method.least,
-        "tolerance": method.least,
-        "loosest": max(method.least, _LOOSEST if method.least >= _TIGHT else 0.0),
+        "least": least,
+        "tolerance": least,
+        "loosest": max(least, _LOOSEST if least >= _TIGHT else 0.0),
         "share": _SHARE if method.coefficients.damping else _KEEPING,
         "price": _MADE + groups if flat.tangents or groups else _ASKED,
         "asking": int(not flat.tangents and not groups),
