@@ -109,8 +109,8 @@ def test_the_steps_it_names_see_it():
     """A remedy that leaves it unsaid, beside an explicit method that follows the growth."""
     coarse = fc.simulate(carts(), law(1, sent=True), until=22.2, method=fc.GeneralizedAlpha(SAMPLE))
     step = float(coarse.report.message.split("take steps of ")[1].split()[0])
-    for method in (fc.GeneralizedAlpha(step), fc.ExplicitRungeKutta()):
-        run = fc.simulate(carts(), law(1, sent=True), until=22.2, method=fc.Checked(method), every=SAMPLE)
+    for method in (fc.GeneralizedAlpha(step), fc.Unchecked(fc.ExplicitRungeKutta())):
+        run = fc.simulate(carts(), law(1, sent=True), until=22.2, method=method, every=SAMPLE)
         assert run.status is fc.Status.FINISHED
         assert np.ptp((run["far"] - run["near"])[-40:]) > 0.3
         assert not any("sampled loop" in note for note in run.report.notes)
