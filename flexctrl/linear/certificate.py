@@ -27,7 +27,8 @@ class Certificate:
     loads : tuple of str
         Loads at work without a potential; they may make K unsymmetric, and what they add is kept.
     frequency_error : float
-        Bound of the relative error of the lowest 20 undamped frequencies by the rounding of K.
+        Bound of the relative error of the lowest 20 undamped frequencies by the rounding of K, and of the places that
+        tell the stresses.
     gyroscopic : float
         max |C − Cᵀ| / 2 max |C|: 0 for dampers, 1 for Coriolis forces alone (`RotatingFrame`). Undamped modes do
         not know of it, damped poles do.

@@ -16,7 +16,7 @@ from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.paths.pivots import holds, negative_pivots
 from flexctrl.model.places import Places, places_of
-from flexctrl.model.rounding import force_rounding, slope_terms
+from flexctrl.model.rounding import DIGITS, force_rounding, rounded, slope_terms
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 from flexctrl.model.units import geared, turning, units
@@ -37,7 +37,7 @@ _LASTING = (
     "_led",
     "weighed",
 )
-_STILL, _UNFELT, _CARRIED = 1e-12, 1e-7, 1e-9
+_STILL, _UNFELT, _CARRIED = 4.0 * float(np.finfo(float).eps), 1e-7, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,11 +293,17 @@ class Balance:
         return negative_pivots(self.among_free(K), self._terms(state, K))
 
     def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
-        terms = slope_terms(self.model, state, self.u, K)
+        terms = slope_terms(self.model, state, self.u, K) + self._stresses(state)
         if self._plain:
             return self.among_free(terms)
         change = abs(self._change(state))
         return self.among_free((change.T @ terms @ change).tocsr())
+
+    def _stresses(self, state: State) -> sp.csr_matrix:
+        """What K has of stresses that are but the last digits of places, as terms that may be rounded."""
+        if not self.model.large:
+            return sp.csr_matrix((self.model.n, self.model.n))
+        return abs(self.slope(rounded(state, 0)) - self.slope(state)) / DIGITS
 
     def linear_step(self, state: State, K: sp.csr_matrix) -> np.ndarray:
         """Return where the forces and the held coordinates would lead all coordinates, did K stay as it is."""

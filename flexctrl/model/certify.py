@@ -16,8 +16,9 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
 from flexctrl.linear.pattern import symmetric
 from flexctrl.linear.pencil import EPS
-from flexctrl.linear.undamped import EXTENDED_EPS, LOST, UNSURE, unseen
+from flexctrl.linear.undamped import EXTENDED_EPS, LOST, UNSEEN, UNSURE, unseen
 from flexctrl.model.motion import Motion
+from flexctrl.model.rounding import stress_noise
 from flexctrl.model.state import State
 
 _ASYMMETRY = 1e-6
@@ -116,14 +117,17 @@ def certify(
 
 
 def _frequency_error(linear: LinearModel, modes: Modes) -> float:
-    """The bound of the lowest frequencies' relative error; refuses what the rounding of K has swallowed."""
-    noise = stiffness_noise(linear.K, modes.shapes)
-    values = np.abs(modes.omega_squared)
-    errors = np.divide(noise, 2.0 * values, out=np.zeros_like(noise), where=values > 0.0)
+    """The bound of the lowest frequencies' relative error; refuses what rounding of K or of places has swallowed."""
+    noise, values = stiffness_noise(linear.K, modes.shapes), np.abs(modes.omega_squared)
+    errors = _relative(noise, values)
     errors = np.where(errors > UNSURE, errors * EXTENDED_EPS / EPS, errors)
-    hangs = linear.place is not None and linear.place.pull > 0.0
-    hidden = (values == 0.0) & (RIGID_NOISE * noise > unseen(linear, values)) & hangs
-    lost = hidden | (errors > LOST)
+    stress = np.zeros_like(noise) if linear.place is None else stress_noise(linear.place, modes.shapes)
+    noise, whole = np.maximum(noise, stress), errors + _relative(stress, values)
+    hangs, slight = linear.place is not None and linear.place.pull > 0.0, unseen(linear, values)
+    hidden = (values == 0.0) & (RIGID_NOISE * noise > slight) & hangs
+    # near a critical load what is left is as little as one likes: it is lost if other motions do not dwarf its doubt
+    first = float(values.min(initial=np.inf, where=(values > 0.0) & (whole <= LOST)))
+    lost = hidden | (errors > LOST) | ((whole > LOST) & (stress > min(slight, UNSEEN * first)))
     if lost.any():
         i = int(np.argmax(lost))
         raise LinearizationError(
@@ -132,7 +136,12 @@ def _frequency_error(linear: LinearModel, modes: Modes) -> float:
             f"{modes.omega_squared[i]:.3g} (rad/s)², give or take {RIGID_NOISE * noise[i]:.1e}. "
             "Use fewer elements, or a rigid part in place of the stiffest one"
         )
-    return float(errors.max(initial=0.0))
+    return float(whole.max(initial=0.0))
+
+
+def _relative(noise: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """What noise in ω² is in ω, as a share of it; 0 for what is 0."""
+    return np.divide(noise, 2.0 * values, out=np.zeros_like(noise), where=values > 0.0)
 
 
 def _skew_share(C: sp.csc_matrix) -> float:

@@ -12,17 +12,23 @@ levers turn by with each coordinate.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.linear.place import Place
+from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.model.units import units
 
-__all__ = ["DIGITS", "force_rounding", "slope_terms"]
+__all__ = ["DIGITS", "force_rounding", "rounded", "shaken", "slope_terms", "stress_noise"]
 
 DIGITS = 4.0 * float(np.finfo(float).eps)
 """Share of each term that is unsure: it is made by a few roundings."""
+
+_SHAKES = 4
 
 
 def force_rounding(model: Model, state: State, u: np.ndarray) -> np.ndarray:
@@ -71,6 +77,64 @@ def slope_terms(model: Model, state: State, u: np.ndarray, K: sp.spmatrix) -> sp
     rates = np.where(led > 0.0, 1.0 / _unit(model, state), 0.0)
     turned = sp.csr_matrix(led[:, None]) @ sp.csr_matrix(rates[None, :])
     return sp.csr_matrix(T.T @ model.forces.terms(state).slopes @ T + turned + turned.T)
+
+
+def stress_noise(place: Place[Model, State], shapes: np.ndarray) -> np.ndarray:
+    """Return by how much φᵀKφ of some shapes may be wrong because places have no more digits.
+
+    The stress of a stiff part is told by the last ones: at EA = 1e12 N a strain of 1e-14 is 0.01 N,
+    and what hangs on that part swings with it.
+
+    Parameters
+    ----------
+    place : Place
+    shapes : numpy.ndarray, shape (n, k)
+
+    Returns
+    -------
+    numpy.ndarray, shape (k,)
+    """
+    model, state = place.model, place.state
+    if not model.large:
+        return np.zeros(shapes.shape[1])
+    here = place.strain(shapes).diagonal()
+    near = [replace(place, state=rounded(state, seed)) for seed in range(_SHAKES)]
+    return np.asarray(np.max([np.abs(p.strain(shapes).diagonal() - here) for p in near], axis=0))
+
+
+def shaken(state: State, shift: np.ndarray | float, turn: float, seed: int) -> State:
+    """Return a state with other last digits of every node's place: what rides on others moves with them up to these.
+
+    Parameters
+    ----------
+    state : State
+    shift : numpy.ndarray, shape of the places, or float
+        By how much places are others [m].
+    turn : float
+        By how much rotations are [rad].
+    seed : int
+
+    Returns
+    -------
+    State
+    """
+    signs = np.random.default_rng(seed).choice((-1.0, 1.0), (2, *state.x.shape))
+    return replace(state, x=state.x + shift * signs[0], R=exponential(turn * signs[1]) @ state.R)
+
+
+def rounded(state: State, seed: int) -> State:
+    """Return a state with other last digits.
+
+    Parameters
+    ----------
+    state : State
+    seed : int
+
+    Returns
+    -------
+    State
+    """
+    return shaken(state, np.spacing(np.abs(state.x)), float(np.finfo(float).eps), seed)
 
 
 def _reach(model: Model, state: State) -> float:

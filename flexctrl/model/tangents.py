@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.linear.dust import clean_mass, clean_stiffness
-from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.model import Model
+from flexctrl.model.rounding import shaken
 from flexctrl.model.state import State
 from flexctrl.model.units import units
 
@@ -60,16 +58,10 @@ def _unsure(model: Model, state: State, u: np.ndarray, K: sp.csc_matrix) -> np.n
         signs = np.random.default_rng(seed).choice((-1.0, 1.0), model.n)
         near = model.advance(state, _LAST_DIGITS * signs * unit, still, 0.0)
         if not model.motion.plain:
-            near = _shaken(near, reach, seed)
+            near = shaken(near, reach * _LAST_DIGITS, _LAST_DIGITS, seed)
         change = abs(K + model.slope(near, still, still, (1.0, 0.0, 0.0), u))
         largest = np.maximum(largest, change.max(axis=1).toarray().ravel())
     return _CAUTION * largest
-
-
-def _shaken(state: State, reach: float, seed: int) -> State:
-    """A state with other last digits of every node's place: what rides on others moves with them up to these."""
-    signs = np.random.default_rng(seed).choice((-_LAST_DIGITS, _LAST_DIGITS), (2, *state.x.shape))
-    return replace(state, x=state.x + reach * signs[0], R=exponential(signs[1]) @ state.R)
 
 
 def _groups(coordinates: tuple[str, ...]) -> tuple[np.ndarray, ...]:

@@ -162,3 +162,37 @@ def test_damping_of_motion_however_small_beside_that_of_strain_is_kept(alpha):
     poles = fc.linearize(model).damped_poles()
     assert np.count_nonzero(poles == 0.0) == 2
     assert poles[2:4].real == pytest.approx(-alpha, rel=1e-6)
+
+
+def slender_pendulum(EA: float, elements: int) -> fc.Structure:
+    """A bar of 1 m, 1 kg and 1 N m² on a pin."""
+    section = fc.Section(EA=EA, EI_y=1.0, EI_z=1.0, GJ=1.0, rhoA=1.0, rhoJ=1e-3)
+    bar = fc.Beam("bar", (0, 0, 0), (0, 0, -1), section, elements=elements)
+    return fc.Structure([bar], [fc.Support(bar.start, "u v w rz")])
+
+
+@pytest.mark.parametrize(
+    ("EA", "elements", "g"), [(1e8, 50, 1e-4), (1e9, 50, 1e-3), (1e10, 50, 1e-2), (1e12, 20, 0.1), (1e12, 50, 0.1)]
+)
+def test_a_slender_bar_in_light_gravity_swings(EA, elements, g):
+    """Its weight is less than the last digits of places make of EA, and stretches it by 1e-13: ω² = 3/2 g/L."""
+    effects = [fc.Flexible(), fc.LargeRotation(), fc.Gravity((0, 0, -g))]
+    model = fc.assemble(slender_pendulum(EA, elements), effects)
+    rest = fc.equilibrium(model)
+    linear = fc.linearize(model, at=rest)
+    bound = linear.certificate.frequency_error
+    assert rest.stable
+    assert linear.modes(2).rigid == 0
+    assert bound < 0.01
+    assert linear.modes(2).omega == pytest.approx(np.sqrt(1.5 * g), rel=max(bound, 1e-3))
+
+
+@pytest.mark.parametrize(("EA", "elements", "g"), [(1e8, 50, 1e-7), (1e12, 50, 1e-3), (1e12, 20, 0.0)])
+def test_a_swing_that_places_do_not_tell_is_refused(EA, elements, g):
+    """Stretched by less than the last digit: pulls and pushes of 1e-3 N are rounding, no instability."""
+    effects = [fc.Flexible(), fc.LargeRotation(), *([fc.Gravity((0, 0, -g))] if g else [])]
+    model = fc.assemble(slender_pendulum(EA, elements), effects)
+    rest = fc.equilibrium(model)
+    assert rest.stable
+    with pytest.raises(LinearizationError, match="lost in the rounding"):
+        fc.linearize(model, at=rest)
