@@ -29,7 +29,7 @@ EARLY = line((0.593088, 1.676243), 58160.1, 0.00171313, 40369.7, (18.64833, 3.51
 def test_what_breaks_loose_by_a_little_is_told(model, speed):
     """Steps of 1 ms go the wrong way by 0.4 of the motion, as steps of 2 ms do; those of 0.5 ms do not."""
     how = {"until": 0.8, "start": model.drawn.with_(v=np.array([0.0, speed])), "every": 0.005}
-    true = fc.simulate(model, method=fc.ExplicitRungeKutta(), tolerance=fc.Tolerance(1e-9, 1e-12), **how)
+    true = fc.simulate(model, method=fc.Unchecked(fc.ExplicitRungeKutta()), tolerance=fc.Tolerance(1e-8, 1e-11), **how)
     off = {}
     for step in (1e-3, 5e-4):
         run = fc.simulate(model, method=fc.GeneralizedAlpha(step), **how)
