@@ -154,11 +154,23 @@ LONG = (
 """Cases whose neighbours hold the same: run with -m long."""
 
 
+_FAMILY = 8
+"""Of one test of dynamics so many cases are run, evenly spread over all; the others with -m long."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the long cases."""
+    """Mark the long cases, and those between their like."""
+    families: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.nodeid.endswith(LONG):
             item.add_marker("long")
+        elif item.nodeid.startswith("tests/dynamics/"):
+            families.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in families.values():
+        run = {round(i * (len(cases) - 1) / (_FAMILY - 1)) for i in range(_FAMILY)}
+        for i, item in enumerate(cases):
+            if len(cases) > _FAMILY and i not in run:
+                item.add_marker("long")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
