@@ -150,12 +150,13 @@ LONG = (
     "test_law_states.py::test_anti_windup_slides_along_its_limit[backend5-how5-0.001-gains0]",
     "test_sticking_under_control.py::test_it_comes_to_rest_near_its_target[fixed]",
     "test_first_steps.py::test_what_nothing_sets_going_but_the_clock_is_not_missed[0.1-implicit]",
+    "test_omissions.py::test_sampling_is_kept_under_what_counts_samples[noisy]",
 )
 """Cases whose neighbours hold the same: run with -m long."""
 
 
-_FAMILY = 8
-"""Of one test of dynamics so many cases are run, evenly spread over all; the others with -m long."""
+_FAMILY, _LARGE = 4, ("tests/dynamics/", "tests/effects/", "tests/model/", "tests/study/", "tests/scene/")
+"""Of one test in these rooms so many cases are run, evenly spread over all; the others with -m long."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -164,7 +165,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.endswith(LONG):
             item.add_marker("long")
-        elif item.nodeid.startswith("tests/dynamics/"):
+        elif item.nodeid.startswith(_LARGE):
             families.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for cases in families.values():
         run = {round(i * (len(cases) - 1) / (_FAMILY - 1)) for i in range(_FAMILY)}
