@@ -61,10 +61,8 @@ def evened(felt: np.ndarray, borne: np.ndarray, most: np.ndarray) -> np.ndarray:
     """
     if len(felt) < 2:
         return borne
-    felt, borne = (
-        np.asarray(np.linalg.qr(felt.T, mode="r")).T,
-        borne.copy(),
-    )  # as lengths and angles are, in few numbers
+    felt = np.asarray(np.linalg.qr(felt.T, mode="r")).T  # as lengths and angles are, in few numbers
+    borne = borne.copy()
     label = tied(felt)
     for group in (np.flatnonzero(label == g) for g in np.flatnonzero(np.bincount(label) > 1)):
         borne[group] = most[group] * _used(felt[group], borne[group], most[group])
