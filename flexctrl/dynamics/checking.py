@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from flexctrl.design.controller import Controller
 from flexctrl.dynamics.checkpoint import Checkpoint
@@ -115,8 +116,8 @@ def _copied(law: Controller | None) -> Controller | None:
 def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> Run:
     """Return the run with what a coarser one tells of it; where that is much, a second one has the last word.
 
-    Where they tell little, a note says whether one far coarser goes elsewhere; of steps of one length the others know
-    enough.
+    Where they tell little, one far coarser shows how errors grow with the tolerance, and a note says whether it goes
+    elsewhere; of steps of one length the others know enough.
 
     Parameters
     ----------
@@ -137,11 +138,11 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     told, other = _told(run, journey, coarser, beginning)
     if other is None or other.run.status is Status.INTERRUPTED:
         return told
+    nearby = method.coarser(tolerance, _NEARER)
     quiet = told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes)
     parted = not quiet and told.report.error > PARTED
     if not quiet:
-        feared = told.report.error / (coarser.longer**run.report.order - 1.0) if parted else 0.0
-        told = _nearer(run, told, other, journey, method.coarser(tolerance, _NEARER), beginning, feared)
+        told = _nearer(run, told, other, journey, nearby, beginning)
     if told.report.error > TOLD:
         return told
     if parted:
@@ -152,6 +153,10 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     standing, third = _made(told, journey, farther, beginning)
     if third is None:
         return told
+    if quiet:
+        standing = _grown(run, standing, other, third, journey, nearby, beginning)
+    if standing.report.error > TOLD:
+        return standing
     grown = (farther.longer**run.report.order - 1.0) / (coarser.longer**run.report.order - 1.0)
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
     return elsewhere(standing, third.gap, journey, farther.said) if astray else standing
@@ -159,21 +164,54 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
 
 @dataclass(frozen=True)
 class _Other:
-    """A run beside, and how far it is from the first: nothing where it has ended at once."""
+    """A run beside, how it was made, and how far it is from the first: nothing where it has ended at once."""
 
     run: Run
     gap: Gap
+    beside: Beside
 
 
-def _nearer(
-    run: Run, told: Run, other: _Other, journey: Journey, nearby: Beside, beginning: Beginning, feared: float
+def _order(near: _Other, far: _Other, most: float) -> float:
+    """The order of errors as two runs beside show it: of what they are apart no more than all is the finer one's.
+
+    With errors that grow as rᵖ the gaps are as rᵖ − 1; what does not grow so, as where corners come one after another,
+    has a lower order than its method.
+    """
+    if not near.gap.most or _reached(near.run) != _reached(far.run):
+        return most
+    one, other = math.log(near.beside.longer), math.log(far.beside.longer)
+    ratio, least = far.gap.most / near.gap.most, min(math.log(2.0) / one, most)
+
+    def short(order: float) -> float:
+        return math.expm1(order * other) - ratio * math.expm1(order * one)
+
+    if short(least) >= 0.0:
+        return least
+    return float(brentq(short, least, most)) if short(most) > 0.0 else most
+
+
+def _grown(
+    run: Run, told: Run, other: _Other, far: _Other, journey: Journey, nearby: Beside, beginning: Beginning
 ) -> Run:
+    """The run with what is told of it where errors grow as they do from the one to the other run beside."""
+    order = _order(other, far, run.report.order)
+    if order == run.report.order:
+        return told
+    known = _said(replace(run, checkpoint=told.checkpoint), other, journey, beginning, order)
+    return _nearer(run, known, other, journey, nearby, beginning) if known.report.error > TOLD else known
+
+
+def _nearer(run: Run, told: Run, other: _Other, journey: Journey, nearby: Beside, beginning: Beginning) -> Run:
     """What a second one tells, unless it ended before the first."""
-    nearer, second = _told(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning, feared)
+    standing, second = _made(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning)
     if second is None:
         return told
     if _reached(second.run) < _reached(other.run):
         return _standing(told, second.run.checkpoint, nearby)
+    order, parted = run.report.order, told.report.error > PARTED
+    feared = told.report.error / (other.beside.longer**order - 1.0) if parted else 0.0
+    seen = order if parted else _order(second, other, order)
+    nearer = _said(standing, second, journey, beginning, seen, feared)
     return _as_much(nearer, told) if nearer.report.error == told.report.error == run.report.drift else nearer
 
 
@@ -189,16 +227,17 @@ def _reached(other: Run) -> float:
     return math.inf if other.status is Status.STOPPED else other.final.t
 
 
-def _told(
-    run: Run, journey: Journey, beside: Beside, beginning: Beginning, feared: float = 0.0
-) -> tuple[Run, _Other | None]:
+def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, _Other | None]:
     """The run with what one other tells, and that one; None if there is none."""
-    run, other = _made(run, journey, beside, beginning)
-    if other is None:
-        return run, None
+    standing, other = _made(run, journey, beside, beginning)
+    return (standing, None) if other is None else (_said(standing, other, journey, beginning, run.report.order), other)
+
+
+def _said(run: Run, other: _Other, journey: Journey, beginning: Beginning, order: float, feared: float = 0.0) -> Run:
+    """The run with what one other tells, if errors are of an order."""
     if other.run.final.t <= beginning.t:
-        return _noted(run, f"{_UNCHECKED}, which ended at t = {other.run.final.t:.3g} s"), other
-    return told_beside(run, other.run, other.gap, journey, beside.longer, feared), other
+        return _noted(run, f"{_UNCHECKED}, which ended at t = {other.run.final.t:.3g} s")
+    return told_beside(run, other.run, other.gap, journey, other.beside.longer, order, feared)
 
 
 def _made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, _Other | None]:
@@ -229,9 +268,9 @@ def _made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> t
         return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
     standing = _standing(run, other.checkpoint, beside)
     if other.final.t <= beginning.t:
-        return standing, _Other(other, Gap.unseen(run))
+        return standing, _Other(other, Gap.unseen(run), beside)
     try:
-        return standing, _Other(other, between(run, other, journey, run.report.steps - beginning.steps))
+        return standing, _Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside)
     except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
         return _noted(standing, f"{_UNCHECKED}, whose numbers fail ({fault})"), None
 

@@ -121,7 +121,9 @@ def may_grow(journey: Journey) -> bool:
     return bool(swung.any()) or feed.reacting or _cornered(journey, own)
 
 
-def told_beside(run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float, feared: float = 0.0) -> Run:
+def told_beside(
+    run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float, order: float, feared: float = 0.0
+) -> Run:
     """Return a run with what a coarser one tells of its error.
 
     Where nothing else keeps them short, steps of the coarser run are longer by a factor r and its errors by rᵖ. Samples
@@ -141,6 +143,8 @@ def told_beside(run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float
         How the finer one went.
     longer : float
         By how much steps of the coarser one are longer; below 1 it is a finer one.
+    order : float
+        p: that of the method, or less, as two runs beside have shown it.
     feared : float
         What one that has parted would leave if errors grew as powers of steps do; 0 if none has.
 
@@ -156,7 +160,7 @@ def told_beside(run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float
         return run
     fewer, report = coarse.report.steps / max(run.report.steps, 1), run.report
     free = (1.0 - fewer) / (1.0 - 1.0 / longer)
-    left = min(max(free, _LEAST), 1.0) * abs(longer**report.order - 1.0)
+    left = min(max(free, _LEAST), 1.0) * abs(longer**order - 1.0)
     told, parted = gap.most / left, gap.most > PARTED
     origin = journey.origin
     summed = max(told, origin.error) < report.drift and (free < _LEAST or parted)
