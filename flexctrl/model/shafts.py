@@ -9,6 +9,9 @@ Wᵀ K W = Wᵀ K₀ W + D
 
 has both to the last digit. K₀ is that of the same machine with shafts next to nothing, twisted until they bear the same
 torques.
+
+Each motor takes the place of its own angle, so any number of shafts may drive one body, or bear on one another in a
+row. Whether they drown what they drive is asked of all together: without the first of two, the second still holds all.
 """
 
 from __future__ import annotations
@@ -87,14 +90,18 @@ def with_twists(linear: LinearModel, balance: Balance, state: State) -> LinearMo
 
 
 def _drowning(K: sp.csc_matrix, motors: np.ndarray) -> np.ndarray:
-    """Motors whose shafts are nearly all that holds something they drive."""
+    """Motors of shafts that, together, are nearly all that holds something they drive."""
     own = K.diagonal()
-    found = []
-    for i in motors:
-        beside, pull = K.indices[K.indptr[i] : K.indptr[i + 1]], K.data[K.indptr[i] : K.indptr[i + 1]]
-        left = own[beside] - pull**2 / own[i] if own[i] > 0.0 else own[beside]
-        found.append(bool(((left < _DROWNED * own[beside]) & (beside != i)).any()))
-    return motors[np.array(found, dtype=bool)]
+    motors = motors[own[motors] > 0.0]
+    borne = _borne(K, motors)
+    left = own - borne.sum(axis=0)
+    left[motors] = np.inf
+    return motors[(borne[:, left < _DROWNED * own] > 0.0).any(axis=1)]
+
+
+def _borne(K: sp.spmatrix, motors: np.ndarray) -> np.ndarray:
+    """What each shaft alone adds to the stiffness of each coordinate, shape (motors, n)."""
+    return K.tocsr()[motors].toarray() ** 2 / K.diagonal()[motors, None]
 
 
 def _bare(linear: LinearModel, balance: Balance, state: State, names: tuple[str, ...]) -> _Bare:
