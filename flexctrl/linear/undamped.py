@@ -25,7 +25,7 @@ COMPLETE = 1000
 DEFAULT_COUNT = 20
 BLURRED = 1e-13
 ROUND_OFF = 2e-13
-UNSURE, UNSEEN, LOST, SLIGHT = 1e-7, 1e-6, 0.05, 1e-12
+UNSURE, UNSEEN, LOST = 1e-7, 1e-6, 0.05
 STRESS_NOISE = 5.0
 EXTENDED_EPS = float(np.finfo(np.longdouble).eps)
 
@@ -35,7 +35,8 @@ def modes(linear: LinearModel, count: int | None = None) -> Modes:
 
     A mode counts as rigid-body when φᵀKφ is indistinguishable from the rounding of K's entries, or is both
     under 1e-8 of the first flexible ω² and within 1e6 of that rounding: a slow pendulum on a stiff structure
-    stays a pendulum. No mode is missed: the number found is checked by a Sturm count.
+    stays a pendulum. Where weights or loads may make it swing, the machine itself is asked whether it does. No mode
+    is missed: the number found is checked by a Sturm count.
 
     Parameters
     ----------
@@ -95,13 +96,19 @@ def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
 
 def _recalculated(linear: LinearModel, base: Scaled, pairs: Eigenpairs) -> Eigenpairs:
     """Soft modes whose λ is unsure by the rounding of K, by Rayleigh–Ritz with the stiffness of the machine itself."""
-    hidden = RIGID_NOISE * pairs.noise > unseen(linear, pairs.values)
-    faint = np.where(pairs.rigid, hidden, pairs.noise > UNSURE * np.abs(pairs.values))
-    unsure = np.flatnonzero(faint)
-    if linear.place is None or not unsure.size:
+    if linear.place is None:
+        return pairs
+    told = np.array(pairs.values)
+    told[pairs.rigid] = energies(base.stiffness[0], pairs.shapes[:, pairs.rigid])
+    slight = unseen(linear, pairs.values)
+    # beside stiff motions a slow swing counts as none: what hangs is asked whether it has one
+    swings = (np.abs(told) > slight) & (linear.place.pull > 0.0)
+    hidden = (RIGID_NOISE * pairs.noise > slight) | swings
+    unsure = np.flatnonzero(np.where(pairs.rigid, hidden, pairs.noise > UNSURE * np.abs(told)))
+    if not unsure.size:
         return pairs
     exact = linear.place.strain(base.scales[:, None] * pairs.shapes[:, unsure])
-    if (np.abs(exact.diagonal() - pairs.values[unsure]) > 100.0 * pairs.noise[unsure]).any():
+    if (np.abs(exact.diagonal() - told[unsure]) > 100.0 * pairs.noise[unsure]).any():
         return pairs  # the machine has another K by now
     values, shapes, noise, rigid = (a.copy() for a in (pairs.values, pairs.shapes, pairs.noise, pairs.rigid))
     values[unsure], turned = np.linalg.eigh(0.5 * (exact + exact.T))
@@ -128,7 +135,7 @@ def unseen(linear: LinearModel, omega_squared: np.ndarray) -> float:
     """
     first = float(omega_squared.min(initial=np.inf, where=omega_squared > 0.0))
     first, pull = first if np.isfinite(first) else 0.0, linear.place.pull if linear.place else 0.0
-    return LOST * pull if pull > SLIGHT * first else UNSEEN * first
+    return LOST * pull if pull > 0.0 else UNSEEN * first
 
 
 def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenpairs:

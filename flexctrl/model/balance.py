@@ -36,6 +36,7 @@ _LASTING = (
     "_weights",
     "_led",
     "weighed",
+    "_gravity",
 )
 _STILL, _UNFELT, _CARRIED = 4.0 * float(np.finfo(float).eps), 1e-7, 1e-9
 
@@ -230,7 +231,7 @@ class Balance:
 
         Weights count whether the machine can give way to them or not.
         """
-        mass = float(self.felt[self.moving].sum()) or self.heaviest
+        mass = max(float(self.felt[self.moving].sum()), float(self.felt.max(initial=1e-300)))
         return max(self.scale(state), self._weights) / (mass * self.size)
 
     @cached_property
@@ -267,11 +268,19 @@ class Balance:
     @cached_property
     def weighed(self) -> bool:
         """Whether weights, or centrifugal forces, work on coordinates: what turns about the vertical has none."""
-        effects = self.model.effects
-        pull = max((float(np.linalg.norm(e.g)) for e in effects if isinstance(e, Gravity)), default=0.0)
         weights = np.abs(self.model.balance(self.model.rest, self.still, self.still) / self.lever).sum()
-        felt = bool(pull) and bool(weights > _CARRIED * pull * self.felt.sum())
-        return felt or any(isinstance(e, RotatingFrame) for e in effects)
+        felt = self.heavy and bool(weights > _CARRIED * self._gravity * self.felt.sum())
+        return felt or any(isinstance(e, RotatingFrame) for e in self.model.effects)
+
+    @property
+    def heavy(self) -> bool:
+        """Whether masses have weights, felt by coordinates or not: what hangs straight down swings by them."""
+        return self._gravity > 0.0
+
+    @cached_property
+    def _gravity(self) -> float:
+        """[m/s²]."""
+        return max((float(np.linalg.norm(e.g)) for e in self.model.effects if isinstance(e, Gravity)), default=0.0)
 
     def called_forth(self, state: State) -> float:
         """Return the largest force on a coordinate if what is held went to its place and all else stood still [N]."""

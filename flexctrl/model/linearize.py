@@ -193,7 +193,8 @@ def _derivative(balance: Balance, state: State, unsymmetric: bool) -> tuple[Line
     M, C, K = (balance.seen(state, A) for A in (M, C, K))
     largest = float(abs(unit @ K @ unit).max()) if K.nnz else 0.0
     asymmetry = float(abs(unit @ (K - K.T) @ unit).max()) / max(largest, 1e-300) if K.nnz else 0.0
-    pull = 0.0 if not balance.loaded and balance.idle(model.rest) else balance.pull(state)
+    at_work = balance.loaded or balance.heavy or not balance.idle(model.rest)
+    pull = balance.pull(state) if at_work else 0.0
     basis = balance.basis(state)
     T = model.motion.jacobian(model.place(state)) @ basis
     on_place, on_rates = model.signals.slopes(state, model.rates(state.with_(v=np.zeros(model.n))), model.motion.raw)

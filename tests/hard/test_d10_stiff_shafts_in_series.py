@@ -12,6 +12,7 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
+from flexctrl.errors import LinearizationError
 
 G, HALF, OWN, ROTOR = 9.81, 0.5, 0.02, 0.01
 LEVEL, TILTED = np.eye(3), Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
@@ -120,3 +121,22 @@ def test_two_pendulums_hang_on_a_cart_that_a_motor_drives(k):
     M = np.array([[7.0, -HALF, -HALF], [-HALF, 0.28, 0.0], [-HALF, 0.0, 0.32]])
     expected = frequencies(M, np.diag([50.0, HALF * G, HALF * G]))
     assert linear.modes().frequencies[:3] == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("k", [1e10, 1e11, 1e12, 1e14])
+def test_behind_a_motor_that_is_held_a_slow_swing_is_told_by_the_machine_itself(k):
+    """Its shaft ties the two in one: K holds their stiffness in its last digits, and the certificate says how well."""
+    model = hanging([k, k])
+    linear = fc.linearize(model, fc.equilibrium(model, hold={"d1_source": 0.0}))
+    M, K = (A.sum() for A in rigid(2))
+    assert linear.modes().frequencies[0] == pytest.approx(float(np.sqrt(K / M)) / (2.0 * np.pi), rel=1e-7)
+    assert linear.certificate.rigid_modes == ()
+    run = fc.simulate(linear, until=3.0, inputs={"t0": 1.0}, every=0.5)
+    assert run["q0"] == pytest.approx((1.0 - np.cos(np.sqrt(K / M) * run.t)) / K, rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("k", [1e16, 1e18])
+def test_where_no_digit_of_the_swing_is_left_it_is_refused(k):
+    model = hanging([k, k])
+    with pytest.raises(LinearizationError, match=r"lost in the rounding of the stiffest entries.*rigid part"):
+        fc.linearize(model, fc.equilibrium(model, hold={"d1_source": 0.0}))

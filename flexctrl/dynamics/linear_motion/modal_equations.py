@@ -81,6 +81,7 @@ def opened(model: Plant, modes: int | None = None) -> ModalEquations:
         model.coordinates,
         (*model.inputs, "constant_loads"),
         tuple(f"{name}_{what}" for what in ("place", "rate") for name in model.coordinates),
+        place=model.linear.place if isinstance(model, LinearPlant) else None,
     )
     system = replace(modal_system(linear), jump=np.zeros((2 * n, m + 1)))
     first = first_order(system)
