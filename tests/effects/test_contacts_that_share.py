@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import flexctrl as fc
 from flexctrl.model.laws.sharing import evened, led, spare, tied
@@ -118,6 +119,20 @@ def test_shares_are_those_of_the_theorems_of_plasticity(seed):
     mechanisms = np.array([(-w[1], w[0]) for w in W])  # one contact each does not slip
     needed = max(abs(load @ v) / (most @ np.abs(W @ v)) for v in mechanisms)
     assert np.abs(borne / most).max() == pytest.approx(needed, rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_other_shares_are_less(seed):
+    """Up to fifteen contacts of up to five freedoms, some alike: what a linear program finds is no less."""
+    rng = np.random.default_rng(seed)
+    W = np.repeat(rng.normal(size=(5, rng.integers(1, 6))), rng.integers(1, 4), axis=0)
+    anyhow, most = rng.normal(size=len(W)), rng.uniform(0.5, 2.0, len(W))
+    borne, load, one = evened(W, anyhow, most), W.T @ anyhow, np.ones((2 * len(W), 1))
+    both = np.hstack([np.vstack([np.eye(len(W)), -np.eye(len(W))]), -one])
+    goal, equal = np.append(np.zeros(len(W)), 1.0), np.hstack([W.T * most, np.zeros((W.shape[1], 1))])
+    least = linprog(goal, both, np.zeros(len(one)), equal, load, (None, None))
+    assert W.T @ borne == pytest.approx(load, abs=1e-12)
+    assert np.abs(borne / most).max() == pytest.approx(least.fun, rel=1e-9)
 
 
 def test_what_shares_with_what():

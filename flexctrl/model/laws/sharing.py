@@ -9,12 +9,12 @@ largest |λ| / F is least, with F what a contact bears: of one freedom, contacts
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 __all__ = ["evened", "led", "spare", "tied"]
 
 _SAME = 1e-13
 _TIED = 1e-9
+_EDGES = 16
 
 
 def spare(felt: np.ndarray, most: np.ndarray) -> np.ndarray:
@@ -80,10 +80,12 @@ def tied(felt: np.ndarray) -> np.ndarray:
     Returns
     -------
     numpy.ndarray of int, shape (contacts,)
+        Which is the first of them.
     """
     across, _, rank = _directions(felt)
     others = across[:, rank:]  # what else they could bear to the same end
-    return np.asarray(connected_components(np.abs(others @ others.T) > _TIED, directed=False)[1])
+    beside = np.abs(others @ others.T) > _TIED
+    return np.linalg.matrix_power(beside | np.eye(len(felt), dtype=bool), len(felt)).argmax(axis=1)  # over any number
 
 
 def led(held: np.ndarray, felt: np.ndarray) -> np.ndarray:
@@ -119,13 +121,29 @@ def _used(felt: np.ndarray, borne: np.ndarray, most: np.ndarray) -> np.ndarray:
 
 
 def _least(x: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """Return x + ways y with the least largest entry; x is orthogonal to ``ways``, whose columns are orthonormal."""
-    from scipy.optimize import linprog
+    """Return x + ways y with the least largest entry, the columns of ``ways`` being orthonormal.
 
-    size = float(np.abs(x).max())
-    if size == 0.0:
-        return x
-    one = -np.ones((len(x), 1))
-    rows, goal = np.block([[ways, one], [-ways, one]]), np.append(np.zeros(ways.shape[1]), 1.0)
-    found = linprog(goal, A_ub=rows, b_ub=np.append(-x, x) / size, bounds=(None, None), method="highs-ds")
-    return x + size * (ways @ found.x[:-1]) if found.success else x
+    The largest is followed down where it falls most steeply, from one of its edges to the next, to where none goes on.
+    """
+    sizes, slopes = np.append(x, -x), np.vstack([ways, -ways])
+    for _ in range(_EDGES * len(x)):
+        largest = sizes.max()
+        most = sizes >= (1.0 - _SAME) * largest
+        change = slopes @ _down(slopes[most])
+        ahead = ~most & (change > -1.0)
+        if not change.any() or not ahead.any():
+            break
+        sizes = sizes + change * ((largest - sizes[ahead]) / (1.0 + change[ahead])).min()
+    return sizes[: len(x)]
+
+
+def _down(slopes: np.ndarray) -> np.ndarray:
+    """Return the shortest y with slopes @ y <= -1, or zero if there is none.
+
+    C. L. Lawson, R. J. Hanson (1974): Solving Least Squares Problems, ch. 23, least distance programming.
+    """
+    from scipy.optimize import nnls
+
+    rows, one = np.vstack([-slopes.T, np.ones(len(slopes))]), np.append(np.zeros(slopes.shape[1]), 1.0)
+    left = one - rows @ nnls(rows, one)[0]
+    return -left[:-1] / left[-1] if np.linalg.norm(left) > _SAME else np.zeros(left.size - 1)
