@@ -157,7 +157,7 @@ class Forces:
         motion = self.motion
         T = motion.dense_jacobian(state) if motion.n <= DENSE_UP_TO else motion.jacobian(state)
         raw = self._raw_matrix(blocks) @ T
-        if v.any() or a.any():
+        if (seeds[0] or seeds[1]) and (v.any() or a.any()):
             speed, pull, coriolis = motion.drift(state, v, a)
             on_rates, on_pull = (
                 self._raw_matrix(self._blocks(z, s, gusts)) for s in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -54,15 +54,16 @@ class Hold:
         """Return generalised forces, or their slopes, without what the contacts bear of them."""
         if isinstance(force, np.ndarray):
             return force - self.W.T @ self.borne(force)
-        return sp.csr_matrix(force - sp.csr_matrix(self.W.T) @ sp.csr_matrix(self.back.T @ force))
+        return self.firm(force, 0.0)
 
     def against(self, slip: np.ndarray) -> np.ndarray:
         """Return the generalised forces of contacts that push their masses against slips."""
         return self.W.T @ (self.masses * slip)
 
-    def against_slope(self) -> sp.csr_matrix:
-        """Return the slope of these on motions."""
-        return sp.csr_matrix(sp.csr_matrix(self.W.T * self.masses) @ sp.csr_matrix(self.W))
+    def firm(self, slope: sp.csr_matrix, firmness: float) -> sp.csr_matrix:
+        """Return slopes of forces that are `freed`, and less those of `against` by how firm slips are held."""
+        along = self.back.T @ slope + firmness * self.masses[:, None] * self.W
+        return sp.csr_matrix(slope - sp.csr_matrix(self.W.T) @ sp.csr_matrix(along))
 
 
 def easiness(model: Model) -> np.ndarray:

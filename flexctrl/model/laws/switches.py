@@ -37,6 +37,7 @@ Force = TypeVar("Force", np.ndarray, sp.csr_matrix)
 T = TypeVar("T")
 
 _FADING = 1e4
+_KEPT = 4
 _STILL = 1e-10
 _MOST, _ALIKE, _OVERCOME = 1.0 + 1e-10, 1e-9, 0.5
 
@@ -51,7 +52,7 @@ class Switches:
     """
 
     model: Model
-    _kept: dict[str, tuple[State, Any]] = field(default_factory=dict, repr=False)
+    _kept: dict[str, tuple[tuple[State, bytes, Any], ...]] = field(default_factory=dict, repr=False)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -130,9 +131,8 @@ class Switches:
 
     def held_slope(self, state: State, slope: sp.csr_matrix, seeds: tuple[float, float, float]) -> sp.csr_matrix:
         """Return the slope of `held` from that of the balance without."""
-        hold = self._hold(state)
         firmness = seeds[2] + self.fading * seeds[1] + 0.25 * self.fading**2 * seeds[0]
-        return sp.csr_matrix(hold.freed(slope) - firmness * hold.against_slope())
+        return self._hold(state).firm(slope, firmness)
 
     def still(self, state: State, motion: np.ndarray) -> np.ndarray:
         """Return what is left of a motion of the degrees of freedom when what sticks does not move."""
@@ -160,7 +160,7 @@ class Switches:
 
     def _hold(self, state: State) -> Hold:
         """Return what holds the contacts that stick."""
-        return self._once("hold", state, lambda: hold(self._stuck_rows(state), self.ease))
+        return self._once("hold", state, b"", lambda: hold(self._stuck_rows(state), self.ease))
 
     def spare(self, state: State) -> np.ndarray:
         """Tell which contacts that stick hold nothing that stronger ones do not, shape (contacts,)."""
@@ -173,12 +173,14 @@ class Switches:
     def _stuck_rows(self, state: State) -> np.ndarray:
         return self.slips.rows(state)[self.phases(state) == STUCK]
 
-    def _once(self, what: str, state: State, make: Callable[[], T]) -> T:
-        """Return what is made of a state, once while nothing else is asked for."""
-        kept = self._kept.get(what)
-        if kept is None or kept[0] is not state:
-            self._kept[what] = kept = (state, make())
-        return kept[1]
+    def _once(self, what: str, state: State, given: bytes, make: Callable[[], T]) -> T:
+        """Return what is made of a state and what else is given, once while little else is asked for."""
+        kept = self._kept.get(what, ())
+        found = next((made for s, g, made in kept if s is state and g == given), None)
+        if found is None:
+            found = make()
+            self._kept[what] = ((state, given, found), *kept[: _KEPT - 1])
+        return found
 
     # -- where phases end, and what comes then
 
@@ -200,10 +202,7 @@ class Switches:
         gaps = np.where(phases == 0.0, 1.0, phases * self.slips.speeds(state) / self.scales.speeds)
         stuck = phases == STUCK
         if stuck.any():
-            held = self._once("gaps", state, lambda: (u, self._holding(state, u)[0]))
-            if not np.array_equal(held[0], u):
-                held = (u, self._holding(state, u)[0])
-            gaps[stuck] = _MOST - np.abs(held[1]) / self.static[stuck]
+            gaps[stuck] = _MOST - np.abs(self._holding(state, u)[0]) / self.static[stuck]
         return gaps
 
     def gap(self, state: State, u: np.ndarray, contact: int) -> float:
@@ -226,6 +225,9 @@ class Switches:
 
     def _holding(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the forces that hold what sticks, and the accelerations of what has mass."""
+        return self._once("holding", state, u.tobytes(), lambda: self._held_by(state, u))
+
+    def _held_by(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         model, a = self.model, np.zeros(self.model.n)
         stuck = self.phases(state) == STUCK
         loose = self.unheld(state)
@@ -235,7 +237,7 @@ class Switches:
         M = M if heavy.size == model.n else M[heavy][:, heavy]
         held = hold(self._stuck_rows(state)[:, heavy], self.ease[heavy])
         _, turning, _ = self.slips.at(state, state.v, a)
-        solve = factorise(sp.csr_matrix(held.freed(M) + held.against_slope()))
+        solve = factorise(held.firm(M, -1.0))
         a[heavy] = solve(held.freed(force[heavy]) - held.against(turning[stuck]))
         borne, felt = held.borne(M @ a[heavy] - force[heavy]), held.W * np.sqrt(self.ease[heavy])
         return evened(felt, borne, self.static[stuck]), a
