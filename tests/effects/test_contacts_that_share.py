@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 import flexctrl as fc
+from flexctrl.model.laws import switches
 from flexctrl.model.laws.sharing import evened, led, spare, tied
 
 METHODS = {"adaptive": fc.AdaptiveAlpha(), "fixed": fc.GeneralizedAlpha(2e-3), "explicit": fc.ExplicitRungeKutta()}
@@ -149,3 +150,41 @@ def test_what_shares_with_what():
     assert borne == pytest.approx([0.035, 0.35, 5.0, 0.5, 0.5, 0.5], rel=1e-12)
     assert spare(W, most).tolist() == [False, True, False, False, True, False]
     assert led(W[[0, 3]], W).tolist() == [True, True, False, True, False, False]
+
+
+class Pulling:
+    """Pulls two blocks to and fro, sampled."""
+
+    inputs, outputs, sample_time = (), ("f1", "f2"), 0.02
+
+    def initial(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([1.5 + 8.0 * np.sin(3.0 * t), 5.0 * np.cos(2.1 * t + 0.3)])
+
+
+def stacked() -> fc.Model:
+    """Two blocks on each other and between walls, all dry, the lower one at a stiff spring: it slips by microns."""
+    base, low, top = (fc.RigidBody(name, (0, 0, 0), m, (1, 1, 1)) for name, m in (("base", 1), ("b1", 2), ("b2", 0.7)))
+    spring = fc.Spring("s", (-1, 0, 0), (0, 0, 0), stiffness=1e5)
+    joints = [
+        fc.Support(base.node),
+        fc.Support(spring.start),
+        fc.Slide(base.node, low.node, along="x"),
+        fc.Slide(low.node, top.node, along="x"),
+        fc.Pin(low.node, spring.end),
+    ]
+    forces = [fc.Force("f1", low.node, "x"), fc.Force("f2", top.node, "x")]
+    structure = fc.Structure([base, low, top, spring], joints, [], forces, [fc.Position("x1", low.node, "x")])
+    rubs = {"b1.u": 4.1, "b2": 0.6, "b2.u": 6.7}
+    return fc.assemble(structure, [fc.LargeRotation(), fc.CoulombFriction(rubs)])
+
+
+def test_what_is_borne_is_worked_out_a_few_times_a_step(monkeypatch):
+    """In the middle of a step and at its ends; what is overcome from the start of a step on is not looked for in it."""
+    worked, solve = [], switches.factorise
+    monkeypatch.setattr(switches, "factorise", lambda M: worked.append(1) or solve(M))
+    run = fc.simulate(stacked(), Pulling(), until=1.0, method=fc.Unchecked(fc.AdaptiveAlpha()))
+    assert len(run.events) > 10
+    assert len(worked) < 3 * run.report.steps

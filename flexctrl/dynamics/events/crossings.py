@@ -126,7 +126,9 @@ def _through(watch: Watch, gauge: int, corners: Sequence[tuple[float, float]], v
         rising = fb > 0.0
         if side != 0.0 and direction is not (Direction.FALLING if rising else Direction.RISING):
             own = partial(value.one, gauge)
-            if not fa * fb < 0.0:
+            if fa * fb > 0.0 and abs(fa) > _NEAR * watch.sizes[gauge]:  # beyond it from the start
+                at = a
+            elif not fa * fb < 0.0:
                 at = comes_back(own, a, b, fb, dust)
             elif watch.stops(gauge):  # where exactly, is found by steps
                 at = nearly(corners, a)
