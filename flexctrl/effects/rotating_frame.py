@@ -13,13 +13,11 @@ from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError
-from flexctrl.mechanics.beam import BeamForce, no_force
-from flexctrl.mechanics.beam_inertia import offset, offset_force
-from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
+from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.structure.freedoms import Vector, parse_point
 
 if TYPE_CHECKING:
-    import casadi as ca
+    pass
 
 
 @dataclass(frozen=True)
@@ -32,9 +30,6 @@ class RotatingFrame(Effect):
     `equilibrium` finds the shape stretched by its spin, and a linear model about it has centrifugal stiffening
     and spin softening in K and the Coriolis terms in C, which is skew. Rotors of drives count with their speed
     relative to what carries them.
-
-    Seen from outside, a beam element's inertia lies on its chord; in the turning frame the centrifugal force acts on
-    its bent axis as weight does, so that a blade's stiffening converges with the fourth power of the mesh.
 
     The stored energy includes the potential −½∫|Ω × (x − c)|² dm: what is conserved is the Jacobi integral.
     Drag on velocities (α of `RayleighDamping`) is that of air which turns with the frame; the air of `Wind` does not.
@@ -76,32 +71,6 @@ class RotatingFrame(Effect):
             node.a + 2.0 * ca.cross(spin, node.v) + ca.cross(spin, carried),
             node.b + ca.cross(spin, node.w),
         )
-
-    def beam(self, m: BeamMotion) -> BeamForce:
-        """Centrifugal force on the offset of the axis from its chord: what makes the pull vary along an element."""
-        import casadi as ca
-
-        if not any(self.rate):
-            return no_force()
-        spin, mass, none = ca.DM(self.rate), m.p["mass"], ca.SX(3, 1)
-        half = -0.5 * mass * (m.frame.T @ ca.cross(spin, ca.cross(spin, m.frame @ offset(m))))
-        nodal = BeamForce(ca.SX(7, 1), none, ca.vertcat(half, none, half, none))
-        return offset_force(m, mass * (m.frame.T @ self._pull(m.middle))) + nodal
-
-    def beam_energy(self, m: BeamMotion, middle: ca.SX) -> ca.SX:
-        """Centrifugal potential of the offset."""
-        import casadi as ca
-
-        if not any(self.rate):
-            return ca.SX(1, 1)
-        return -m.p["mass"] * ca.dot(self._pull(middle), m.frame @ offset(m))
-
-    def _pull(self, x: ca.SX) -> ca.SX:
-        """Centrifugal acceleration −Ω × (Ω × (x − c))."""
-        import casadi as ca
-
-        spin = ca.DM(self.rate)
-        return -ca.cross(spin, ca.cross(spin, x - ca.DM(self.center)))
 
     def turns(self, vector: Vector) -> bool:
         """Tell whether a vector that is fixed outside turns in the frame: it is not along the axis.

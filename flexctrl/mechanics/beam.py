@@ -31,6 +31,8 @@ class BeamForce:
         Forces on the element's own modes; 0 where it has none.
     stress : casadi.SX, 6, or float
         `stresses`, which resist `deformations`; 0 where there are none.
+    mean : casadi.SX, 3, or float
+        Works on the mean of the axis (`flexctrl.mechanics.beam_inertia.offset`), in the frame.
     """
 
     deformation: ca.SX
@@ -38,14 +40,15 @@ class BeamForce:
     nodal: ca.SX
     modal: ca.SX | float = 0.0
     stress: ca.SX | float = 0.0
+    mean: ca.SX | float = 0.0
 
     def __add__(self, other: BeamForce) -> BeamForce:
         sums = (self.deformation + other.deformation, self.torque + other.torque, self.nodal + other.nodal)
-        return BeamForce(*sums, self.modal + other.modal, self.stress + other.stress)
+        return BeamForce(*sums, self.modal + other.modal, self.stress + other.stress, self.mean + other.mean)
 
     def __mul__(self, factor: float) -> BeamForce:
         works = (self.deformation * factor, self.torque * factor, self.nodal * factor)
-        return BeamForce(*works, self.modal * factor, self.stress * factor)
+        return BeamForce(*works, self.modal * factor, self.stress * factor, self.mean * factor)
 
 
 def no_force() -> BeamForce:
@@ -73,10 +76,11 @@ def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
 
 
 def _resolved(m: BeamMotion, force: BeamForce) -> BeamForce:
-    """The force without stresses, but what these work on."""
-    if isinstance(force.stress, float):
-        return force
-    return replace(force, stress=0.0) + stress_force(m, force.stress)
+    """The force by what stresses and forces on the mean work on."""
+    plain = replace(force, stress=0.0, mean=0.0)
+    if not isinstance(force.stress, float):
+        plain = plain + stress_force(m, force.stress)
+    return plain if isinstance(force.mean, float) else plain + _mean_force(m, force.mean)
 
 
 def whole_force(m: BeamMotion, force: BeamForce) -> ca.SX:
@@ -111,6 +115,22 @@ def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
         about_z2 + s * (4.0 * z2 - z1) + half * y1 - t * (2.0 * about_y1 - about_y2),
     )
     return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
+
+
+def _mean_force(m: BeamMotion, force: ca.SX) -> BeamForce:
+    """What a force on the mean of the axis does."""
+    import casadi as ca
+
+    (t1, t2), t, L = m.axes, m.axes[0] - m.axes[1], m.p["L"]
+    on_slant = L * (force / 12.0 - ca.vertcat(force[0] / 20.0, 0, 0))
+    on_chord = -L / 20.0 * (force[0] * t + t[0] * force)
+    nodal = ca.vertcat(0.5 * force, ca.cross(t1, on_slant), 0.5 * force, -ca.cross(t2, on_slant))
+    torque = ca.vertcat(0, -on_chord[2], on_chord[1])
+    if not m.modal:
+        return BeamForce(ca.SX(7, 1), torque, nodal)
+    moments, turn, modal = component_modes.offset_force(m, force)
+    none = ca.SX(3, 1)
+    return BeamForce(ca.SX(7, 1), torque + turn, nodal + ca.vertcat(none, moments[:3], none, moments[3:]), modal)
 
 
 def work_of(m: BeamMotion, of: Callable[[BeamMotion], ca.SX]) -> BeamForce:

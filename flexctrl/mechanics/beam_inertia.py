@@ -8,47 +8,45 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.mechanics import component_modes
-from flexctrl.mechanics.beam import BeamForce, work_of
-from flexctrl.mechanics.corotation import BeamMotion, components
+from flexctrl.mechanics.beam import BeamForce, no_force
+from flexctrl.mechanics.corotation import BeamMotion, components, turning
 from flexctrl.mechanics.matrices import PlaneMass
 
 if TYPE_CHECKING:
     import casadi as ca
 
 
-def momentum(m: BeamMotion, rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return M_e applied to nodal velocities (or accelerations) in the frame: four blocks."""
+def _relative(m: BeamMotion, rates: tuple[ca.SX, ...]) -> tuple[ca.SX, ...]:
+    """Momenta of the consistent mass less that of the mean motion it knows, four blocks: rates by differences."""
     import casadi as ca
 
     (vx1, vy1, vz1), (wx1, wy1, wz1), (vx2, vy2, vz2), (wx2, wy2, wz2) = (components(r) for r in rates)
-    mass, polar = m.p["mass"], m.p["polar"]
-    py1, lz1, py2, lz2 = _bending_momentum(m, (vy1, wz1, vy2, wz2), "z")
-    pz1, ly1, pz2, ly2 = _bending_momentum(m, (vz1, -wy1, vz2, -wy2), "y")
+    px, polar = m.p["mass"] / 12.0 * (vx1 - vx2), m.p["polar"]
+    py, lz1, lz2 = _in_plane(m, vy1 - vy2, wz1, wz2, "z")
+    pz, ly1, ly2 = _in_plane(m, vz1 - vz2, -wy1, -wy2, "y")
     return (
-        ca.vertcat(mass / 6.0 * (2.0 * vx1 + vx2), py1, pz1),
+        ca.vertcat(px, py, pz),
         ca.vertcat(polar / 6.0 * (2.0 * wx1 + wx2), -ly1, lz1),
-        ca.vertcat(mass / 6.0 * (vx1 + 2.0 * vx2), py2, pz2),
+        -ca.vertcat(px, py, pz),
         ca.vertcat(polar / 6.0 * (wx1 + 2.0 * wx2), -ly2, lz2),
     )
 
 
-def _bending_momentum(m: BeamMotion, rates: tuple, about: str) -> tuple:
-    """Consistent mass in one plane on the rates of (v₁, θ₁, v₂, θ₂)."""
-    v1, w1, v2, w2 = rates
-    vv, tv, tt, other_vv, other_tv, other_tt = (m.p[f"{about}_{entry}"] for entry in PlaneMass._fields)
-    return (
-        vv * v1 + tv * w1 + other_vv * v2 - other_tv * w2,
-        tv * v1 + tt * w1 + other_tv * v2 + other_tt * w2,
-        other_vv * v1 + other_tv * w1 + vv * v2 - tv * w2,
-        -other_tv * v1 + other_tt * w1 - tv * v2 + tt * w2,
-    )
+def _in_plane(m: BeamMotion, v: ca.SX, w1: ca.SX, w2: ca.SX, about: str) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """The consistent mass in one plane less that of ½(v₁ + v₂) + L/12 (ω₁ − ω₂), on v = v₁ − v₂ and the spins."""
+    mass, L = m.p["mass"], m.p["L"]
+    vv, tv, tt, _, _, other_tt = (m.p[f"{about}_{entry}"] for entry in PlaneMass._fields)
+    vv, tv, shared = vv - mass / 4.0, tv - mass * L / 24.0, mass * L * L / 144.0
+    tt, other_tt = tt - shared, other_tt + shared
+    return vv * v + tv * (w1 + w2), tv * v + tt * w1 + other_tt * w2, tv * v + other_tt * w1 + tt * w2
 
 
 def inertial_force(m: BeamMotion) -> BeamForce:
     """Return the force of inertia.
 
-    Lagrange's equations of T = ½ Vᵀ M_e V, V the nodal velocities in the frame:
-    d/dt(R_E p) − (ω × on the rotations) − ∂T/∂q, with R_E changing by the frame's spin.
+    Lagrange's equations of T = ½ Vᵀ M V + ½ m |Ẋ|², V the nodal velocities in the frame, M the consistent mass
+    relative to its mean, X the `mean` of the axis: d/dt(R_E p) − (ω × on the rotations) − ∂T/∂q, with R_E changing by
+    the frame's spin, and −m Ẍ on X.
     """
     import casadi as ca
 
@@ -59,12 +57,13 @@ def inertial_force(m: BeamMotion) -> BeamForce:
     blocks = [r + ca.cross(m.spin, q) for r, q in zip(rate, p, strict=True)]
     for i in (1, 3):
         blocks[i] = blocks[i] - ca.cross(m.rates[i], p[i])
-    return BeamForce(ca.SX(7, 1), -frame_torque, -ca.vertcat(*blocks), -modal)
+    apart = BeamForce(ca.SX(7, 1), -frame_torque, -ca.vertcat(*blocks), -modal)
+    return replace(apart, mean=-m.p["mass"] * _mean_acceleration(m))
 
 
 def _momenta(m: BeamMotion, rates: tuple[ca.SX, ...], order: int) -> tuple[tuple[ca.SX, ...], ca.SX | float]:
-    """Return momenta of the nodes and of the element's own modes, by rates (order 1) or accelerations (2)."""
-    blocks = momentum(m, rates)  # type: ignore[arg-type]
+    """Momenta but of the mean: of the nodes and of the element's own modes, by rates (order 1) or accelerations (2)."""
+    blocks = _relative(m, rates)
     if not m.modal:
         return blocks, 0.0
     more, modal = component_modes.momenta(m, rates, m.modal[:3][order])
@@ -72,30 +71,29 @@ def _momenta(m: BeamMotion, rates: tuple[ca.SX, ...], order: int) -> tuple[tuple
 
 
 def kinetic_energy(m: BeamMotion) -> ca.SX:
-    """Return ½ Vᵀ M_e V [J]."""
+    """Return ½ Vᵀ M V + ½ m |Ẋ|² [J]."""
     import casadi as ca
 
     p, modal = _momenta(m, m.rates, 1)
+    velocity = _mean_velocity(m)
+    mean = 0.5 * m.p["mass"] * ca.dot(velocity, velocity)
     nodal = 0.5 * ca.dot(ca.vertcat(*m.rates), ca.vertcat(*p))
-    return nodal + 0.5 * ca.dot(m.modal[1], modal) if m.modal else nodal
+    return mean + nodal + 0.5 * ca.dot(m.modal[1], modal) if m.modal else mean + nodal
 
 
 def drag(m: BeamMotion) -> BeamForce:
-    """Return −M_e V, the force of a damping equal to the mass on the nodal velocities."""
+    """Return the force of a damping equal to the mass: minus the momenta."""
     import casadi as ca
 
     blocks, modal = _momenta(m, m.rates, 1)
-    return BeamForce(ca.SX(7, 1), ca.SX(3, 1), -ca.vertcat(*blocks), -modal)
+    apart = BeamForce(ca.SX(7, 1), ca.SX(3, 1), -ca.vertcat(*blocks), -modal)
+    return replace(apart, mean=-m.p["mass"] * _mean_velocity(m))
 
 
 def weight(m: BeamMotion, g: np.ndarray) -> BeamForce:
     """Return the force of gravity g [m/s²], minus the gradient of `height_energy`."""
-    import casadi as ca
-
     local = m.p["mass"] * (m.frame.T @ g)
-    none = ca.SX(3, 1)
-    halves = ca.vertcat(0.5 * local, none, 0.5 * local, none)
-    return offset_force(m, local) + BeamForce(ca.SX(7, 1), none, halves)
+    return replace(no_force(), mean=local)
 
 
 def height_energy(m: BeamMotion, g: np.ndarray, middle: ca.SX) -> ca.SX:
@@ -108,26 +106,53 @@ def height_energy(m: BeamMotion, g: np.ndarray, middle: ca.SX) -> ca.SX:
 def offset(m: BeamMotion) -> ca.SX:
     """Return how far the mean of the axis lies off the middle of the chord, in the frame.
 
-    Across, the deflection of the cubic; along, what the bending of the more bent half draws in: ∫½(v'² + w'²)(ξ − ½).
+    That of the cubic with unit slopes t₁ and t₂ is L/12 (t₁ − t₂). Along the chord it is two fifths of that: what the
+    bending of the more bent half draws in, ∫½(v'² + w'²)(ξ − ½).
     """
     import casadi as ca
 
-    (_, y1, z1), (_, y2, z2) = (components(t) for t in m.theta)
-    along = (y2 * y2 + z2 * z2 - y1 * y1 - z1 * z1) / 60.0
-    cubic = m.p["L"] * ca.vertcat(along, (z1 - z2) / 12.0, (y2 - y1) / 12.0)
-    if not m.modal:
-        return cubic
-    return cubic + component_modes.deflection(m) + ca.vertcat(m.p["L"] * component_modes.drawn(m), 0, 0)
+    slant = m.axes[0] - m.axes[1]
+    cubic = m.p["L"] * (slant / 12.0 - ca.vertcat(slant[0] / 20.0, 0, 0))
+    return cubic + component_modes.offset(m, m.axes, m.modal.amplitudes) if m.modal else cubic
 
 
-def offset_force(m: BeamMotion, force: ca.SX) -> BeamForce:
-    """Return a force that acts on the `offset`, given in the frame."""
+def _mean_velocity(m: BeamMotion) -> ca.SX:
+    """Ẋ of X = ½(x₁ + x₂) + L/12 t − L/20 (t·e) e, t = t₁ − t₂, e along the chord, and of what modes add to it."""
     import casadi as ca
 
-    if m.modal:
-        return replace(work_of(m, lambda local: ca.dot(offset(local), force)), torque=ca.cross(offset(m), force))
-    (_, y1, z1), (_, y2, z2) = (components(t) for t in m.theta)
-    along, c = m.p["L"] * force[0] / 30.0, m.p["L"] / 12.0
-    m1 = ca.vertcat(0, -c * force[2] - along * y1, c * force[1] - along * z1)
-    m2 = ca.vertcat(0, c * force[2] + along * y2, along * z2 - c * force[1])
-    return BeamForce(ca.vertcat(0, m1, m2), ca.cross(offset(m), force), ca.SX(12, 1))
+    v1, w1, v2, w2 = m.rates
+    (t1, t2), (t, turn) = m.axes, _chord(m)
+    rate = ca.cross(w1, t1) - ca.cross(w2, t2)
+    along = ca.vertcat(rate[0] + ca.dot(t, turn), 0, 0) + t[0] * turn
+    cubic = 0.5 * (v1 + v2) + m.p["L"] * (rate / 12.0 - along / 20.0)
+    if not m.modal:
+        return cubic
+    y, seen, _ = component_modes.offset_rates(m)
+    return cubic + seen + ca.cross(m.spin, y)
+
+
+def _chord(m: BeamMotion) -> tuple[ca.SX, ca.SX]:
+    """t, and the rate of the chord's direction ė."""
+    import casadi as ca
+
+    return m.axes[0] - m.axes[1], ca.vertcat(0, m.spin[2], -m.spin[1])
+
+
+def _mean_acceleration(m: BeamMotion) -> ca.SX:
+    """Ẍ of the same."""
+    import casadi as ca
+
+    (t1, t2), (t, turn) = m.axes, _chord(m)
+    (v1, w1, v2, w2), (a1, b1, a2, b2) = m.rates, m.accelerations
+    u1, u2 = ca.cross(w1, t1), ca.cross(w2, t2)
+    rate = u1 - u2
+    second = ca.cross(b1, t1) + ca.cross(w1, u1) - ca.cross(b2, t2) - ca.cross(w2, u2)
+    apart = (a2 - a1 - 2.0 * (v2 - v1)[0] * turn) / m.chord
+    turned = ca.vertcat(-ca.dot(turn, turn), apart[1], apart[2])
+    along = second[0] + 2.0 * ca.dot(rate, turn) + ca.dot(t, turned)
+    twice = ca.vertcat(along, 0, 0) + 2.0 * (rate[0] + ca.dot(t, turn)) * turn + t[0] * turned
+    cubic = 0.5 * (a1 + a2) + m.p["L"] * (second / 12.0 - twice / 20.0)
+    if not m.modal:
+        return cubic
+    y, seen, again = component_modes.offset_rates(m)
+    return cubic + again + ca.cross(turning(m), y) + ca.cross(m.spin, 2.0 * seen + ca.cross(m.spin, y))

@@ -25,8 +25,8 @@ class _Seen:
     """What is seen in the element frame, and the frame; symbols or values."""
 
     frame: ca.SX
-    middle: ca.SX
     chord: ca.SX
+    axes: tuple[ca.SX, ...]
     sides: tuple[ca.SX, ...]
     theta: tuple[ca.SX, ...]
     rates: tuple[ca.SX, ...]
@@ -40,27 +40,27 @@ class _Seen:
         def some(name: str, count: int) -> tuple[ca.SX, ...]:
             return tuple(ca.SX.sym(f"{name}{i}", 3) for i in range(count))
 
-        frame, middle, chord = ca.SX.sym("frame", 3, 3), ca.SX.sym("middle", 3), ca.SX.sym("chord")
+        frame, chord = ca.SX.sym("frame", 3, 3), ca.SX.sym("chord")
         amplitudes, rates, accelerations = (ca.SX.sym(f"modal{i}", own[0].numel() if own else 0) for i in range(3))
         modal = OwnMotion(amplitudes, rates, accelerations, own.along) if own else ()
-        around = (some("side", 2), some("theta", 2), some("rate", 4), some("acceleration", 4))
-        return cls(frame, middle, chord, *around, modal)
+        around = (some("axis", 2), some("side", 2), some("theta", 2), some("rate", 4), some("acceleration", 4))
+        return cls(frame, chord, *around, modal)
 
     @classmethod
     def of(cls, m: BeamMotion, first: NodeMotion, second: NodeMotion, rest: ca.SX) -> _Seen:
         sides = tuple(m.frame.T @ (node.R @ rest[:, 1]) for node in (first, second))
-        return cls(m.frame, m.middle, m.chord, sides, m.theta, m.rates, m.accelerations, m.modal)
+        return cls(m.frame, m.chord, m.axes, sides, m.theta, m.rates, m.accelerations, m.modal)
 
     @property
     def all(self) -> ca.SX:
         """All but the frame."""
         import casadi as ca
 
-        nodal = (self.middle, self.chord, *self.sides, *self.theta, *self.rates, *self.accelerations)
+        nodal = (self.chord, *self.axes, *self.sides, *self.theta, *self.rates, *self.accelerations)
         return ca.vertcat(*nodal, *self.modal[:3])
 
     def motion(self, p: dict[str, ca.SX], rates: tuple[ca.SX, ...] | None = None) -> BeamMotion:
-        seen = (self.middle, self.chord, self.sides, self.theta, rates or self.rates, self.accelerations)
+        seen = (self.chord, self.axes, self.sides, self.theta, rates or self.rates, self.accelerations)
         return framed_motion(p, self.frame, *seen, self.modal)
 
 
@@ -96,15 +96,25 @@ def beam_slope(
     m, modes = beam_motion(first, second, parameters, modal), sum(eta.numel() for eta in modal[:1])
     seen = _Seen.symbols(modal)
     local = seen.motion(m.p)
-    push = ca.cse(whole_force(replace(local, frame=ca.SX.eye(3)), force(local)))
-    on_seen, on_frame = ca.jacobian(push, seen.all), ca.jacobian(push, ca.vec(seen.frame))
+    acting, mean = force(local), ca.SX.sym("mean", 3)
+    on_mean = ca.densify(ca.SX(3, 1) + acting.mean)
+    push = ca.cse(whole_force(replace(local, frame=ca.SX.eye(3)), replace(acting, mean=mean)))
     increment, turn = ca.SX.sym("increment", 12 + modes), ca.SX.sym("turn", 3)
     change = _change(seen, increment, turn, seeds)
+    turned = ca.jacobian(ca.vec(seen.frame @ ca.skew(turn)), turn)
+
+    def slopes(of: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """By the increment while the frame stands still, and by the turn of the frame."""
+        on_seen, on_frame = ca.jacobian(of, seen.all), ca.jacobian(of, ca.vec(seen.frame))
+        on_turn = on_seen @ ca.jacobian(change, turn) + seeds[0] * on_frame @ turned
+        return on_seen @ ca.jacobian(change, increment), on_turn
+
+    through = ca.jacobian(push, mean)  # 12 × 3: what the mean's force hangs on goes through it once
+    still, on_turn = (a + through @ b for a, b in zip(slopes(push), slopes(on_mean), strict=True))
     carried = ca.vertcat(*[ca.cross(turn, push[3 * i : 3 * i + 3]) for i in range(4)], ca.SX(modes, 1))
-    turned = on_frame @ ca.jacobian(ca.vec(seen.frame @ ca.skew(turn)), turn) + ca.jacobian(carried, turn)
-    on_turn = on_seen @ ca.jacobian(change, turn) + seeds[0] * turned
     spin = seen.motion(m.p, tuple(ca.vertsplit(increment[:12], 3))).spin
-    slope = on_seen @ ca.jacobian(change, increment) + on_turn @ ca.jacobian(spin, increment)
+    slope = still + (on_turn + seeds[0] * ca.jacobian(carried, turn)) @ ca.jacobian(spin, increment)
+    slope = ca.substitute(slope, mean, on_mean)
     now = _Seen.of(m, first, second, ca.reshape(parameters[:9], 3, 3).T)
     slope = ca.substitute(slope, ca.vertcat(seen.all, ca.vec(seen.frame)), ca.vertcat(now.all, ca.vec(now.frame)))
     out_of_frame = ca.diagcat(*[m.frame] * 4, ca.SX.eye(modes))
@@ -117,10 +127,12 @@ def _change(seen: _Seen, increment: ca.SX, turn: ca.SX, seeds: ca.SX) -> ca.SX:
 
     u = ca.vertsplit(increment[:12], 3)
     twists = [u[1] - turn, u[3] - turn]
-    sides = [ca.cross(twist, side) for twist, side in zip(twists, seen.sides, strict=True)]
+    axes, sides = (
+        [ca.cross(twist, axis) for twist, axis in zip(twists, both, strict=True)] for both in (seen.axes, seen.sides)
+    )
     # the rate of a rotation vector is T⁻¹ times the spin; T⁻¹(θ) = T⁻ᵀ(−θ)
     theta = [inverse_tangent(-t, twist) for t, twist in zip(seen.theta, twists, strict=True)]
-    place = ca.vertcat(0.5 * seen.frame @ (u[0] + u[2]), (u[2] - u[0])[0], *sides, *theta)
+    place = ca.vertcat((u[2] - u[0])[0], *axes, *sides, *theta)
     rates = [seeds[1] * d - seeds[0] * ca.cross(turn, v) for d, v in zip(u, seen.rates, strict=True)]
     accelerations = [seeds[2] * d - seeds[0] * ca.cross(turn, a) for d, a in zip(u, seen.accelerations, strict=True)]
     modal = [seeds[k] * increment[12:] for k in range(len(seen.modal[:3]))]

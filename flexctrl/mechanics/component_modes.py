@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.mechanics.clamped_modes import ClampedModes, HeldShapes, clamped_modes, held_shapes
+from flexctrl.mechanics.corotation import turning
 from flexctrl.mechanics.matrices import PlaneMass
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _PLANES = ((2, 1.0, "z"), (1, -1.0, "y"))
 """Of deflection along y and along z: the end rotation that goes with it, its sign, and the axis of bending."""
+_ACROSS = (1, 2)
 
 
 def motion_of(m: BeamMotion) -> OwnMotion:
@@ -54,31 +56,68 @@ def lines(m: BeamMotion, values: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 def bowing(m: BeamMotion) -> ca.SX:
     """Return what modes add to the strain from bending of the axis, ∫½v′²/L."""
-    modes = modes_of(m)
-    return _slopes(m, modes.bow, modes.slope)
+    import casadi as ca
+
+    modes, ends = modes_of(m), [sign * ca.vertcat(*(t[axis] for t in m.theta)) for axis, sign, _ in _PLANES]
+    return _slopes(m, ends, motion_of(m).amplitudes, modes.bow, modes.slope)
 
 
-def drawn(m: BeamMotion) -> ca.SX:
-    """Return what modes add to how far the mean of the axis is drawn along the chord, ∫½v′² (s − ½)."""
-    modes = modes_of(m)
-    return _slopes(m, modes.drawn_ends, modes.drawn)
-
-
-def _slopes(m: BeamMotion, with_ends: np.ndarray, own: np.ndarray) -> ca.SX:
+def _slopes(m: BeamMotion, ends: list[ca.SX], amplitudes: ca.SX, with_ends: np.ndarray, own: np.ndarray) -> ca.SX:
+    """An integral of ½v′² in both planes, v′ of slopes of the ends and of modes."""
     import casadi as ca
 
     total = ca.SX(1, 1)
-    for eta, (axis, sign, _) in zip(planes(m, motion_of(m).amplitudes / m.p["L"]), _PLANES, strict=True):
-        ends = sign * ca.vertcat(m.theta[0][axis], m.theta[1][axis])
-        total += ca.dot(ends, ca.DM(with_ends) @ eta) + 0.5 * ca.dot(eta, ca.DM(own) @ eta)
+    for eta, slopes in zip(planes(m, amplitudes / m.p["L"]), ends, strict=True):
+        total += ca.dot(slopes, ca.DM(with_ends) @ eta) + 0.5 * ca.dot(eta, ca.DM(own) @ eta)
     return total
 
 
-def deflection(m: BeamMotion) -> ca.SX:
-    """Return what modes add to the mean of the axis off the middle of the chord, in the frame [m]."""
+def offset(m: BeamMotion, axes: tuple[ca.SX, ...], amplitudes: ca.SX) -> ca.SX:
+    """Return what modes add to the mean of the axis off the middle of the chord, in the frame [m].
+
+    Across, their mean deflection; along, how far they draw it in, ∫½v′² (s − ½), beside the slopes of the ends' axes.
+    """
     import casadi as ca
 
-    mean, values = ca.DM(modes_of(m).mean), motion_of(m).amplitudes
+    modes, ends = modes_of(m), [ca.vertcat(*(t[k] for t in axes)) for k in _ACROSS]
+    drawn = _slopes(m, ends, amplitudes, modes.drawn_ends, modes.drawn)
+    return deflection(m, amplitudes) + ca.vertcat(m.p["L"] * drawn, 0, 0)
+
+
+def offset_rates(m: BeamMotion) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return `offset`, its rate and the rate of that, as seen by who turns with the frame."""
+    import casadi as ca
+
+    own, spins = motion_of(m), [w - m.spin for w in m.rates[1::2]]
+    rates = [b - ca.cross(m.spin, w) - turning(m) for b, w in zip(m.accelerations[1::2], m.rates[1::2], strict=True)]
+    first = [ca.cross(w, t) for w, t in zip(spins, m.axes, strict=True)]
+    second = [ca.cross(b, t) + ca.cross(w, u) for b, w, t, u in zip(rates, spins, m.axes, first, strict=True)]
+    now = ca.vertcat(*m.axes, own.amplitudes)
+    z, rate = ca.SX.sym("z", now.numel()), ca.SX.sym("rate", now.numel())
+    y = offset(m, (z[:3], z[3:6]), z[6:])
+    once = ca.jtimes(y, z, rate)
+    twice = ca.jtimes(once, z, rate) + ca.jtimes(once, rate, ca.vertcat(*second, own.accelerations))
+    values = ca.vertcat(now, *first, own.rates)
+    return tuple(ca.substitute(of, ca.vertcat(z, rate), values) for of in (y, once, twice))  # type: ignore[return-value]
+
+
+def offset_force(m: BeamMotion, force: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return what a force on `offset` does: moments on the nodes (6), a torque on the frame, forces on the modes."""
+    import casadi as ca
+
+    now = ca.vertcat(*m.axes, motion_of(m).amplitudes)
+    z = ca.SX.sym("z", now.numel())
+    y = offset(m, (z[:3], z[3:6]), z[6:])
+    pull = ca.substitute(ca.gradient(ca.dot(y, force), z), z, now)
+    moments = [ca.cross(t, pull[3 * i : 3 * i + 3]) for i, t in enumerate(m.axes)]
+    return ca.vertcat(*moments), ca.cross(ca.substitute(y, z, now), force) - sum(moments), pull[6:]
+
+
+def deflection(m: BeamMotion, values: ca.SX) -> ca.SX:
+    """Return the mean of the axis as modal values bend and stretch it, in the frame."""
+    import casadi as ca
+
+    mean = ca.DM(modes_of(m).mean)
     stretch = ca.dot(ca.DM(held_of(m).mean), lines(m, values)[0])
     return ca.vertcat(stretch, *[ca.dot(mean, eta) for eta in planes(m, values)])
 
@@ -95,6 +134,8 @@ def stiffness(m: BeamMotion) -> ca.SX:
 def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tuple[ca.SX, ...], ca.SX]:
     """Return what modal rates add to the momenta of the nodes (four blocks), and the momenta of the modes.
 
+    All less those of the mean motion, ½(v₁ + v₂) + L/12 (ω₁ − ω₂) × e₁ and the modes' `deflection`.
+
     Parameters
     ----------
     m : BeamMotion
@@ -108,7 +149,7 @@ def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tupl
     modes, L, mass = modes_of(m), m.p["L"], m.p["mass"]
     blocks = [ca.SX(3, 1) for _ in range(4)]
     pushed_modes: list[ca.SX] = []
-    for eta, across, (axis, sign, about) in zip(planes(m, modal), (1, 2), _PLANES, strict=True):
+    for eta, across, (axis, sign, about) in zip(planes(m, modal), _ACROSS, _PLANES, strict=True):
         turning = _rotary(m, about) / L
         ends = ca.vertcat(rates[0][across], sign * L * rates[1][axis], rates[2][across], sign * L * rates[3][axis])
         coupling = mass * ca.DM(modes.mass) + turning * ca.DM(modes.rotary)
@@ -124,7 +165,20 @@ def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tupl
             blocks[i][0] += push
         ends = ca.vertcat(rates[first][0], rates[first + 2][0])
         pushed_modes.append(inertia * (ca.DM(held.ends).T @ ends + ca.DM(held.mass) @ eta))
-    return tuple(blocks), ca.vertcat(*pushed_modes)
+    shared = _shared(m, rates, modal)
+    return tuple(b - s for b, s in zip(blocks, shared[:4], strict=True)), ca.vertcat(*pushed_modes) - shared[4]
+
+
+def _shared(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[ca.SX, ...]:
+    """What the mean motion has of these momenta: that of modal rates on the nodes, and all of it on the modes."""
+    import casadi as ca
+
+    mass, arm = m.p["mass"], ca.vertcat(m.p["L"] / 12.0, 0, 0)
+    values = ca.SX.sym("values", modal.numel())
+    own = deflection(m, modal)
+    mean = 0.5 * (rates[0] + rates[2]) + ca.cross(rates[1] - rates[3], arm) + own
+    half, turn = 0.5 * mass * own, ca.cross(arm, mass * own)
+    return half, turn, half, -turn, ca.gradient(ca.dot(deflection(m, values), mass * mean), values)
 
 
 def _rotary(m: BeamMotion, about: str) -> ca.SX:

@@ -89,12 +89,10 @@ class BeamMotion:
         Parameters by name.
     frame : casadi.SX, 3 × 3
         R_e, columns in space axes.
-    middle : casadi.SX
-        Mean of the nodes' positions, in space axes.
     chord : casadi.SX
         Distance of the nodes [m].
-    normal, arms : tuple
-        How the twist of the frame hangs on the nodal rotations.
+    axes, sides : tuple of two casadi.SX
+        First axes of the nodes, along the beam's axis, and second ones.
     stretch : casadi.SX
         Length of the chord less L [m].
     theta : tuple of two casadi.SX
@@ -111,10 +109,9 @@ class BeamMotion:
 
     p: dict[str, ca.SX]
     frame: ca.SX
-    middle: ca.SX
     chord: ca.SX
-    normal: tuple[ca.SX, ca.SX]
-    arms: tuple[ca.SX, ca.SX]
+    axes: tuple[ca.SX, ca.SX]
+    sides: tuple[ca.SX, ca.SX]
     stretch: ca.SX
     theta: tuple[ca.SX, ca.SX]
     spin: ca.SX
@@ -122,6 +119,38 @@ class BeamMotion:
     accelerations: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
     modal: OwnMotion | tuple[()] = ()
     lean: ca.SX | float = 1.0
+
+    @property
+    def normal(self) -> tuple[ca.SX, ca.SX]:
+        """The mean of the sides in the frame, but for its third component, which is 0."""
+        return tuple(0.5 * (self.sides[0][i] + self.sides[1][i]) for i in range(2))  # type: ignore[return-value]
+
+    @property
+    def arms(self) -> tuple[ca.SX, ca.SX]:
+        """On which the twist of the frame hangs with the nodal rotations: q × e₃, q = (q₁, q₂, q₃) a side."""
+        return tuple(_arm(q) for q in self.sides)  # type: ignore[return-value]
+
+
+def _arm(side: ca.SX) -> ca.SX:
+    import casadi as ca
+
+    return ca.vertcat(side[1], -side[0], 0)
+
+
+def turning(m: BeamMotion) -> ca.SX:
+    """Return the rate of the frame's spin, resolved in the frame."""
+    import casadi as ca
+
+    v = m.rates[2] - m.rates[0]
+    apart = m.accelerations[2] - m.accelerations[0] - ca.cross(m.spin, v) - v * v[0] / m.chord
+    about_y, about_z = -apart[2] / m.chord, apart[1] / m.chord
+    spins, rates = m.rates[1::2], m.accelerations[1::2]
+    sides = [ca.cross(w - m.spin, q) for w, q in zip(spins, m.sides, strict=True)]
+    twist = about_y * m.normal[0]
+    for w, b, arm, side in zip(spins, rates, m.arms, sides, strict=True):
+        twist += 0.5 * (ca.dot(b - ca.cross(m.spin, w), arm) + ca.dot(w, _arm(side)))
+        twist += 0.5 * (m.spin[1] * side[0] - m.spin[0] * side[1])
+    return ca.vertcat(twist / m.normal[1], about_y, about_z)
 
 
 def beam_motion(
@@ -160,8 +189,8 @@ def beam_motion(
     m = framed_motion(
         p,
         frame,
-        0.5 * (first.x + second.x),
         chord,
+        tuple(frame.T @ (node.R @ rest[:, 0]) for node in (first, second)),
         tuple(frame.T @ side for side in sides),
         tuple(rotation_vector(frame.T @ (node.R @ rest)) for node in (first, second)),
         tuple(frame.T @ v for v in rates),
@@ -174,37 +203,34 @@ def beam_motion(
 def framed_motion(
     p: dict[str, ca.SX],
     frame: ca.SX,
-    middle: ca.SX,
     chord: ca.SX,
+    axes: tuple[ca.SX, ...],
     sides: tuple[ca.SX, ...],
     theta: tuple[ca.SX, ...],
     rates: tuple[ca.SX, ...],
     accelerations: tuple[ca.SX, ...],
     modal: OwnMotion | tuple[()] = (),
 ) -> BeamMotion:
-    """Return the motion of an element from what is seen in its frame; ``sides`` are the nodes' second axes."""
+    """Return the motion of an element from what is seen in its frame; ``axes``, ``sides``: first, second of nodes."""
     import casadi as ca
 
-    normal = tuple(0.5 * (sides[0][i] + sides[1][i]) for i in range(2))
-    # q×e3 for the lever arms of the twist, q = (q1, q2, q3)
-    arms = tuple(ca.vertcat(q[1], -q[0], 0) for q in sides)
     dv = rates[2] - rates[0]
     spin_y, spin_z = -dv[2] / chord, dv[1] / chord
-    twist = 0.5 * (ca.dot(rates[1], arms[0]) + ca.dot(rates[3], arms[1]))
-    return BeamMotion(
+    m = BeamMotion(
         p=p,
         frame=frame,
-        middle=middle,
         chord=chord,
-        normal=normal,  # type: ignore[arg-type]
-        arms=arms,  # type: ignore[arg-type]
+        axes=axes,  # type: ignore[arg-type]
+        sides=sides,  # type: ignore[arg-type]
         stretch=chord - p["L"],
         theta=theta,  # type: ignore[arg-type]
-        spin=ca.vertcat((twist + spin_y * normal[0]) / normal[1], spin_y, spin_z),
+        spin=ca.vertcat(0, spin_y, spin_z),
         rates=rates,  # type: ignore[arg-type]
         accelerations=accelerations,  # type: ignore[arg-type]
         modal=modal,
     )
+    twist = 0.5 * (ca.dot(rates[1], m.arms[0]) + ca.dot(rates[3], m.arms[1]))
+    return replace(m, spin=ca.vertcat((twist + spin_y * m.normal[0]) / m.normal[1], spin_y, spin_z))
 
 
 def components(v: ca.SX) -> tuple:

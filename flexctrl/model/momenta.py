@@ -181,7 +181,8 @@ def _kernel_of(kind: Kind, effects: tuple[Effect, ...]) -> Kernel:
     step = ca.SX.sym("step", kind.width)
     span = ca.SX.sym("span")
     nodes = [replace(m, span=span) for m in moved(kind, symbols, step, ca.SX([1, 0, 0]))]
-    slot = symbols[NODE_SLOT * kind.nodes :]
+    moving = ca.kron(step[kind.nodes * kind.freedoms :], ca.SX([1] + [0] * (DRIVE_SLOT - 1)))
+    slot = symbols[NODE_SLOT * kind.nodes :] + moving
     still = [replace(m, a=ca.SX(3, 1), b=ca.SX(3, 1)) for m in nodes]
     along = [replace(m, a=m.v, b=m.w) for m in nodes]
     shares = kind.physics(effects, still, _accelerated(slot, 0.0), parameters)

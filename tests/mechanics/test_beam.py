@@ -17,7 +17,7 @@ SECTION = fc.Section(
     EA=900.0, EI_y=40.0, EI_z=70.0, GJ=30.0, rhoA=1.3, rhoJ=0.05, rhoI_y=0.02, rhoI_z=0.03, GA_y=400.0, GA_z=250.0
 )
 BEAM = fc.Beam("b", (0.1, -0.2, 0.3), (1.0, 0.5, -0.4), SECTION, up=(0.3, 0.2, 1.0))
-L, AXES = BEAM.length, BEAM.axes
+norm, L, AXES = np.linalg.norm, BEAM.length, BEAM.axes
 ENDS = np.array([BEAM.start.position, BEAM.end.position])
 G = np.array([1.0, -2.0, -9.0])
 REST = np.concatenate([slot(x, np.eye(3)) for x in ENDS])
@@ -121,22 +121,69 @@ def test_strain_energy_is_that_of_the_textbook_stiffness_on_curvatures_of_second
 
 @pytest.mark.parametrize("slots", STATES)
 def test_height_energy_is_that_of_the_deflected_axis(slots):
-    """−∫ρA g·x ds along the cubic between the nodes, the axis drawn in where it slopes."""
-    E, _, (t1, t2) = element_frame(slots)
+    """−∫ρA g·x ds along the cubic between the nodes, drawn in where it slopes; to second order of its slopes."""
+    E, _, turns = element_frame(slots)
+    t1, t2 = (E.T @ row[3:12].reshape(3, 3) @ AXES[:, 0] for row in slots.reshape(2, -1))
     s, weights = (0.5 * (leggauss(4)[0] + 1.0), 0.5 * leggauss(4)[1])
     n2, n4 = s * (1 - s) ** 2 * L, s**2 * (s - 1) * L
-    off = np.outer(n2 * t1[2] + n4 * t2[2], E[:, 1]) - np.outer(n2 * t1[1] + n4 * t2[1], E[:, 2])
-    slope = [(1 - 4 * s + 3 * s**2) * a + (3 * s**2 - 2 * s) * b for a, b in ((t1[1], t2[1]), (t1[2], t2[2]))]
+    off = sum(np.outer(n2 * t1[k] + n4 * t2[k], E[:, k]) for k in (1, 2))
+    slope = [(1 - 4 * s + 3 * s**2) * t1[k] + (3 * s**2 - 2 * s) * t2[k] for k in (1, 2)]
     drawn_in = L * weights @ ((s - 0.5) * 0.5 * (slope[0] ** 2 + slope[1] ** 2))
     axis = np.outer(1 - s, slots[:3]) + np.outer(s, slots[24:27]) + off + drawn_in * E[:, 0]
-    close(kernel(height, 2)(slots), -SECTION.rhoA * L * weights @ (axis @ G))
+    far = max(norm(turn) for turn in turns)
+    close(kernel(height, 2)(slots), -SECTION.rhoA * L * weights @ (axis @ G), 1e-11 + far**4 / 20.0)
 
 
 @pytest.mark.parametrize("slots", STATES)
-def test_kinetic_energy_is_that_of_the_consistent_mass_in_the_frame(slots):
+def test_the_mean_of_the_axis_is_that_of_hermites_cubic_but_along_the_chord(slots):
+    """Whose slopes are the nodes' axes: the mean lies ½(x₁ + x₂) + L/12 (t₁ − t₂); along the chord two fifths of it."""
+    E, _, _ = element_frame(slots)
+    (x1, t1), (x2, t2) = ((s[:3], s[3:12].reshape(3, 3) @ AXES[:, 0]) for s in slots.reshape(2, -1))
+    s, weights = (0.5 * (leggauss(4)[0] + 1.0), 0.5 * leggauss(4)[1])
+    h = np.array([1 - 3 * s**2 + 2 * s**3, s * (1 - s) ** 2 * L, 3 * s**2 - 2 * s**3, s**2 * (s - 1) * L])
+    off = weights @ (h.T @ np.array([x1, t1, x2, t2])) - 0.5 * (x1 + x2)
+    along = (off @ E[:, 0]) * E[:, 0]
+    mean = 0.5 * (x1 + x2) + off - 0.6 * along
+    close(kernel(height, 2)(slots), -SECTION.rhoA * L * mean @ G)
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_kinetic_energy_is_that_of_the_consistent_mass_but_for_the_mean_which_moves_as_weight_says(slots):
+    """½ Vᵀ M_e V − ½ m |c|² + ½ m |Ẋ|², c the mean velocity that M_e knows, Ẋ by the power of weights."""
     E, _, _ = element_frame(slots)
     V = np.concatenate([E.T @ s[k : k + 3] for s in slots.reshape(2, -1) for k in (12, 15)])
-    close(kernel(kinetic, 2)(slots), 0.5 * V @ beam_mass(SECTION, L) @ V)
+    M, m = beam_mass(SECTION, L), SECTION.rhoA * L
+    known = (M[:3] + M[6:9]) @ V / m
+    close(
+        kernel(kinetic, 2)(slots),
+        0.5 * V @ M @ V + 0.5 * m * (mean_velocity(slots) @ mean_velocity(slots) - known @ known),
+    )
+
+
+def mean_velocity(slots):
+    rates = slots.reshape(2, -1)[:, 12:18].ravel()
+    heights = (lambda a, b, g=g: beam_inertia.height_energy(motion(a, b), g, 0.5 * (a.x + b.x)) for g in np.eye(3))
+    return np.array([-(gradient(height, 2)(slots) @ rates) / (SECTION.rhoA * L) for height in heights])
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_a_speed_of_the_whole_adds_its_own_energy_and_its_share_of_the_momentum(slots):
+    """T(v + V) = T(v) + m Ẋ·V + ½ m |V|²: who moves along sees the same (Galilei)."""
+    V, m = np.array([30.0, -20.0, 50.0]), SECTION.rhoA * L
+    faster = slots.copy()
+    for k in (12, 36):
+        faster[k : k + 3] += V
+    gained = kernel(kinetic, 2)(faster) - kernel(kinetic, 2)(slots)
+    close(gained, m * mean_velocity(slots) @ V + 0.5 * m * V @ V)
+    close(INERTIAL(faster), INERTIAL(slots), 1e-10)
+
+
+@pytest.mark.parametrize("slots", STATES)
+def test_inertia_in_free_fall_is_the_weight(slots):
+    falling = slots.copy()
+    for k in (18, 42):
+        falling[k : k + 3] += G
+    close(INERTIAL(falling) - INERTIAL(slots), -WEIGHT(slots), 1e-10)
 
 
 @pytest.mark.parametrize("slots", STATES)

@@ -36,8 +36,10 @@ def _beam(
         parked = (seen_outside(effects, standing(first)), seen_outside(effects, standing(second)))
         still = modal._replace(rates=0.0 * modal.rates, accelerations=0.0 * modal.accelerations) if modal else ()
         carried = beam_inertia.kinetic_energy(corotation.beam_motion(*parked, parameters, still))
-    inertia = beam.whole_force(felt, beam_inertia.inertial_force(felt))
-    return Shares(inertia, beam.whole_force(m, force), beam_inertia.kinetic_energy(m), stored - carried)
+    inertial = beam_inertia.inertial_force(felt)
+    shares = (beam.whole_force(felt, inertial), beam.whole_force(m, force))
+    together = beam.whole_force(m, force + inertial) if felt is m else None
+    return Shares(*shares, beam_inertia.kinetic_energy(m), stored - carried, together=together)
 
 
 def modes_in(slot: ca.SX, along: int = 0) -> corotation.OwnMotion | tuple[()]:
