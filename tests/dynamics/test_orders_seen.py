@@ -30,15 +30,15 @@ def rattling(EI: float, EA: float, mass: float) -> fc.Model:
 
 
 @pytest.mark.parametrize(
-    ("EI", "EA", "mass"), [(32.0, 4e5, 0.8), (25.0, 5e4, 0.66), (80.0, 1.3e5, 0.9), (20.0, 2e5, 0.7)]
+    ("EI", "EA", "mass"), [(20.0, 2.5e5, 0.3), (30.0, 5e4, 0.8), (30.0, 2.5e5, 0.3), (30.0, 2.5e5, 0.8)]
 )
 def test_what_does_not_follow_a_power_of_steps_is_told_whole(EI, EA, mass):
-    """An eighth of what two runs are apart, which steps of second order leave, was a fifth of the truth and less."""
+    """An eighth of what two runs are apart, which steps of second order leave, was a sixth of the truth and less."""
     model, every = rattling(EI, EA, mass), 0.05
-    run = fc.simulate(model, until=1.0, every=every, inputs={"push": 1.0})
+    run = fc.simulate(model, until=2.0, every=every, inputs={"push": 1.0})
     close = fc.Unchecked(fc.AdaptiveAlpha())
     right = fc.simulate(
-        model, until=1.0, every=every, inputs={"push": 1.0}, method=close, tolerance=fc.Tolerance(1e-7, 1e-10)
+        model, until=2.0, every=every, inputs={"push": 1.0}, method=close, tolerance=fc.Tolerance(1e-7, 1e-10)
     )
     assert len(run.events) > 10
     off = np.linalg.norm(run.y - right.y, axis=1).max() / np.linalg.norm(right.y - right.y[0], axis=1).max()
