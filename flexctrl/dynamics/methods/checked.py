@@ -101,8 +101,8 @@ class Checked(_Wrapped):
     leaves 1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 % a note says so, and
     until when the run is right to that. What would be noted is asked of a second run first, half as far away (in
     powers): its word counts. Where they tell little, a note says whether a third one, under 243 times the
-    tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at most that of
-    the method: what rattles goes by no power of its steps.
+    tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at
+    most that of the method: what rattles goes by no power of its steps.
 
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so and for corners. Nothing is run
