@@ -158,7 +158,7 @@ def refuse_unsymmetric(base: Scaled, limit: float = 1e-9) -> None:
     skew = base.stiffness[1]
     if skew > limit:
         raise LinearizationError(
-            f"K is not symmetric (relative difference {skew:.1e}; follower loads, or LuGreFriction?): undamped modes do "
+            f"K is not symmetric (relative difference {skew:.1e}; follower loads, LuGreFriction?): undamped modes do "
             "not exist as real shapes; use damped_poles()"
         )
 
