@@ -139,7 +139,7 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     if other is None or other.run.status is Status.INTERRUPTED:
         return told
     nearby = method.coarser(tolerance, _NEARER)
-    quiet = told.report.error < _LITTLE and set(told.report.notes) <= set(run.report.notes)
+    quiet = told.report.error < _LITTLE and not _news(told, run)
     parted = not quiet and told.report.error > PARTED
     if not quiet:
         told = _nearer(run, told, other, journey, nearby, beginning)
@@ -198,7 +198,13 @@ def _grown(
     if order == run.report.order:
         return told
     known = _said(replace(run, checkpoint=told.checkpoint), other, journey, beginning, order)
-    return _nearer(run, known, other, journey, nearby, beginning) if known.report.error > TOLD else known
+    much = known.report.error > TOLD or _news(known, run)
+    return _nearer(run, known, other, journey, nearby, beginning) if much else known
+
+
+def _news(told: Run, run: Run) -> bool:
+    """Whether a run beside has notes of its own."""
+    return not set(told.report.notes) <= set(run.report.notes)
 
 
 def _nearer(run: Run, told: Run, other: _Other, journey: Journey, nearby: Beside, beginning: Beginning) -> Run:

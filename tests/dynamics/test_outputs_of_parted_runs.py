@@ -37,6 +37,6 @@ def test_outputs_that_parted_runs_have_apart_are_told(seed, until):
     run = fc.simulate(links(seed), method=fc.GeneralizedAlpha(5e-3), **how)
     off = np.abs(run.y - true.y).max(axis=0) / np.ptp(true.y, axis=0)
     told = np.array([run.report.output_errors[name] for name in run.outputs])
-    assert run.report.error == run.report.drift > 0.3
+    assert run.report.error >= run.report.drift > 0.3
     assert off.max() > 0.1
     assert (told > 0.25 * off).all()

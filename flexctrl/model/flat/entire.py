@@ -33,7 +33,7 @@ _Drawn = tuple[Kernel, np.ndarray, np.ndarray, np.ndarray]
 """A kernel, what it reads, its parameters, and where it writes."""
 
 _FREEDOMS, _BENDING = 12, 24
-_LARGE, _MOST = 8000, 4000
+_LARGE, _MOST = 10000, 5000
 """Instructions of pieces and levers; of the kernel of accelerations: beyond, there is nothing to be gained."""
 _TURN = 2.0 * np.pi
 _MARKED = (0.0, 1.0, -1.0)

@@ -38,7 +38,7 @@ def _beam(
         carried = beam_inertia.kinetic_energy(corotation.beam_motion(*parked, parameters, still))
     inertial = beam_inertia.inertial_force(felt)
     shares = (beam.whole_force(felt, inertial), beam.whole_force(m, force))
-    together = beam.whole_force(m, force + inertial) if felt is m else None
+    together = beam.whole_force(m, force + inertial)
     return Shares(*shares, beam_inertia.kinetic_energy(m), stored - carried, together=together)
 
 
