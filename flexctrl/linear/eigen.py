@@ -7,7 +7,7 @@ from the inverted one, high pairs from the direct one in the M-orthogonal rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -17,7 +17,17 @@ from scipy.linalg import lapack
 from flexctrl.errors import LinearizationError
 from flexctrl.linear.banded import Band
 from flexctrl.linear.krylov import Space
-from flexctrl.linear.pencil import EPS, HIDDEN, DensePencil, Matrix, Pencil, ShiftedPencil, faint_shift, stiffness_noise
+from flexctrl.linear.pencil import (
+    EPS,
+    HIDDEN,
+    TINY,
+    DensePencil,
+    Matrix,
+    Pencil,
+    ShiftedPencil,
+    faint_shift,
+    stiffness_noise,
+)
 
 __all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
 
@@ -27,7 +37,8 @@ RIGID_GAP = 1e-8
 UNCLEAR = 1e5 * EPS
 SHORT_SPAN = 1e4
 WIDTH = 4
-SCOUTS = 8
+BLUR, STEP = 1e3, 1e4
+MISFIT = 1e-4
 GROWTH, CLEAR = 1e5, 1e-3
 NEARLY = 1e-3
 
@@ -46,12 +57,16 @@ class Eigenpairs:
         Which of them are rigid-body modes.
     noise : numpy.ndarray, shape (k,)
         Spread of λ by the rounding of K's entries.
+    misfit : numpy.ndarray, shape (k,) or (0,)
+        Share of λ, or of about the first flexible λ if that is more, by which a pair misses K φ = λ M φ beyond what
+        rounding explains; empty where a Sturm count has told that none is missed.
     """
 
     values: np.ndarray
     shapes: np.ndarray
     rigid: np.ndarray
     noise: np.ndarray
+    misfit: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def coordinate_scales(M: Matrix, C: Matrix, K: Matrix) -> np.ndarray:
@@ -95,28 +110,50 @@ def complete_pairs(
     lam, phi = pencil.direct()
     top = float(np.abs(lam).max())
     if top > SHORT_SPAN * np.abs(lam).min():
-        shifted, lowest = _scouted(pencil, phi, SCOUTS)
+        shifted, lowest = _scouted(pencil, lam, phi)
         low = int(np.count_nonzero(lam <= np.sqrt(top * max(lowest, 0.0))))
         lam[:low], phi[:, :low] = shifted.ritz(phi[:, :low])
         if EPS * top > lowest:  # direct ones are blurred past the softest, which then are in all that was found of them
             lam[:low], phi[:, :low] = shifted.ritz(_orthonormal(pencil.M, phi[:, :low]))
     else:
         shifted = pencil.below_all(-max(top, 1.0))
-    return _settled(pencil, _found(pencil, shifted, lam, phi))
+    pairs = _settled(pencil, _found(pencil, shifted, lam, phi))
+    return replace(pairs, misfit=_misfit(pencil, shifted, pairs))
 
 
-def _scouted(pencil: DensePencil, phi: np.ndarray, count: int) -> tuple[ShiftedPencil, float]:
-    """A shift that suits the lowest pairs, given vectors near them, and its distance to the lowest."""
-    shifted, x = pencil.below_all(faint_shift(pencil.K, pencil.M)), phi[:, :count]
-    for _ in range(4):
-        lam, x = shifted.ritz(_orthonormal(pencil.M, x))
-        better = _better_shift(_found(pencil, shifted, lam, x, 0), shifted.sigma)
-        if better in (0.0, shifted.sigma):
-            break
-        shifted = pencil.below_all(better)
-    if better == 0.0 and count < len(phi):
-        return _scouted(pencil, phi, 4 * count)
-    return shifted, lam[0] - shifted.sigma
+def _misfit(pencil: DensePencil, shifted: ShiftedPencil, pairs: Eigenpairs) -> np.ndarray:
+    """The misfit beyond what the rounding of K, and of the shapes, explains."""
+    share, size = shifted.misfit(pairs.shapes)
+    noise = pairs.noise / size
+    blurred = np.sqrt(noise * noise.max()) + EPS * np.sqrt(size / size.min())
+    beyond = np.maximum(share - RIGID_NOISE * blurred, 0.0)
+    wrong = beyond > MISFIT
+    if wrong.any():  # in M's measure, what the shape of a stiff motion has of soft ones is little
+        beyond[wrong] = np.fmin(beyond[wrong], pencil.misfit(pairs.shapes[:, wrong]))
+    return np.asarray(beyond)
+
+
+def _scouted(pencil: DensePencil, values: np.ndarray, phi: np.ndarray) -> tuple[ShiftedPencil, float]:
+    """A shift that suits the lowest pairs, given pairs near them, and its distance to the lowest.
+
+    Beside a shift of less than EPS λ, the inverted pencil does not tell λ from infinity: what it blurs leaks into all
+    others. So only vectors that the shift spans are looked at. They hold all that the direct pencil has mixed; where
+    nothing but free motion is among them, the shift and their number grow.
+    """
+    mixed = BLUR * EPS * float(np.abs(values).max())
+    sigma = min(faint_shift(pencil.K, pencil.M), -TINY * max(mixed, float(values[0])))
+    while True:
+        shifted, lam, x = pencil.below_all(sigma), values, phi
+        for _ in range(4):
+            x = x[:, TINY * lam <= -shifted.sigma]
+            lam, x = shifted.ritz(_orthonormal(pencil.M, x))
+            better = _better_shift(_found(pencil, shifted, lam, x, 0), shifted.sigma)
+            if better in (0.0, shifted.sigma):
+                break
+            shifted = pencil.below_all(better)
+        if better != 0.0 or TINY * float(values[-1]) <= -sigma:
+            return shifted, lam[0] - shifted.sigma
+        sigma *= STEP
 
 
 def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int, band: Band | None = None) -> Eigenpairs:

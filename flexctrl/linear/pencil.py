@@ -21,6 +21,7 @@ __all__ = [
     "EPS",
     "HIDDEN",
     "SINGULAR",
+    "TINY",
     "DensePencil",
     "Matrix",
     "Pencil",
@@ -102,6 +103,18 @@ class ShiftedPencil:
         """One refined step of subspace iteration, and the pairs within the space; ascending when λ > σ."""
         image = self.M @ x
         return self._within(x, image, self.solve(image))
+
+    def misfit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far x, of M-length one, are from eigenvectors, and their λ − σ, of which that is a share.
+
+        With A = K − σM, θ = xᵀ A x and the residual r = A x − θ M x, A^-½ r = (1 − θ A^-½ M A^-½) A^½ x: for some λ of
+        the pencil, θ is within the share |A^-½ r| / |A^½ x| of λ − σ.
+        """
+        image = self.M @ x
+        force = self.K @ x - self.sigma * image
+        size = np.abs(np.einsum("ij,ij->j", x, force))
+        rest = force - size * image
+        return np.sqrt(np.abs(np.einsum("ij,ij->j", rest, self.inverse(rest))) / size), size
 
     def _within(self, x: np.ndarray, image: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The pairs within the space of x, given M x and (K − σM)⁻¹ M x."""
@@ -246,6 +259,14 @@ class DensePencil:
     def below_all(self, sigma: float) -> ShiftedPencil:
         """Factors at or under σ with no λ under it."""
         return _below_all(self.at, sigma)
+
+    def misfit(self, x: np.ndarray) -> np.ndarray:
+        """How far x, of M-length one, are from eigenvectors: some λ is within this share of θ = xᵀ K x from it."""
+        image, force = self.M @ x, self.K @ x
+        theta = np.einsum("ij,ij->j", x, force)
+        rest = force - theta * image
+        length = np.sqrt(np.abs(np.einsum("ij,ij->j", rest, np.linalg.solve(self.M, rest))))
+        return np.asarray(length / np.abs(theta))
 
     def direct(self) -> tuple[np.ndarray, np.ndarray]:
         """All λ and φ by the pencil (K, M), ascending: right at the high end.

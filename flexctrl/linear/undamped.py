@@ -11,7 +11,7 @@ from flexctrl.errors import LinearizationError
 from flexctrl.linear.basis import canonical, clusters
 from flexctrl.linear.columns import energies
 from flexctrl.linear.condense import Scaled, scaled, static_map
-from flexctrl.linear.eigen import EPS, RIGID_NOISE, Eigenpairs, complete_pairs, lowest_pairs
+from flexctrl.linear.eigen import EPS, MISFIT, RIGID_NOISE, Eigenpairs, complete_pairs, lowest_pairs
 from flexctrl.linear.massless import STIFFNESS_RANK, null_split
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes, shares_of
@@ -52,7 +52,7 @@ def modes(linear: LinearModel, count: int | None = None) -> Modes:
     Raises
     ------
     LinearizationError
-        If K is not symmetric (use ``damped_poles``), M not positive semidefinite.
+        If K is not symmetric (use ``damped_poles``), M not positive semidefinite, or ω² span more than doubles hold.
     MechanismError
         For a motion with neither mass nor stiffness.
     """
@@ -90,6 +90,7 @@ def modes_of(linear: LinearModel, base: Scaled, count: int | None) -> Modes:
         K = sp.csc_matrix(K + _grounded(base))
     dense = n <= DENSE or wanted + 30 > finite // 2
     pairs = _complete(K, M, null) if dense else lowest_pairs(K, M, wanted, base.band)
+    _refuse_misfits(linear, base.scales, pairs)
     known = _recalculated(linear, base, _sharpened(K, M, pairs))
     return _described(linear, base, _settled_basis(base, known), wanted)
 
@@ -144,7 +145,20 @@ def _complete(K: sp.csc_matrix, M: sp.csc_matrix, null: sp.csc_matrix) -> Eigenp
         return complete_pairs(K.toarray(), M.toarray())
     T, _ = static_map(K, null)
     pairs = complete_pairs((T.T @ K @ T).toarray(), (T.T @ M @ T).toarray(), origin=(K, T))
-    return Eigenpairs(pairs.values, T @ pairs.shapes, pairs.rigid, pairs.noise)
+    return replace(pairs, shapes=T @ pairs.shapes)
+
+
+def _refuse_misfits(linear: LinearModel, scales: np.ndarray, pairs: Eigenpairs) -> None:
+    """Raise LinearizationError for pairs that the solver has not brought to satisfy K φ = ω² M φ."""
+    wrong = np.flatnonzero(pairs.misfit > MISFIT)
+    if wrong.size:
+        i = int(wrong[0])
+        name = linear.coordinates[int(np.argmax(np.abs(scales * pairs.shapes[:, i])))]
+        raise LinearizationError(
+            f"modes: the motion of {name} with {pairs.values[i]:.3g} (rad/s)² misses K φ = ω² M φ by "
+            f"{pairs.misfit[i]:.1e}: beside the fastest motion, {np.abs(pairs.values).max():.1e} (rad/s)², doubles do "
+            "not hold it. Make the stiffest part rigid, or softer"
+        )
 
 
 def refuse_unsymmetric(base: Scaled, limit: float = 1e-9) -> None:

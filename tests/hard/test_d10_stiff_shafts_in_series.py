@@ -13,9 +13,12 @@ from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
 from flexctrl.errors import LinearizationError
+from flexctrl.linear import eigen
+from flexctrl.linear.pencil import DensePencil, faint_shift
 
 G, HALF, OWN, ROTOR = 9.81, 0.5, 0.02, 0.01
 LEVEL, TILTED = np.eye(3), Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
+EIGH = 1e-8
 STIFF = [1e6, 1e10, 1e11, 1e12, 1e14, 1e16, 1e18]
 
 
@@ -140,3 +143,75 @@ def test_where_no_digit_of_the_swing_is_left_it_is_refused(k):
     model = hanging([k, k])
     with pytest.raises(LinearizationError, match=r"lost in the rounding of the stiffest entries.*rigid part"):
         fc.linearize(model, fc.equilibrium(model, hold={"d1_source": 0.0}))
+
+
+def adrift(k: float, axis: tuple[float, float, float], length: float, elements: int, shafts: int = 2) -> fc.Model:
+    """Free bodies in a row, motors between them with shafts of some k R² [N m/rad], and a beam welded to the first."""
+    hub = fc.RigidBody("hub", (0, 0, 0), 40.0, (3, 5, 4), {"front": (1, 0, 0), "back": (-1, 0, 0)})
+    arm = fc.RigidBody("arm", (1, 0, 0), 3.0, (0.3, 0.5, 0.4), {"tip": (1.7, 0.2, -0.4)})
+    hand = fc.RigidBody("hand", (1.7, 0.2, -0.4), 2.0, (0.3, 0.5, 0.4))
+    section = fc.Section(EA=1e7, EI_y=2e3, EI_z=3e3, GJ=1e3, rhoA=2.0, rhoJ=0.01)
+    boom = fc.Beam("boom", (-1, 0, 0), (-1 - length, 0, 0), section, elements=elements)
+    joints, drives = [fc.Weld(hub.point("back"), boom.start)], []
+    between = [(hub.point("front"), arm.node, (0, 1, 0), 1000.0, 10.0), (arm.point("tip"), hand.node, axis, 100.0, 2.0)]
+    for i, (base, moved, about, ratio, rotor) in enumerate(between[:shafts]):
+        motor = {"stiffness": k / ratio**2, "ratio": ratio, "inertia": rotor / ratio**2}
+        joints.append(fc.Hinge(base, moved, axis=about))
+        drives.append(fc.RotaryDrive(f"d{i}", moved, base, axis=about, **motor))
+    bodies = [hub, arm, hand][: shafts + 1]
+    return fc.assemble(fc.Structure([*bodies, boom], joints, drives), [fc.LargeRotation(), fc.Flexible()])
+
+
+def behind_rigid_shafts(linear: fc.LinearModel, zeros: int) -> np.ndarray:
+    """The frequencies of a free machine [Hz], its twists struck out of M and K; so many of them are 0."""
+    kept = np.flatnonzero([not name.endswith("_twist") for name in linear.coordinates])
+    M, K = (A.toarray()[np.ix_(kept, kept)] for A in (linear.M, linear.K))
+    squares = eigh(K, M, eigvals_only=True)[zeros:]
+    return np.append(np.zeros(zeros), np.sqrt(squares) / (2.0 * np.pi))
+
+
+@pytest.mark.parametrize(("length", "elements"), [(3.0, 4), (30.0, 4), (3.0, 12), (30.0, 12)])
+@pytest.mark.parametrize("axis", [(0, 1, 0), (0, 0.6, 0.8), (0, 0, 1)], ids=["y", "oblique", "z"])
+@pytest.mark.parametrize("k", [1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18])
+def test_adrift_with_a_beam_every_rigid_body_mode_is_found_and_no_other_is_mixed_with_it(k, axis, length, elements):
+    """Six of the whole and a turn of each motor: K and M hold them, whatever the span of ω²."""
+    linear = fc.linearize(adrift(k, axis, length, elements))
+    expected = behind_rigid_shafts(linear, 8)[:14]
+    found = linear.modes()
+    assert (found.rigid, found.unstable) == (8, 0)
+    assert found.frequencies[:14] == pytest.approx(expected, rel=EIGH)
+    for poles in (linear.damped_poles(), linear.to_ss().poles()):
+        assert np.sort(np.abs(poles))[:28:2] / (2.0 * np.pi) == pytest.approx(expected, rel=EIGH)
+    assert len(linear.certificate.rigid_modes) == 8
+
+
+def test_modes_that_the_solver_did_not_reach_are_refused(monkeypatch):
+    """Left beside a shift so faint that doubles do not span the rest, motions are mixed: none of them is let out."""
+
+    def faint(pencil, values, phi):
+        return pencil.below_all(faint_shift(pencil.K, pencil.M)), 0.0
+
+    model = adrift(1e17, (0, 1, 0), 3.0, 4)
+    monkeypatch.setattr(eigen, "_scouted", faint)
+    with pytest.raises(LinearizationError, match=r"the motion of \w+ with .* misses K φ = ω² M φ.*stiffest part rigid"):
+        fc.linearize(model)
+
+
+@pytest.mark.parametrize("angle", [1e-1, 1e-3, 1e-6])
+def test_a_misfit_is_that_of_two_motions_mixed(angle):
+    """Along each of them the residual is its share times λ − σ − θ, and weighs as one over λ − σ."""
+    first, second, sigma = 3.0, 700.0, -2.0
+    x = np.array([[np.cos(angle)], [np.sin(angle)]])
+    share, size = DensePencil(np.diag([first, second]), np.eye(2)).at(sigma).misfit(x)
+    a, b = first - sigma, second - sigma
+    theta = a * np.cos(angle) ** 2 + b * np.sin(angle) ** 2
+    rest = np.array([(a - theta) * np.cos(angle), (b - theta) * np.sin(angle)])
+    assert size == pytest.approx([theta], rel=1e-12)
+    assert share == pytest.approx([np.sqrt((rest**2 / [a, b]).sum() / theta)], rel=1e-6)
+
+
+@pytest.mark.parametrize("elements", [2, 4, 8])
+@pytest.mark.parametrize("length", [3.0, 30.0])
+@pytest.mark.parametrize("k", [1e8, 1e10, 1e12, 1e14, 1e16, 1e18])
+def test_adrift_behind_one_shaft_nothing_is_refused(k, length, elements):
+    assert fc.linearize(adrift(k, (0, 1, 0), length, elements, shafts=1)).modes().rigid == 7
