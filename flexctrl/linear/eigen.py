@@ -118,19 +118,23 @@ def complete_pairs(
     else:
         shifted = pencil.below_all(-max(top, 1.0))
     pairs = _settled(pencil, _found(pencil, shifted, lam, phi))
-    return replace(pairs, misfit=_misfit(pencil, shifted, pairs))
+    return replace(pairs, misfit=_misfit(shifted, pairs))
 
 
-def _misfit(pencil: DensePencil, shifted: ShiftedPencil, pairs: Eigenpairs) -> np.ndarray:
-    """The misfit beyond what the rounding of K, and of the shapes, explains."""
-    share, size = shifted.misfit(pairs.shapes)
-    noise = pairs.noise / size
-    blurred = np.sqrt(noise * noise.max()) + EPS * np.sqrt(size / size.min())
-    beyond = np.maximum(share - RIGID_NOISE * blurred, 0.0)
-    wrong = beyond > MISFIT
-    if wrong.any():  # in M's measure, what the shape of a stiff motion has of soft ones is little
-        beyond[wrong] = np.fmin(beyond[wrong], pencil.misfit(pairs.shapes[:, wrong]))
-    return np.asarray(beyond)
+def _misfit(shifted: ShiftedPencil, pairs: Eigenpairs) -> np.ndarray:
+    """The misfit of those that the direct pencil mixes, beyond what the rounding of K and of the shapes explains."""
+    mixed = pairs.values <= _mixed(pairs.values)
+    share, size = shifted.misfit(pairs.shapes[:, mixed])
+    noise = pairs.noise[mixed] / size
+    blurred = np.sqrt(noise * noise.max(initial=0.0)) + EPS * np.sqrt(size / size.min(initial=np.inf))
+    found = np.zeros(len(mixed))
+    found[mixed] = np.maximum(share - RIGID_NOISE * blurred, 0.0)
+    return found
+
+
+def _mixed(values: np.ndarray) -> float:
+    """Motions of less than this λ the direct pencil mixes with each other."""
+    return BLUR * EPS * float(np.abs(values).max())
 
 
 def _scouted(pencil: DensePencil, values: np.ndarray, phi: np.ndarray) -> tuple[ShiftedPencil, float]:
@@ -140,8 +144,7 @@ def _scouted(pencil: DensePencil, values: np.ndarray, phi: np.ndarray) -> tuple[
     others. So only vectors that the shift spans are looked at. They hold all that the direct pencil has mixed; where
     nothing but free motion is among them, the shift and their number grow.
     """
-    mixed = BLUR * EPS * float(np.abs(values).max())
-    sigma = min(faint_shift(pencil.K, pencil.M), -TINY * max(mixed, float(values[0])))
+    sigma = min(faint_shift(pencil.K, pencil.M), -TINY * max(_mixed(values), float(values[0])))
     while True:
         shifted, lam, x = pencil.below_all(sigma), values, phi
         for _ in range(4):

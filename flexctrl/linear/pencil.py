@@ -260,14 +260,6 @@ class DensePencil:
         """Factors at or under σ with no λ under it."""
         return _below_all(self.at, sigma)
 
-    def misfit(self, x: np.ndarray) -> np.ndarray:
-        """How far x, of M-length one, are from eigenvectors: some λ is within this share of θ = xᵀ K x from it."""
-        image, force = self.M @ x, self.K @ x
-        theta = np.einsum("ij,ij->j", x, force)
-        rest = force - theta * image
-        length = np.sqrt(np.abs(np.einsum("ij,ij->j", rest, np.linalg.solve(self.M, rest))))
-        return np.asarray(length / np.abs(theta))
-
     def direct(self) -> tuple[np.ndarray, np.ndarray]:
         """All λ and φ by the pencil (K, M), ascending: right at the high end.
 
