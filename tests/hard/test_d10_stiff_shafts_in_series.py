@@ -170,9 +170,9 @@ def behind_rigid_shafts(linear: fc.LinearModel, zeros: int) -> np.ndarray:
     return np.append(np.zeros(zeros), np.sqrt(squares) / (2.0 * np.pi))
 
 
-@pytest.mark.parametrize(("length", "elements"), [(3.0, 4), (30.0, 4), (3.0, 12), (30.0, 12)])
+@pytest.mark.parametrize(("length", "elements"), [(3.0, 4), (30.0, 4), (3.0, 12)])
 @pytest.mark.parametrize("axis", [(0, 1, 0), (0, 0.6, 0.8), (0, 0, 1)], ids=["y", "oblique", "z"])
-@pytest.mark.parametrize("k", [1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18])
+@pytest.mark.parametrize("k", [1e12, 1e15, 1e17])
 def test_adrift_with_a_beam_every_rigid_body_mode_is_found_and_no_other_is_mixed_with_it(k, axis, length, elements):
     """Six of the whole and a turn of each motor: K and M hold them, whatever the span of ω²."""
     linear = fc.linearize(adrift(k, axis, length, elements))
@@ -210,8 +210,7 @@ def test_a_misfit_is_that_of_two_motions_mixed(angle):
     assert share == pytest.approx([np.sqrt((rest**2 / [a, b]).sum() / theta)], rel=1e-6)
 
 
-@pytest.mark.parametrize("elements", [2, 4, 8])
 @pytest.mark.parametrize("length", [3.0, 30.0])
-@pytest.mark.parametrize("k", [1e8, 1e10, 1e12, 1e14, 1e16, 1e18])
-def test_adrift_behind_one_shaft_nothing_is_refused(k, length, elements):
-    assert fc.linearize(adrift(k, (0, 1, 0), length, elements, shafts=1)).modes().rigid == 7
+@pytest.mark.parametrize("k", [1e8, 1e13, 1e18])
+def test_adrift_behind_one_shaft_nothing_is_refused(k, length):
+    assert fc.linearize(adrift(k, (0, 1, 0), length, 4, shafts=1)).modes().rigid == 7
