@@ -155,7 +155,7 @@ LONG = (
 """Cases whose neighbours hold the same: run with -m long."""
 
 
-_FAMILY, _LARGE = 4, ("tests/dynamics/", "tests/effects/", "tests/model/", "tests/study/", "tests/scene/")
+_FAMILY, _LARGE = 3, ("tests/dynamics/", "tests/effects/", "tests/model/", "tests/study/", "tests/scene/")
 """Of one test in these rooms so many cases are run, evenly spread over all; the others with -m long."""
 
 
