@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +14,6 @@ from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.structure.freedoms import Vector, parse_point
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

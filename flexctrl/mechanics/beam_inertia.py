@@ -45,8 +45,8 @@ def inertial_force(m: BeamMotion) -> BeamForce:
     """Return the force of inertia.
 
     Lagrange's equations of T = ½ Vᵀ M V + ½ m |Ẋ|², V the nodal velocities in the frame, M the consistent mass
-    relative to its mean, X the `mean` of the axis: d/dt(R_E p) − (ω × on the rotations) − ∂T/∂q, with R_E changing by
-    the frame's spin, and −m Ẍ on X.
+    relative to its mean, X the mean of the axis (`offset`): d/dt(R_E p) − (ω × on the rotations) − ∂T/∂q, with R_E
+    changing by the spin of the frame, and −m Ẍ on X.
     """
     import casadi as ca
 

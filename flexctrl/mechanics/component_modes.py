@@ -150,14 +150,14 @@ def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tupl
     blocks = [ca.SX(3, 1) for _ in range(4)]
     pushed_modes: list[ca.SX] = []
     for eta, across, (axis, sign, about) in zip(planes(m, modal), _ACROSS, _PLANES, strict=True):
-        turning = _rotary(m, about) / L
+        rotary = _rotary(m, about) / L
         ends = ca.vertcat(rates[0][across], sign * L * rates[1][axis], rates[2][across], sign * L * rates[3][axis])
-        coupling = mass * ca.DM(modes.mass) + turning * ca.DM(modes.rotary)
+        coupling = mass * ca.DM(modes.mass) + rotary * ca.DM(modes.rotary)
         pushed = coupling @ eta
         for i in (0, 2):
             blocks[i][across] += pushed[i]
             blocks[i + 1][axis] += sign * L * pushed[i + 1]
-        pushed_modes.append(coupling.T @ ends + mass * eta + turning * (ca.DM(modes.slope) @ eta))
+        pushed_modes.append(coupling.T @ ends + mass * eta + rotary * (ca.DM(modes.slope) @ eta))
     held = held_of(m)
     for eta, first, inertia in zip(lines(m, modal), (0, 1), (mass, m.p["polar"]), strict=True):
         pushed = inertia * (ca.DM(held.ends) @ eta)
