@@ -15,7 +15,7 @@ from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
-from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, halved, told_beside
+from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, told_beside
 from flexctrl.dynamics.notes.gap import Gap, between
 from flexctrl.dynamics.records.record import InMemory
 from flexctrl.dynamics.run import Run, Status
@@ -113,7 +113,7 @@ def _copied(law: Controller | None) -> Controller | None:
         return None
 
 
-def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> Run:
+def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> Run:
     """Return the run with what a coarser one tells of it; where that is much, a second one has the last word.
 
     Where they tell little, one far coarser shows how errors grow with the tolerance, and a note says whether it goes
@@ -126,14 +126,16 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
         How it went.
     method : Checked
     beginning : Beginning
+    shorter : float
+        By how much steps of the run beside are shorter; 1 where they are longer.
 
     Returns
     -------
     Run
     """
     tolerance = journey.plan.tolerance
-    if halved(journey):
-        return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time), beginning)[0]
+    if shorter < 1.0:
+        return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)[0]
     coarser = method.coarser(tolerance)
     told, other = _told(run, journey, coarser, beginning)
     if other is None or other.run.status is Status.INTERRUPTED:

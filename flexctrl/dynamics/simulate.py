@@ -17,7 +17,8 @@ from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.journey import Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
-from flexctrl.dynamics.notes.beside import can_be_told, may_grow
+from flexctrl.dynamics.notes.answers import answers
+from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
 from flexctrl.dynamics.records.record import InMemory, Record
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
@@ -140,8 +141,10 @@ def simulate(
             run = of_sampled_loop(run, journey, beginning.again)
         if run.status is Status.FAILED:
             return run
-        if check and beginning and can_be_told(journey) and (isinstance(method, Checked) or may_grow(journey)):
-            return laid_beside(run, journey, check, beginning)
+        if check and beginning and can_be_told(journey):
+            law = answers(run, journey, beginning.again)
+            if isinstance(method, Checked) or may_grow(journey, law):
+                return laid_beside(run, journey, check, beginning, shorter(journey, law))
     return run
 
 

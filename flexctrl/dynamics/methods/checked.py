@@ -147,14 +147,16 @@ class Checked(_Wrapped):
         longer, said = 2.0**share, f"in steps {2.0**share:.2g} times as long"
         return Beside(_stepping(self.method, lambda step: longer * step), tolerance, longer, said)
 
-    def finer(self, tolerance: Tolerance, sample: float) -> Beside:
-        """Return how a run is made whose steps are half as long, also as those that samples keep short.
+    def finer(self, tolerance: Tolerance, sample: float, share: float) -> Beside:
+        """Return how a run is made whose steps are shorter, also those that samples keep short.
 
         Parameters
         ----------
         tolerance : Tolerance
         sample : float
             Time between samples [s]; 0 where there are none.
+        share : float
+            How long they are, of what they were.
 
         Returns
         -------
@@ -162,8 +164,10 @@ class Checked(_Wrapped):
         """
         if not _changeable(self.method):
             return self.coarser(tolerance)
-        halved = _stepping(self.method, lambda step: 0.5 * min(step, sample or math.inf))
-        return Beside(halved, tolerance, 0.5, "in half the steps")
+        shortened = _stepping(self.method, lambda step: share * min(step, sample or math.inf))
+        tight = share**self.pace.steepness if isinstance(self.pace, Controlled) else 1.0
+        asked = Tolerance(tight * tolerance.relative, tight * tolerance.absolute)
+        return Beside(shortened, asked, share, f"in steps {share:g} times as long")
 
 
 def _changeable(method: Any) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.dynamics.notes.answers import Answers
 from flexctrl.dynamics.notes.gap import Gap
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.run import Run, Status
@@ -18,7 +19,7 @@ from flexctrl.model.model import Model
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["PARTED", "TOLD", "can_be_told", "elsewhere", "halved", "kept_short", "may_grow", "told_beside"]
+__all__ = ["PARTED", "TOLD", "can_be_told", "elsewhere", "kept_short", "may_grow", "shorter", "told_beside"]
 
 _SWUNG, _FAR = 0.25, 0.02
 """What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
@@ -72,44 +73,51 @@ def kept_short(journey: Journey) -> bool:
     return sample > 0.0 and journey.mark.steps < _MORE * journey.point.state.t / sample
 
 
-def halved(journey: Journey) -> bool:
-    """Tell whether the run beside is to be one in half the steps, not in longer ones.
+def shorter(journey: Journey, law: Answers) -> float:
+    """Return by how much steps of the run beside are to be shorter; 1 where they are to be longer.
 
     Parameters
     ----------
     journey : Journey
         At its end.
+    law : Answers
+        How a sampled law answers.
 
     Returns
     -------
-    bool
-        Where samples keep steps short, and in steps of one length past corners: whether a contact with little to spare
-        breaks loose is decided by a finer run, where two coarse ones may be wrong alike.
+    float
+        A half where samples keep steps short, and in steps of one length past corners: whether a contact with little to
+        spare breaks loose is decided by a finer run, where two coarse ones may be wrong alike. A quarter for what jumps
+        at every sample: of what half the steps round as the run itself does, they round a quarter otherwise.
     """
+    if law is Answers.ABRUPT:
+        return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
-    return kept_short(journey) or (fixed and _cornered(journey, {*journey.watch.corner_names}))
+    return 0.5 if kept_short(journey) or (fixed and _cornered(journey, {*journey.watch.corner_names})) else 1.0
 
 
 def _cornered(journey: Journey, names: set[str]) -> bool:
     return any(event.name in names for event in journey.events)
 
 
-def may_grow(journey: Journey) -> bool:
+def may_grow(journey: Journey, law: Answers) -> bool:
     """Tell whether small differences may have grown of themselves.
 
     Parameters
     ----------
     journey : Journey
         At its end.
+    law : Answers
+        How a sampled law answers.
 
     Returns
     -------
     bool
         Whether something has swung by more than a quarter of a radian, gone farther than a fiftieth of the machine's
-        size, met corners, or followed a continuous law, which may have corners of its own; in steps of one length, if
-        it has gone twelve times that way to and fro. Where samples keep steps short the other run is a finer one,
-        which costs twice as much as the run itself: only for what turns so far and often, or goes a quarter of the
-        machine's size so often, and corners.
+        size, met corners, or followed a law that has corners or jumps, or is continuous, which may have some; in steps
+        of one length, if it has gone twelve times that way to and fro. Where samples keep steps short the other run is
+        a finer one, which costs twice as much as the run itself: only for what turns so far and often, or goes a
+        quarter of the machine's size so often, and for corners and jumps.
     """
     plan, sums, watch, short = journey.plan, journey.books.sums, journey.watch, kept_short(journey)
     feed, model = plan.feed, plan.model
@@ -118,7 +126,7 @@ def may_grow(journey: Journey) -> bool:
     swung = sums.moved > least
     if short or isinstance(plan.method.pace, Fixed):
         swung &= sums.path > _OFTEN * least
-    return bool(swung.any()) or feed.reacting or _cornered(journey, own)
+    return bool(swung.any()) or feed.reacting or law is not Answers.SMOOTH or _cornered(journey, own)
 
 
 def told_beside(

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as la
-import scipy.sparse as sp
 
 from flexctrl.dynamics.alpha.point import Coefficients
-from flexctrl.linear.modal import modal_system
-from flexctrl.linear.model import LinearModel
-from flexctrl.linear.statespace import first_order
+from flexctrl.dynamics.notes.heavy import without_light
 
 __all__ = ["Answers", "SampledLoop"]
 
-_DUST = 1e-13
 _SURE = 0.1
 
 
@@ -57,6 +54,11 @@ class SampledLoop:
     sample: float
     heavy: np.ndarray
 
+    @cached_property
+    def _between(self) -> tuple[np.ndarray, ...]:
+        machine = without_light(self.M, self.C, self.K, self.B, (self.reads, self.reads_rate), self.heavy, self.sample)
+        return machine.in_modes()
+
     def poles(self, least: float) -> np.ndarray:
         """Return the loop's own poles, from sample to sample; the machine moves exactly between.
 
@@ -69,45 +71,8 @@ class SampledLoop:
         -------
         numpy.ndarray of complex
         """
-        return _firm(self._closed(*(self._modal() if self.heavy.all() else self._descriptor())), least)
-
-    def _modal(self) -> tuple[np.ndarray, ...]:
-        """The machine over a sample in coordinates (ω η, η̇) of its undamped modes; (η, η̇) where ω is round-off."""
-        L, n, span = np.linalg.cholesky(self.M), len(self.M), self.sample
-        normal = la.solve_triangular(L, la.solve_triangular(L, self.K, lower=True).T, lower=True).T
-        squares, modes = np.linalg.eigh(0.5 * (normal + normal.T))
-        squares[abs(squares) < _DUST * abs(squares).max()] = 0.0
-        shapes = la.solve_triangular(L, modes, lower=True, trans=1)
-        size = np.sqrt(abs(squares))
-        size[size == 0.0] = 1.0
-        turning = modes.T @ (0.5 * (normal - normal.T)) @ modes
-        A = np.block(
-            [
-                [np.zeros((n, n)), np.diag(size)],
-                [-(np.diag(squares) + turning) / size, -shapes.T @ self.C @ shapes],
-            ]
-        )
-        B = np.vstack([np.zeros_like(self.B), shapes.T @ self.B])
-        C = np.hstack([self.reads @ shapes / size, self.reads_rate @ shapes])
-        return (*_over(A, B, span), C, np.zeros((len(C), B.shape[1])))
-
-    def _descriptor(self) -> tuple[np.ndarray, ...]:
-        """The same where something has no mass."""
-        linear = LinearModel(
-            sp.csc_matrix(self.M),
-            sp.csc_matrix(self.C),
-            sp.csc_matrix(self.K),
-            self.B,
-            self.reads,
-            self.reads_rate,
-            np.zeros((len(self.reads), self.B.shape[1])),
-            tuple(f"q{i}" for i in range(len(self.M))),
-            tuple(f"u{i}" for i in range(self.B.shape[1])),
-            tuple(f"y{i}" for i in range(len(self.reads))),
-        )
-        system = modal_system(linear)
-        first = first_order(replace(system, jump=np.zeros_like(system.jump)))
-        return (*_over(first.A, first.B, self.sample), first.C, first.D)
+        A, B, C, D = self._between
+        return _firm(self._closed(*_over(A, B, self.sample), C, D), least)
 
     def stepped(self, rho: float, count: int, least: float) -> np.ndarray:
         """Return the poles of the loop as steps of generalised alpha have it.

@@ -1,0 +1,97 @@
+"""How a sampled law answers to what it has read: in proportion, with limits, or by jumps that a hair decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.errors import FlexctrlError
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.feed import Feed
+    from flexctrl.dynamics.journey import Journey
+    from flexctrl.dynamics.run import Run
+
+__all__ = ["Answers", "answers"]
+
+_PLACES, _HALVINGS = 17, 16
+_JUMP = 5e-3
+"""Encoders of an arm or a crane step by 1e-5 of their way; what moves a run by percents steps by a hundredth."""
+_BENT, _AT_ONCE = 0.05, 0.4
+"""How much slopes change along the line, of the largest, and which share of it at one place where that is a limit."""
+
+Answer = Callable[[float], np.ndarray]
+
+
+class Answers(Enum):
+    """What a law's answers look like along a line of measurements."""
+
+    SMOOTH = "smooth"
+    LIMITED = "with a corner"
+    ABRUPT = "with a jump"
+
+
+def answers(run: Run, journey: Journey, feed: Feed | None) -> Answers:
+    """Tell how a sampled law answers along the line from the least to the most of all that it has read.
+
+    Where the largest change between two places does not become small as they come nearer, it is a jump.
+
+    Parameters
+    ----------
+    run : Run
+    journey : Journey
+        At its end.
+    feed : Feed or None
+        With a law that may be asked anew; None if there is none.
+
+    Returns
+    -------
+    Answers
+        Jumps count from half a percent of all that a command, or a state of the law, changes by along that line.
+    """
+    if feed is None or not feed.sample_time or not feed.reads.size or not len(run.y):
+        return Answers.SMOOTH
+    read, end = run.y[:, feed.reads], journey.point
+    low, high = read.min(axis=0), read.max(axis=0)
+
+    def answer(share: float) -> np.ndarray:
+        return np.concatenate(feed.told(end.state.t, end.supply.x, low + share * (high - low)))
+
+    try:
+        return _kind(answer)
+    except (FlexctrlError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
+        return Answers.SMOOTH
+
+
+def _kind(answer: Answer) -> Answers:
+    places = np.linspace(0.0, 1.0, _PLACES)
+    said = np.array([answer(share) for share in places])
+    changes, whole = np.diff(said, axis=0), np.ptp(said, axis=0)
+    moving, steepest = np.flatnonzero(whole > 0.0).tolist(), np.argmax(np.abs(changes), axis=0)
+    if any(_jump(answer, part, places, int(steepest[part])) > _JUMP * whole[part] for part in moving):
+        return Answers.ABRUPT
+    return Answers.LIMITED if any(_cornered(changes[:, part]) for part in moving) else Answers.SMOOTH
+
+
+def _jump(answer: Answer, part: int, places: np.ndarray, at: int) -> float:
+    """What is left of a change as the places it is between come nearer."""
+    low, high = places[at], places[at + 1]
+    below, above = answer(low)[part], answer(high)[part]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        said = answer(middle)[part]
+        if abs(said - below) > abs(above - said):
+            high, above = middle, said
+        else:
+            low, below = middle, said
+    return float(abs(above - below))
+
+
+def _cornered(changes: np.ndarray) -> bool:
+    """Whether slopes change, and at few places: a corner lies between two of them, or at one."""
+    bends = np.abs(np.diff(changes))
+    near = bends[:-1] + bends[1:]
+    return bool(near.max() > max(_BENT * np.abs(changes).max(), _AT_ONCE * bends.sum()))
