@@ -37,6 +37,7 @@ __all__ = ["with_twists"]
 
 _SOFT = 2.0**-100
 _DROWNED = 2.0**-20
+_DUST = 1e-12
 _KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
 
 
@@ -110,7 +111,15 @@ def _bare(linear: LinearModel, balance: Balance, state: State, names: tuple[str,
     if (held := balance.turning(state, balance.whole_force(state))).nnz:
         K = K - held
     C, K = (balance.seen(there, A) for A in (C, K))
-    return _Bare(model, there, K, C, (linear.K - K).tocsr(), (linear.C - C).tocsr())
+    springs, dampers = (linear.K - K).tocsr(), (linear.C - C).tocsr()
+    return _Bare(model, there, _without(K, springs), _without(C, dampers), springs, dampers)
+
+
+def _without(K: sp.spmatrix, shafts: sp.csr_matrix) -> sp.csr_matrix:
+    """What is left of K beside soft shafts; of round-off of theirs, nothing."""
+    left, size = sp.coo_matrix(K - _SOFT * shafts), np.sqrt(np.abs(shafts.diagonal()))
+    held = np.abs(left.data) > _SOFT * _DUST * size[left.row] * size[left.col]
+    return sp.csr_matrix((left.data[held], (left.row[held], left.col[held])), left.shape)
 
 
 def _softened(model: Model, names: tuple[str, ...]) -> Model:

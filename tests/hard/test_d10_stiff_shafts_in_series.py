@@ -18,7 +18,7 @@ from flexctrl.linear.pencil import DensePencil, faint_shift
 
 G, HALF, OWN, ROTOR = 9.81, 0.5, 0.02, 0.01
 LEVEL, TILTED = np.eye(3), Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
-EIGH = 1e-8
+EIGH = 3e-8
 STIFF = [1e6, 1e10, 1e11, 1e12, 1e14, 1e16, 1e18]
 
 
@@ -143,6 +143,37 @@ def test_where_no_digit_of_the_swing_is_left_it_is_refused(k):
     model = hanging([k, k])
     with pytest.raises(LinearizationError, match=r"lost in the rounding of the stiffest entries.*rigid part"):
         fc.linearize(model, fc.equilibrium(model, hold={"d1_source": 0.0}))
+
+
+WHEELS = [((41.9,), 92.1, 202.0, 0.0), ((0.322, 1.61), 19.3, 15.8, 5.19e-4), ((0.00732, 0.469), 150.0, 963.0, 0.191)]
+
+
+def wheels(inertias, stiffness, ratio, rotor, turned=LEVEL) -> fc.Model:
+    """One wheel behind a motor on the ground, or two with the motor between them; nothing else holds them."""
+    bodies = [fc.RigidBody(f"w{i}", (0, 0, 0), 1.0, (inertia,) * 3) for i, inertia in enumerate(inertias)]
+    ground, axis = fc.RigidBody("ground", (0, 0, 0), 1.0, (1, 1, 1)), tuple(turned[:, 2])
+    joints = [fc.Support(ground.node), *(fc.Hinge(ground.node, body.node, axis=axis) for body in bodies)]
+    base = bodies[0].node if len(bodies) > 1 else None
+    motor = {"stiffness": stiffness, "ratio": ratio, "inertia": rotor}
+    drive = fc.RotaryDrive("d", bodies[-1].node, base, axis=axis, **motor)
+    machine = fc.Structure([ground, *bodies], joints, [drive], [fc.MotorTorque("m", drive)], [fc.DriveAngle("a", drive)])
+    return fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])
+
+
+@pytest.mark.parametrize("turned", [LEVEL, TILTED], ids=["level", "tilted"])
+@pytest.mark.parametrize(
+    "machine", [*WHEELS, ((1e-6,), 1e3, 1e3, 1.0), ((1e-5, 1e3), 1e3, 1e5, 1.0), ((2.0, 3.0), 1e12, 1e3, 1e-3)], ids=str
+)
+def test_wheels_that_nothing_else_holds_keep_the_angle_of_the_motor(machine, turned):
+    """ω² = k (R² Σ 1/J + 1/J_m), and 0 for every wheel: beside soft springs of a shaft there is nothing to be lost."""
+    inertias, k, ratio, rotor = machine
+    linear = fc.linearize(wheels(*machine, turned))
+    swing = [k * (ratio**2 * sum(1.0 / J for J in inertias) + 1.0 / rotor)] if rotor else []
+    found = linear.modes()
+    assert found.rigid == len(inertias)
+    assert found.omega_squared == pytest.approx([0.0] * len(inertias) + swing, rel=1e-9, abs=0.0)
+    assert linear.coordinates[-1] == "d_source"
+    assert found.massless == (not rotor)
 
 
 def adrift(k: float, axis: tuple[float, float, float], length: float, elements: int, shafts: int = 2) -> fc.Model:
