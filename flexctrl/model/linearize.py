@@ -50,7 +50,8 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
         In the order of ``model.coordinates``; inputs and outputs are deviations. Its ``certificate``
         tells why it can be trusted. What a `Rest` holds is held. Where the shaft of a drive is so stiff that K would
         hold nothing of what it drives, the coordinate ``<drive>_twist``, θ_d − R s, stands in place of the motor's
-        angle ``<drive>_source``.
+        angle ``<drive>_source``; of a motor that is held, or far heavier than what it drives, in place of a coordinate
+        of what it drives.
 
     Raises
     ------

@@ -10,8 +10,11 @@ Wᵀ K W = Wᵀ K₀ W + D
 has both to the last digit. K₀ is that of the same machine with shafts next to nothing, twisted until they bear the same
 torques.
 
-Each motor takes the place of its own angle, so any number of shafts may drive one body, or bear on one another in a
-row. Whether they drown what they drive is asked of all together: without the first of two, the second still holds all.
+Each twist takes the place of the angle of its own motor, so any number of shafts may drive one body, or bear on one
+another in a row. A motor that is held has no angle, and one that is far heavier than what it drives (J beside R² J_m)
+would drown its mass in M: there the twist takes the place of what it drives, of that coordinate whose stiffness and
+mass the others bear best. Whether shafts drown what they drive is asked of all together: without the first of two, the
+second still holds all.
 """
 
 from __future__ import annotations
@@ -42,6 +45,72 @@ _KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
 
 
 @dataclass(frozen=True, eq=False)
+class _Shafts:
+    """Shafts of drives, by how they twist with the free coordinates.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the drives.
+    rows : numpy.ndarray, shape (shafts, n)
+        ∂ψ/∂q.
+    stiffness, damping : numpy.ndarray, shape (shafts,)
+        Of ψ.
+    motors : numpy.ndarray of int, shape (shafts,)
+        The coordinate that is the motor's angle; −1 where it is held.
+    """
+
+    names: tuple[str, ...]
+    rows: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    motors: np.ndarray
+
+    @property
+    def borne(self) -> np.ndarray:
+        """What each shaft alone adds to the stiffness of each coordinate, shape (shafts, n)."""
+        return np.asarray(self.stiffness[:, None] * self.rows**2)
+
+    @property
+    def angles(self) -> np.ndarray:
+        """The coordinates that are angles of motors."""
+        return self.motors[self.motors >= 0]
+
+    def among(self, chosen: np.ndarray) -> _Shafts:
+        """Return some of them."""
+        names = tuple(name for name, one in zip(self.names, chosen, strict=True) if one)
+        return _Shafts(names, *(part[chosen] for part in (self.rows, self.stiffness, self.damping, self.motors)))
+
+    def all_but_alone(self, whole: np.ndarray) -> np.ndarray:
+        """Tell which hold far more than all shafts leave of K's diagonal, where that is of something they drive."""
+        borne = self.borne
+        left = whole - borne.sum(axis=0)
+        return np.any((borne > 0.0) & (left < _DROWNED * borne) & self._led, axis=1)
+
+    def drowning(self, own: np.ndarray) -> np.ndarray:
+        """Tell which are far stiffer than something else that holds what they drive, or like one that is.
+
+        Parameters
+        ----------
+        own : numpy.ndarray, shape (n,)
+            What holds each coordinate beside the shafts.
+
+        Returns
+        -------
+        numpy.ndarray of bool, shape (shafts,)
+            A soft one beside a stiff one is none: it is among what the other drowns.
+        """
+        beside = np.vstack([self.borne, own])
+        lost = np.array([(beside > 0.0) & (beside < _DROWNED * borne) & self._led for borne in self.borne])
+        drowns, drowned = np.any(lost, axis=(1, 2)), np.any(lost[:, :-1], axis=(0, 2))
+        return np.logical_and(drowns.any(), drowns | ~drowned)
+
+    @property
+    def _led(self) -> np.ndarray:
+        return ~np.isin(np.arange(self.rows.shape[1]), self.motors)
+
+
+@dataclass(frozen=True, eq=False)
 class _Bare:
     """A machine whose shafts are next to nothing, and the stiffness and damping that they had.
 
@@ -54,6 +123,8 @@ class _Bare:
         Of the free coordinates, without the shafts.
     springs, dampers : scipy.sparse.csr_matrix, shape (n, n)
         What the shafts add.
+    rounding : numpy.ndarray, shape (n,)
+        Of K's diagonal.
     """
 
     model: Model
@@ -62,6 +133,13 @@ class _Bare:
     C: sp.csr_matrix
     springs: sp.csr_matrix
     dampers: sp.csr_matrix
+    rounding: np.ndarray
+
+    @property
+    def own(self) -> np.ndarray:
+        """Stiffness of each coordinate without the shafts; none where that is rounding, shape (n,)."""
+        own = np.abs(self.K.diagonal())
+        return np.where(own > self.rounding, own, 0.0)
 
 
 def with_twists(linear: LinearModel, balance: Balance, state: State) -> LinearModel:
@@ -80,14 +158,45 @@ def with_twists(linear: LinearModel, balance: Balance, state: State) -> LinearMo
     LinearModel
         The same model if no shaft is that stiff.
     """
-    model = balance.model
-    motors = _drowning(linear.K, np.flatnonzero(np.isin(balance.free, model.motion.sources)))
-    if model.about or not motors.size:
+    if balance.model.about or not balance.model.motion.sources.size:
         return linear
-    names = tuple(linear.coordinates[i].removesuffix("_source") for i in motors)
-    bare = _bare(linear, balance, state, names)
-    W = _basis(bare.springs, motors)
-    return _written(linear, bare, W, motors) if _drowned(bare, balance, W, motors) else linear
+    shafts = _shafts(linear, balance, state)
+    shafts = shafts.among(shafts.all_but_alone(linear.K.diagonal()))
+    if not shafts.names:
+        return linear
+    bare = _bare(linear, balance, state, shafts.names)
+    if not (stiff := shafts.drowning(bare.own)).any():
+        return linear
+    if not stiff.all():
+        shafts = shafts.among(stiff)
+        bare = _bare(linear, balance, state, shafts.names)
+    pivots = _pivots(shafts, bare.own, linear.M.diagonal())
+    return _written(linear, bare, shafts, pivots) if pivots.size else linear
+
+
+def _shafts(linear: LinearModel, balance: Balance, state: State) -> _Shafts:
+    """Those of motors that move, and of those that are held where they are."""
+    sources, K, C = balance.model.motion.sources, linear.K.tocsr(), linear.C.diagonal()
+    motors = np.flatnonzero(np.isin(balance.free, sources))
+    motors = motors[K.diagonal()[motors] > 0.0]
+    k, rows = K.diagonal()[motors], K[motors].toarray()
+    names = [linear.coordinates[i] for i in motors]
+    held, beside = _of_held(balance, state, np.intersect1d(balance.fixed, sources))
+    stiffness, damping = (np.append(free, of_held) for free, of_held in zip((k, C[motors]), beside[1:], strict=True))
+    names += [balance.model.coordinates[i] for i in held]
+    motors = np.append(motors, np.full(held.size, -1))
+    rows = np.vstack([rows, beside[0]]) / stiffness[:, None]
+    return _Shafts(tuple(name.removesuffix("_source") for name in names), rows, stiffness, damping, motors)
+
+
+def _of_held(balance: Balance, state: State, sources: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """Motors that are held behind shafts that twist: their rows of K, stiffness and damping."""
+    if not sources.size:
+        return sources, (np.zeros((0, balance.free.size)), np.zeros(0), np.zeros(0))
+    _, C, K = tangents(balance.model, state, balance.u)
+    sources = sources[K.diagonal()[sources] > 0.0]
+    rows = (K.tocsr()[sources] @ balance.basis(state)).toarray()
+    return sources, (rows, K.diagonal()[sources], C.diagonal()[sources])
 
 
 def _drowning(K: sp.csc_matrix, motors: np.ndarray) -> np.ndarray:
@@ -108,11 +217,13 @@ def _borne(K: sp.spmatrix, motors: np.ndarray) -> np.ndarray:
 def _bare(linear: LinearModel, balance: Balance, state: State, names: tuple[str, ...]) -> _Bare:
     model, there = _softened(balance.model, names), _twisted(balance.model, state, names)
     _, C, K = tangents(model, there, balance.u)
+    terms = slope_terms(model, there, balance.u, K)
     if (held := balance.turning(state, balance.whole_force(state))).nnz:
         K = K - held
-    C, K = (balance.seen(there, A) for A in (C, K))
+    C, K, terms = (balance.seen(there, A) for A in (C, K, terms))
     springs, dampers = (linear.K - K).tocsr(), (linear.C - C).tocsr()
-    return _Bare(model, there, _without(K, springs), _without(C, dampers), springs, dampers)
+    rounding = DIGITS * np.abs(terms.diagonal())
+    return _Bare(model, there, _without(K, springs), _without(C, dampers), springs, dampers, rounding)
 
 
 def _without(K: sp.spmatrix, shafts: sp.csr_matrix) -> sp.csr_matrix:
@@ -152,41 +263,55 @@ def _twisted(model: Model, state: State, names: tuple[str, ...]) -> State:
     return replace(state, q=q)
 
 
-def _basis(springs: sp.csr_matrix, motors: np.ndarray) -> sp.csc_matrix:
-    """What the coordinates move by with twists, and with what takes the motors along."""
-    W = sp.lil_matrix(sp.identity(springs.shape[0]))
-    for i in motors:
-        row = springs[i].tocoo()
-        beside = row.col != i
-        W[i, row.col[beside]] = -row.data[beside] / springs[i, i]
+def _pivots(shafts: _Shafts, own: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Which coordinates the twists take the place of, one after the other; none where two shafts twist as one."""
+    rows, pivots = shafts.rows.copy(), np.zeros(0, dtype=int)
+    for i, motor in enumerate(shafts.motors):
+        row = rows[i]
+        row[pivots] = 0.0
+        if not (np.abs(row) > _DUST * np.abs(shafts.rows[i]).max()).any():
+            return np.zeros(0, dtype=int)
+        others = np.setdiff1d(np.flatnonzero(row), shafts.angles)
+        loss = {int(p): _loss(row, int(p), own, mass) for p in (*others, *([motor] if motor >= 0 else []))}
+        best = motor if loss.get(int(motor), np.inf) < 1.0 / _DROWNED else min(loss, key=lambda p: loss[p])
+        pivots = np.append(pivots, best)
+        below = np.arange(len(rows)) != i
+        rows[below] -= np.outer(rows[below, best] / row[best], row)
+    return pivots
+
+
+def _loss(row: np.ndarray, pivot: int, own: np.ndarray, mass: np.ndarray) -> float:
+    """By how much a coordinate that is made of others would drown their stiffness, or their mass."""
+    share = (row / row[pivot]) ** 2
+    share[pivot] = 0.0
+    over = [size[pivot] * share[size > 0.0] / size[size > 0.0] for size in (own, mass)]
+    return float(np.concatenate(over).max(initial=0.0))
+
+
+def _basis(shafts: _Shafts, pivots: np.ndarray) -> sp.csc_matrix:
+    """What the coordinates move by with twists in place of some, and with the others."""
+    twisted = np.linalg.inv(shafts.rows[:, pivots])
+    W, led = sp.lil_matrix(sp.identity(shafts.rows.shape[1])), -twisted @ shafts.rows
+    led[:, pivots] = twisted
+    W[pivots] = led
     return sp.csc_matrix(W)
 
 
-def _drowned(bare: _Bare, balance: Balance, W: sp.csc_matrix, motors: np.ndarray) -> bool:
-    """Whether there is anything beside the shafts that would be lost."""
-    terms = DIGITS * balance.seen(bare.state, slope_terms(bare.model, bare.state, balance.u, bare.K))
-    led = np.unique(W[motors].tocoo().col)
-    led = np.setdiff1d(led, motors)
-    own, shafts = np.abs(bare.K.diagonal()), bare.springs.diagonal()
-    return bool(((own > np.abs(terms.diagonal())) & (own < _DROWNED * shafts))[led].any())
-
-
-def _written(linear: LinearModel, bare: _Bare, W: sp.csc_matrix, motors: np.ndarray) -> LinearModel:
+def _written(linear: LinearModel, bare: _Bare, shafts: _Shafts, pivots: np.ndarray) -> LinearModel:
     """The model in other coordinates, its shafts on the diagonal of K and C."""
-    chosen = np.isin(np.arange(W.shape[0]), motors)
-    springs, dampers = (sp.diags(np.where(chosen, A.diagonal(), 0.0)) for A in (bare.springs, bare.dampers))
+    W, n = _basis(shafts, pivots), len(linear.coordinates)
+    springs, dampers = (
+        sp.csc_matrix((values, (pivots, pivots)), (n, n)) for values in (shafts.stiffness, shafts.damping)
+    )
     K, C = sp.csc_matrix(W.T @ bare.K @ W + springs), sp.csc_matrix(W.T @ bare.C @ W + dampers)
     even = symmetric(linear.K)[1] == 0.0
-    names = tuple(
-        name.removesuffix("_source") + "_twist" if twists else name
-        for name, twists in zip(linear.coordinates, chosen, strict=True)
-    )
-    written = linear.projected(W, names)
+    owners = dict(zip(shafts.names, pivots.tolist(), strict=True))
+    twists = {at: f"{name}_twist" for name, at in owners.items()}
+    written = linear.projected(W, tuple(twists.get(i, name) for i, name in enumerate(linear.coordinates)))
     assert written.place is not None
-    place = replace(written.place, model=bare.model, state=bare.state, springs=sp.csc_matrix(springs))
+    place = replace(written.place, model=bare.model, state=bare.state, springs=springs)
     reach = bare.model.motion.jacobian(bare.model.place(bare.state)) @ place.basis
     parts = bare.model.forces.parts(bare.model.place(bare.state), reach)
-    owners = {name.removesuffix("_twist"): int(i) for i, name in enumerate(names) if chosen[i]}
     return replace(
         written,
         K=symmetric(K)[0] if even else K,

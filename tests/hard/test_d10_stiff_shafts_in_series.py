@@ -126,23 +126,56 @@ def test_two_pendulums_hang_on_a_cart_that_a_motor_drives(k):
     assert linear.modes().frequencies[:3] == pytest.approx(expected, rel=1e-8)
 
 
-@pytest.mark.parametrize("k", [1e10, 1e11, 1e12, 1e14])
-def test_behind_a_motor_that_is_held_a_slow_swing_is_told_by_the_machine_itself(k):
-    """Its shaft ties the two in one: K holds their stiffness in its last digits, and the certificate says how well."""
-    model = hanging([k, k])
+@pytest.mark.parametrize("turned", [LEVEL, TILTED], ids=["level", "tilted"])
+@pytest.mark.parametrize("k", [1e10, 1e12, 1e14, 1e16, 1e18])
+def test_behind_a_motor_that_is_held_both_swing_as_one(k, turned):
+    """The twist of its shaft takes the place of what it drives."""
+    model = hanging([k, k], turned=turned)
     linear = fc.linearize(model, fc.equilibrium(model, hold={"d1_source": 0.0}))
     M, K = (A.sum() for A in rigid(2))
-    assert linear.modes().frequencies[0] == pytest.approx(float(np.sqrt(K / M)) / (2.0 * np.pi), rel=1e-7)
-    assert linear.certificate.rigid_modes == ()
+    assert linear.modes().frequencies[0] == pytest.approx(float(np.sqrt(K / M)) / (2.0 * np.pi), rel=1e-8)
+    assert (linear.certificate.rigid_modes, linear.modes().unstable) == ((), 0)
+    assert "d1_twist" in linear.coordinates
     run = fc.simulate(linear, until=3.0, inputs={"t0": 1.0}, every=0.5)
     assert run["q0"] == pytest.approx((1.0 - np.cos(np.sqrt(K / M) * run.t)) / K, rel=1e-5, abs=1e-9)
 
 
-@pytest.mark.parametrize("k", [1e16, 1e18])
-def test_where_no_digit_of_the_swing_is_left_it_is_refused(k):
-    model = hanging([k, k])
-    with pytest.raises(LinearizationError, match=r"lost in the rounding of the stiffest entries.*rigid part"):
-        fc.linearize(model, fc.equilibrium(model, hold={"d1_source": 0.0}))
+def spliced(k: float, bending: float, ratio: float = 1000.0) -> fc.Model:
+    """Two beams of 1 m in line, clamped, and a motor on the hinge between them."""
+    section = fc.Section(EA=1e6 * bending, EI_y=bending, EI_z=bending, GJ=bending, rhoA=1.0, rhoJ=1e-3)
+    near, far = (fc.Beam(name, (x, 0, 0), (x + 1, 0, 0), section, elements=2) for name, x in (("near", 0), ("far", 1)))
+    motor = {"stiffness": k / ratio**2, "ratio": ratio, "inertia": 1e-3}
+    drive = fc.RotaryDrive("d", far.start, near.end, axis="z", **motor)
+    joints = [fc.Support(near.start), fc.Hinge(near.end, far.start, "z")]
+    machine = fc.planar(fc.Structure([near, far], joints, [drive]))
+    return fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])
+
+
+@pytest.mark.parametrize("bending", [100.0, 0.01])
+@pytest.mark.parametrize("k", [1e8, 1e12, 1e16, 1e18, 1e21])
+def test_beams_that_a_held_motor_joins_are_one_beam(k, bending):
+    """A cantilever of 2 m of as many elements, but for what the shaft gives way."""
+    model = spliced(k, bending)
+    section = model.structure.elements[0].section
+    whole = fc.Beam("whole", (0, 0, 0), (2, 0, 0), section, elements=4)
+    machine = fc.planar(fc.Structure([whole], [fc.Support(whole.start)]))
+    expected = fc.linearize(fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])).modes()
+    found = fc.linearize(model, fc.equilibrium(model, hold={"d_source": 0.0})).modes()
+    assert (found.rigid, found.unstable) == (0, 0)
+    assert found.omega[:4] == pytest.approx(expected.omega[:4], rel=10.0 * bending / k + 1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "spring"), [(1e3, 1e3), (1e4, 1e7)])
+def test_a_motor_far_heavier_than_what_it_drives_leaves_it_its_mass(ratio, spring):
+    """A wheel of 1e-6 kg m² on a spring behind 1 kg m² · R²: the shaft's own swing is lost in no mass matrix."""
+    hub, wheel = fc.RigidBody("hub", (0, 0, 0), 1.0, (1, 1, 1)), fc.RigidBody("wheel", (0, 0, 0), 1.0, (1e-6,) * 3)
+    soft = fc.RotaryDrive("soft", wheel.node, axis="z", stiffness=spring, ratio=1.0, inertia=0.0)
+    stiff = fc.RotaryDrive("stiff", wheel.node, axis="z", stiffness=1e6, ratio=ratio, inertia=1.0)
+    joints = [fc.Support(hub.node), fc.Hinge(hub.node, wheel.node, axis="z")]
+    model = fc.assemble(fc.Structure([hub, wheel], joints, [soft, stiff]), [fc.Flexible(), fc.LargeRotation()])
+    found = fc.linearize(model, fc.equilibrium(model, hold={"soft_source": 0.0})).modes().omega_squared
+    slow, fast = spring / (1e-6 + ratio**2), 1e6 * (ratio**2 / 1e-6 + 1.0)
+    assert found == pytest.approx([slow, fast], rel=1e-9 + 2.0 * spring / (1e6 * ratio**2))
 
 
 WHEELS = [((41.9,), 92.1, 202.0, 0.0), ((0.322, 1.61), 19.3, 15.8, 5.19e-4), ((0.00732, 0.469), 150.0, 963.0, 0.191)]
