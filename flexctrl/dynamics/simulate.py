@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha
 from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
+from flexctrl.dynamics.breakaway import loosened
 from flexctrl.dynamics.checking import Beginning, laid_beside
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same
 from flexctrl.dynamics.events.event import Event
@@ -141,7 +142,7 @@ def simulate(
         if run.status is Status.FAILED:
             return run
         if check and beginning and can_be_told(journey) and (isinstance(method, Checked) or may_grow(journey)):
-            return laid_beside(run, journey, check, beginning)
+            return loosened(laid_beside(run, journey, check, beginning), run, journey, beginning)
     return run
 
 
