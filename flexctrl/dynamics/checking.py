@@ -11,21 +11,21 @@ import numpy as np
 from scipy.optimize import brentq
 
 from flexctrl.design.controller import Controller
-from flexctrl.dynamics.checkpoint import Checkpoint
+from flexctrl.dynamics.checkpoint import Checkpoint, machine_of
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, told_beside
 from flexctrl.dynamics.notes.gap import Gap, between
 from flexctrl.dynamics.records.record import InMemory
-from flexctrl.dynamics.run import Run, Status
+from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
 from flexctrl.dynamics.steps import Fixed
 from flexctrl.errors import FlexctrlError
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
 
-__all__ = ["Beginning", "laid_beside"]
+__all__ = ["Beginning", "Other", "laid_beside", "made", "news"]
 
 _LONGER, _SECONDS = 2.0, 0.2
 _NEARER, _LITTLE = 0.5, 0.01
@@ -83,7 +83,8 @@ class Beginning:
         """Return where another run is to begin: where it stood when the run was cut, or where the whole began."""
         if not isinstance(self.start, Checkpoint):
             return self.start
-        stood = (saved for saved in self.start.origin.others if _of(saved, other))
+        kind = repr(other.method), other.tolerance, machine_of(self.feed.model)
+        stood = (saved for saved in self.start.origin.others if _kind(saved) == kind)
         return next(stood, self.start.origin.state)
 
     @property
@@ -101,9 +102,9 @@ def _time(start: State | Rest | Checkpoint | None) -> float:
     return start.t if isinstance(start, Checkpoint) else 0.0
 
 
-def _of(saved: Checkpoint, other: Beside) -> bool:
-    """Whether it is such a run that stands there."""
-    return saved.method == repr(other.method) and saved.tolerance == other.tolerance
+def _kind(saved: Checkpoint) -> tuple[str, Tolerance, str]:
+    """What run stands there: how it is made, and of which machine."""
+    return saved.method, saved.tolerance, saved.machine
 
 
 def _copied(law: Controller | None) -> Controller | None:
@@ -141,7 +142,7 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     if other is None or other.run.status is Status.INTERRUPTED:
         return told
     nearby = method.coarser(tolerance, _NEARER)
-    quiet = told.report.error < _LITTLE and not _news(told, run)
+    quiet = told.report.error < _LITTLE and not news(told, run)
     parted = not quiet and told.report.error > PARTED
     if not quiet:
         told = _nearer(run, told, other, journey, nearby, beginning)
@@ -152,7 +153,7 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     if isinstance(method.pace, Fixed):
         return told
     farther = method.coarser(tolerance, _FARTHER)
-    standing, third = _made(told, journey, farther, beginning)
+    standing, third = made(told, journey, farther, beginning)
     if third is None:
         return told
     if quiet:
@@ -165,15 +166,24 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
 
 
 @dataclass(frozen=True)
-class _Other:
-    """A run beside, how it was made, and how far it is from the first: nothing where it has ended at once."""
+class Other:
+    """A run beside another one.
+
+    Attributes
+    ----------
+    run : Run
+    gap : Gap
+        How far it is from the first: nothing where it has ended at once.
+    beside : Beside
+        How it was made.
+    """
 
     run: Run
     gap: Gap
     beside: Beside
 
 
-def _order(near: _Other, far: _Other, most: float) -> float:
+def _order(near: Other, far: Other, most: float) -> float:
     """The order of errors as two runs beside show it: of what they are apart no more than all is the finer one's.
 
     With errors that grow as rᵖ the gaps are as rᵖ − 1; what does not grow so, as where corners come one after another,
@@ -193,29 +203,41 @@ def _order(near: _Other, far: _Other, most: float) -> float:
 
 
 def _grown(
-    run: Run, told: Run, other: _Other, far: _Other, journey: Journey, nearby: Beside, beginning: Beginning
+    run: Run, told: Run, other: Other, far: Other, journey: Journey, nearby: Beside, beginning: Beginning
 ) -> Run:
     """The run with what is told of it where errors grow as they do from the one to the other run beside."""
     order = _order(other, far, run.report.order)
     if order == run.report.order:
         return told
     known = _said(replace(run, checkpoint=told.checkpoint), other, journey, beginning, order)
-    much = known.report.error > TOLD or _news(known, run)
+    much = known.report.error > TOLD or news(known, run)
     return _nearer(run, known, other, journey, nearby, beginning) if much else known
 
 
-def _news(told: Run, run: Run) -> bool:
-    """Whether a run beside has notes of its own."""
+def news(told: Run, run: Run) -> bool:
+    """Tell whether a run beside has notes of its own.
+
+    Parameters
+    ----------
+    told : Run
+        With what others tell.
+    run : Run
+        Without.
+
+    Returns
+    -------
+    bool
+    """
     return not set(told.report.notes) <= set(run.report.notes)
 
 
-def _nearer(run: Run, told: Run, other: _Other, journey: Journey, nearby: Beside, beginning: Beginning) -> Run:
+def _nearer(run: Run, told: Run, other: Other, journey: Journey, nearby: Beside, beginning: Beginning) -> Run:
     """What a second one tells, unless it ended before the first."""
-    standing, second = _made(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning)
+    standing, second = made(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning)
     if second is None:
         return told
     if _reached(second.run) < _reached(other.run):
-        return _standing(told, second.run.checkpoint, nearby)
+        return _standing(told, second.run.checkpoint)
     order, parted = run.report.order, told.report.error > PARTED
     feared = told.report.error / (other.beside.longer**order - 1.0) if parted else 0.0
     seen = order if parted else _order(second, other, order)
@@ -235,27 +257,43 @@ def _reached(other: Run) -> float:
     return math.inf if other.status is Status.STOPPED else other.final.t
 
 
-def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, _Other | None]:
+def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Other | None]:
     """The run with what one other tells, and that one; None if there is none."""
-    standing, other = _made(run, journey, beside, beginning)
+    standing, other = made(run, journey, beside, beginning)
     return (standing, None) if other is None else (_said(standing, other, journey, beginning, run.report.order), other)
 
 
-def _said(run: Run, other: _Other, journey: Journey, beginning: Beginning, order: float, feared: float = 0.0) -> Run:
+def _said(run: Run, other: Other, journey: Journey, beginning: Beginning, order: float, feared: float = 0.0) -> Run:
     """The run with what one other tells, if errors are of an order."""
     if other.run.final.t <= beginning.t:
         return _noted(run, f"{_UNCHECKED}, which ended at t = {other.run.final.t:.3g} s")
     return told_beside(run, other.run, other.gap, journey, other.beside.longer, order, feared)
 
 
-def _made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, _Other | None]:
-    """The run with where one other stands, and that one, ended where it takes far longer; None if it tells nothing."""
+def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Other | None]:
+    """Return the run with where one other stands, and that one, ended where it takes far longer.
+
+    Parameters
+    ----------
+    run : Run
+    journey : Journey
+        How it went.
+    beside : Beside
+        How the other is made.
+    beginning : Beginning
+        Where it begins, and of which machine it is.
+
+    Returns
+    -------
+    Run, Other or None
+        None if the other tells nothing; a note says why.
+    """
     if run.final.t <= beginning.t:
         return run, None
     end, feed, start = run.final.t, beginning.again, beginning.beside(beside)
     if feed is None:
         return _noted(run, f"{_UNCHECKED}: the controller cannot be copied"), None
-    changed = replace(journey.plan, feed=feed, method=beside.method, tolerance=beside.tolerance)
+    changed = replace(journey.plan, model=feed.model, feed=feed, method=beside.method, tolerance=beside.tolerance)
     work = (end - _time(start)) / (end - beginning.t) / min(beside.longer, 1.0)
     latest = time.perf_counter() + _LONGER * work * run.report.wall_s + _SECONDS
 
@@ -274,19 +312,19 @@ def _made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> t
     first = journey.origin.u
     if len(first) and len(other.u) and other.t[0] == 0.0 and not np.array_equal(first, other.u[0]):
         return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
-    standing = _standing(run, other.checkpoint, beside)
+    standing = _standing(run, other.checkpoint)
     if other.final.t <= beginning.t:
-        return standing, _Other(other, Gap.unseen(run), beside)
+        return standing, Other(other, Gap.unseen(run), beside)
     try:
-        return standing, _Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside)
+        return standing, Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside)
     except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
         return _noted(standing, f"{_UNCHECKED}, whose numbers fail ({fault})"), None
 
 
-def _standing(run: Run, other: Checkpoint, beside: Beside) -> Run:
+def _standing(run: Run, other: Checkpoint) -> Run:
     """The run, with where the other one stands for what goes on from there."""
     origin = run.checkpoint.origin
-    others = (*(saved for saved in origin.others if not _of(saved, beside)), other)
+    others = (*(saved for saved in origin.others if _kind(saved) != _kind(other)), other)
     return replace(run, checkpoint=replace(run.checkpoint, origin=replace(origin, others=others)))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha
 from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
+from flexctrl.dynamics.breakaway import loosened
 from flexctrl.dynamics.checking import Beginning, laid_beside
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same
 from flexctrl.dynamics.events.event import Event
@@ -144,7 +145,8 @@ def simulate(
         if check and beginning and can_be_told(journey):
             law = answers(run, journey, beginning.again)
             if isinstance(method, Checked) or may_grow(journey, law):
-                return laid_beside(run, journey, check, beginning, shorter(journey, law))
+                told = laid_beside(run, journey, check, beginning, shorter(journey, law))
+                return loosened(told, run, journey, beginning)
     return run
 
 

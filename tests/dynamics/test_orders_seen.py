@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.checking import _order, _Other
+from flexctrl.dynamics.checking import Other, _order
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.gap import Gap
 
@@ -58,5 +58,5 @@ def test_the_order_is_that_of_the_gaps(order):
     for longer in (3.0**0.5, 3.0):
         beside = Beside(fc.AdaptiveAlpha(), fc.Tolerance(), longer, "")
         gap = Gap(np.zeros(1), np.array([1e-3 * (longer**order - 1.0)]), "", np.zeros(0))
-        others.append(_Other(_finished(), gap, beside))
+        others.append(Other(_finished(), gap, beside))
     assert _order(*others, 2.0) == pytest.approx(min(order, 2.0))

@@ -104,6 +104,11 @@ class Checked(_Wrapped):
     tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at
     most that of the method: what rattles goes by no power of its steps.
 
+    Where nothing of that is told, and dry contacts stick or break loose that slide with less than it takes to break
+    them loose, it is run in the same steps with contacts that bear 5 % more (if one has broken loose), and 5 % less: a
+    note says which contact it hangs on if such a run is a fifth of the motion away, of the machine's or of an output's
+    own. All runs in other steps may be wrong alike there.
+
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so and for corners. Nothing is run
     again for linear models and small motion. A sampled law in Python is asked again as a copy of what it was before

@@ -19,7 +19,7 @@ from flexctrl.model.model import Model
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["PARTED", "TOLD", "can_be_told", "elsewhere", "kept_short", "may_grow", "shorter", "told_beside"]
+__all__ = ["PARTED", "TOLD", "agreeing", "can_be_told", "elsewhere", "kept_short", "may_grow", "shorter", "told_beside"]
 
 _SWUNG, _FAR = 0.25, 0.02
 """What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
@@ -215,12 +215,27 @@ def elsewhere(run: Run, gap: Gap, journey: Journey, how: str) -> Run:
     -------
     Run
     """
-    since, pace = float(gap.t[int(np.argmax(gap.size > _ASTRAY))]), journey.plan.method.pace
-    asked = journey.plan.tolerance
-    finer = f"Tolerance({0.01 * asked.relative:.1g}, {0.01 * asked.absolute:.1g})"
-    remedy = finer if isinstance(pace, Controlled) else f"a step of {0.25 * pace.step:.1g} s"
+    since, remedy = float(gap.t[int(np.argmax(gap.size > _ASTRAY))]), agreeing(journey)
     note = _ELSEWHERE.format(where=gap.where, how=how, far=gap.most, t=since, grown=_GROWN, remedy=remedy)
     return replace(run, report=replace(run.report, notes=(*run.report.notes, note)))
+
+
+def agreeing(journey: Journey) -> str:
+    """Return what is to agree with a run that may be wrong: one far finer.
+
+    Parameters
+    ----------
+    journey : Journey
+
+    Returns
+    -------
+    str
+        Its tolerance, or its step.
+    """
+    asked, pace = journey.plan.tolerance, journey.plan.method.pace
+    if isinstance(pace, Controlled):
+        return f"Tolerance({0.01 * asked.relative:.1g}, {0.01 * asked.absolute:.1g})"
+    return f"a step of {0.25 * pace.step:.1g} s"
 
 
 def _right(run: Run, gap: Gap, left: float) -> float:
