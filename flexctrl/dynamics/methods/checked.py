@@ -110,9 +110,10 @@ class Checked(_Wrapped):
     own. All runs in other steps may be wrong alike there.
 
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
-    steps short the other run is a finer one, in half the steps, for what has turned so and for corners. Nothing is run
-    again for linear models and small motion. A sampled law in Python is asked again as a copy of what it was before
-    the run; what goes on from a `Checkpoint` is laid beside what goes on from where the run beside stood.
+    steps short the other run is a finer one, in half the steps, for what has turned so, for corners and for laws that
+    meet limits; in a quarter of the steps for laws that jump by half a percent of what they say. Nothing is run again
+    for linear models and small motion under other laws. A sampled law in Python is asked again as a copy of what it was
+    before the run; what goes on from a `Checkpoint` is laid beside what goes on from where the run beside stood.
 
     Parameters
     ----------
