@@ -25,11 +25,9 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import with_springs
 from flexctrl.linear.pattern import symmetric
 from flexctrl.model.balance import Balance
-from flexctrl.model.laws.families import Family
-from flexctrl.model.laws.loose_kinds import LOOSE_DRIVES
-from flexctrl.model.laws.part_kinds import LINEAR_DRIVE, ROTARY_DRIVE
 from flexctrl.model.model import Model
 from flexctrl.model.rounding import DIGITS, slope_terms
+from flexctrl.model.softened import softened
 from flexctrl.model.state import State
 from flexctrl.model.tangents import tangents
 
@@ -38,7 +36,6 @@ __all__ = ["with_twists"]
 _SOFT = 2.0**-100
 _DROWNED = 2.0**-20
 _DUST = 1e-12
-_KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +103,7 @@ def _borne(K: sp.spmatrix, motors: np.ndarray) -> np.ndarray:
 
 
 def _bare(linear: LinearModel, balance: Balance, state: State, names: tuple[str, ...]) -> _Bare:
-    model, there = _softened(balance.model, names), _twisted(balance.model, state, names)
+    model, there = softened(balance.model, dict.fromkeys(names, _SOFT)), _twisted(balance.model, state, names)
     _, C, K = tangents(model, there, balance.u)
     if (held := balance.turning(state, balance.whole_force(state))).nnz:
         K = K - held
@@ -120,24 +117,6 @@ def _without(K: sp.spmatrix, shafts: sp.csr_matrix) -> sp.csr_matrix:
     left, size = sp.coo_matrix(K - _SOFT * shafts), np.sqrt(np.abs(shafts.diagonal()))
     held = np.abs(left.data) > _SOFT * _DUST * size[left.row] * size[left.col]
     return sp.csr_matrix((left.data[held], (left.row[held], left.col[held])), left.shape)
-
-
-def _softened(model: Model, names: tuple[str, ...]) -> Model:
-    """The machine with shafts next to nothing in some drives."""
-    soft = replace(model)
-    soft.__dict__.update({name: model.__dict__[name] for name in ("signals", "gusts") if name in model.__dict__})
-    soft.__dict__["forces"] = replace(model.forces, families=tuple(_soft(f, names) for f in model.forces.families))
-    if not model.large:
-        soft.__dict__["_stiffness"] = model.stiffness_but(frozenset(names))
-    return soft
-
-
-def _soft(family: Family, names: tuple[str, ...]) -> Family:
-    if family.kernels.kind not in _KINDS:
-        return family
-    parameters = family.parameters.copy()
-    parameters[np.isin(family.parts, names), :2] *= _SOFT
-    return replace(family, parameters=parameters)
 
 
 def _twisted(model: Model, state: State, names: tuple[str, ...]) -> State:
