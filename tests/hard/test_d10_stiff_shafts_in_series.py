@@ -156,7 +156,9 @@ def wheels(inertias, stiffness, ratio, rotor, turned=LEVEL) -> fc.Model:
     base = bodies[0].node if len(bodies) > 1 else None
     motor = {"stiffness": stiffness, "ratio": ratio, "inertia": rotor}
     drive = fc.RotaryDrive("d", bodies[-1].node, base, axis=axis, **motor)
-    machine = fc.Structure([ground, *bodies], joints, [drive], [fc.MotorTorque("m", drive)], [fc.DriveAngle("a", drive)])
+    machine = fc.Structure(
+        [ground, *bodies], joints, [drive], [fc.MotorTorque("m", drive)], [fc.DriveAngle("a", drive)]
+    )
     return fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])
 
 
