@@ -78,10 +78,11 @@ class Eased:
         columns = balance.slope(state).tocsc()[:, self.motors][balance.free].toarray() / lever[:, None]
         return _turned(state, self.motors, np.linalg.lstsq(columns, balance.force(state) / lever, rcond=None)[0])
 
-    def same(self, state: State, there: State) -> bool:
-        """Tell whether one state is what comes back of another, but for the last digits of motors' angles."""
+    def balanced(self, state: State, tolerance: float) -> bool:
+        """Tell whether a state is an equilibrium but for the last digits of motors' angles."""
+        there = self.onto(state)
         away, most = np.abs(self.back(there).q - state.q), np.maximum(self.balance.unit, np.abs(state.q))
-        return bool((away <= _LAST_DIGITS * most)[self.motors].all())
+        return bool((away <= _LAST_DIGITS * most)[self.motors].all()) and self.balance.settled(there, tolerance)
 
     def __str__(self) -> str:
         """Return the names of the drives."""
@@ -102,10 +103,8 @@ def told(balance: Balance, state: State) -> tuple[Balance, State]:
     Balance, State
         Behind eased shafts where others leave nothing to be told.
     """
-    if not (ease := eased(balance, state)):
-        return balance, state
-    there = ease.onto(state)
-    return (ease.balance, there) if ease.same(state, there) else (balance, state)
+    ease = eased(balance, state)
+    return (ease.balance, ease.onto(state)) if ease else (balance, state)
 
 
 def eased(balance: Balance, state: State) -> Eased | None:

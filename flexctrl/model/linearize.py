@@ -16,7 +16,7 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.braked import balance_of, bearing
 from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
-from flexctrl.model.eased import eased, told
+from flexctrl.model.eased import eased
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
@@ -246,10 +246,10 @@ def _check_balance(balance: Balance, state: State) -> float:
 
 def _refuse_hidden_torques(balance: Balance, state: State) -> None:
     """Refuse an equilibrium in which angles do not tell what shafts bear."""
-    behind, there = told(balance, state)
-    if behind is not balance and behind.settled(there, _BALANCED):
+    ease = eased(balance, state)
+    if ease and ease.balanced(state, _BALANCED):
         raise LinearizationError(
-            f"linearize: the shafts of {eased(balance, state)} are so stiff that the last digits of angles hide the "
+            f"linearize: the shafts of {ease} are so stiff that the last digits of angles hide the "
             "torques that they bear in this equilibrium; leave them out of ShaftElasticity: rigid, they differ by "
             "nothing that can be seen"
         )
