@@ -193,6 +193,13 @@ class Balance:
 
     def slope(self, state: State, excess: Excess | None = None) -> sp.csr_matrix:
         """Return K of all coordinates, geometric stiffness included; what holds turns with what it holds."""
+        if excess is not None:
+            return self._slope(state, excess)
+        if self.__dict__.get("_last", (None,))[0] is not state:  # asked for time and again in one state
+            self.__dict__["_last"] = state, self._slope(state, None)
+        return self.__dict__["_last"][1]
+
+    def _slope(self, state: State, excess: Excess | None) -> sp.csr_matrix:
         K = -self.model.slope(state, self.still, self.still, (1.0, 0.0, 0.0), self.u, excess)
         if self._plain:
             return K
@@ -294,14 +301,15 @@ class Balance:
 
     def holds(self, state: State, K: sp.csr_matrix) -> bool:
         """Tell whether a stiffness K of all coordinates resists every displacement of the free ones."""
-        return holds(self.among_free(K), self._terms(state, K))
+        return holds(self.among_free(K), self.terms(state, K))
 
     def unstable(self, state: State) -> int:
         """Return in how many directions the free coordinates leave the state by themselves."""
         K = self.slope(state)
-        return negative_pivots(self.among_free(K), self._terms(state, K))
+        return negative_pivots(self.among_free(K), self.terms(state, K))
 
-    def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+    def terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+        """Return the sizes of what the entries of a stiffness K are sums of, of the free coordinates."""
         terms = slope_terms(self.model, state, self.u, K) + self._stresses(state)
         if self._plain:
             return self.among_free(terms)

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.model.balance import Balance
+from flexctrl.model.eased import told
 from flexctrl.model.equilibrium import Rest, equilibrium, settled
 from flexctrl.model.holding import own_coordinate, raw_place
 from flexctrl.model.linkages.chart import inverse_tangents
@@ -120,7 +121,8 @@ class Braked(Balance):
         wanted = (1.0 - done) * stands(self.model, self.cells, start) + done * self.wanted
         return self._again(replace(found, wanted=wanted))  # type: ignore[return-value]
 
-    def _terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+    def terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+        """Return the sizes of what the entries of a stiffness K are sums of, of the free coordinates."""
         if not self.model.large or self.model.motion.plain:
             return self.among_free(slope_terms(self.model, state, self.u, K))
         change = abs(self._change(state))
@@ -164,7 +166,8 @@ def rest_held(model: Model, hold: Mapping[str, float], inputs: Mapping[str, floa
     found = settled(balance, model.rest.loose)
     _check_places(model, lost, found.state)
     held = (*(model.coordinates[i] for i in own), *lost)
-    forces = balance.brakes(found.state, balance.whole_force(found.state)) if isinstance(balance, Braked) else None
+    at_work, there = told(balance, found.state)
+    forces = at_work.brakes(there, at_work.whole_force(there)) if isinstance(at_work, Braked) else None
     brakes = tuple((name, 0.0 if forces is None else float(forces[i])) for name, i in zip(lost, wanted, strict=True))
     return replace(found, held=held, brakes=brakes)
 

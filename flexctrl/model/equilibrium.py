@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from flexctrl.errors import EquilibriumError, StructureError, shortened
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
+from flexctrl.model.eased import Eased, eased
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import bent, displaced_beyond, overturned
 from flexctrl.model.places import wandered
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SOFT_REACH, _NEAR = 0.3, 0.1
+_IN_PLACE, _ASTRAY = 1e-15, 1e-12
 
 
 @dataclass(frozen=True)
@@ -207,11 +209,32 @@ def rest_of(balance: Balance, found: Found) -> Rest:
 
 
 def _found(balance: Balance, start: State, tolerance: float) -> Found:
-    """The search: straight on from a shape that stands by itself, else by masses."""
-    if not np.isfinite(balance.force(start)).all():
+    """Where a start leads to; itself, if nothing is left to do there."""
+    force = balance.force(start)
+    if not np.isfinite(force).all():
         raise EquilibriumError("no equilibrium found: the start's own forces are not finite; start from another shape")
-    if balance.idle(start):
+    ease = eased(balance, start) if force.any() or balance.astray(start) else None
+    if (ease.balance if ease else balance).idle(start):
         return Found(start, balance.residual(start), 0, True, True, True)
+    return _behind(ease, start, tolerance) if ease else _searched(balance, start, tolerance)
+
+
+def _behind(ease: Eased, start: State, tolerance: float) -> Found:
+    """The search behind eased shafts, with motors that are held turned on until the torques stay as they are."""
+    found, turned, before = _searched(ease.balance, start, tolerance), np.zeros(len(ease.motors)), np.inf
+    iterations = found.iterations
+    while (off := ease.unheld(ease.turned(found.state) - turned)) > _IN_PLACE and off <= 0.5 * before:
+        turned, before = ease.turned(found.state), off
+        found = _searched(ease.holding(turned), found.state, tolerance)
+        iterations += found.iterations
+    if off > _ASTRAY:
+        raise EquilibriumError(_not_borne(ease), found.state, found.residual)
+    left = ease.holding(turned).beyond_noise(found.state)
+    return replace(found, state=ease.back(found.state), residual=min(found.residual, left), iterations=iterations)
+
+
+def _searched(balance: Balance, start: State, tolerance: float) -> Found:
+    """The search: straight on from a shape that stands by itself, else by masses."""
     if _stands(balance, start):
         straight = Newton(balance, tolerance).run(start, 60, watch=True)
         if straight.done and straight.steady:
@@ -262,6 +285,14 @@ def _stands(balance: Balance, start: State) -> bool:
     """
     K = balance.slope(start)
     return balance.holds(start, K) and SMALLEST_PART * balance.moved(balance.linear_step(start, K)) <= 1.0
+
+
+def _not_borne(ease: Eased) -> str:
+    return (
+        f"no equilibrium found behind the shafts of {ease}: beside them doubles hold nothing of what they drive, and "
+        "behind softer ones it does not stay in one place; leave them out of ShaftElasticity: rigid, they differ by "
+        "nothing that can be seen"
+    )
 
 
 def _gave_way(balance: Balance, found: Found, share: float) -> str:

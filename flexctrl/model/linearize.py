@@ -16,6 +16,7 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.braked import balance_of, bearing
 from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import check_state
+from flexctrl.model.eased import eased
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
@@ -233,6 +234,7 @@ def _check_balance(balance: Balance, state: State) -> float:
     if np.abs(state.v).max(initial=0.0) > 0.0:
         raise LinearizationError("linearize: the state moves; give one at rest, e.g. from equilibrium(model)")
     if not balance.settled(state, _BALANCED):
+        _refuse_hidden_torques(balance, state)
         force, scale = balance.force(state), balance.scale(state)
         worst = int(np.argmax(np.abs(force)))
         name = balance.model.coordinates[balance.free[worst]]
@@ -241,6 +243,17 @@ def _check_balance(balance: Balance, state: State) -> float:
             "linearise about equilibrium(model), or name the inputs that balance it"
         )
     return balance.beyond_noise(state)
+
+
+def _refuse_hidden_torques(balance: Balance, state: State) -> None:
+    """Refuse an equilibrium in which angles do not tell what shafts bear."""
+    ease = eased(balance, state)
+    if ease and ease.balanced(state, _BALANCED):
+        raise LinearizationError(
+            f"linearize: the shafts of {ease} are so stiff that the last digits of angles hide the "
+            "torques that they bear in this equilibrium; leave them out of ShaftElasticity: rigid, they differ by "
+            "nothing that can be seen"
+        )
 
 
 def _refuse_corners(model: Model, state: State, free: np.ndarray) -> None:

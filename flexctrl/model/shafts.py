@@ -28,11 +28,9 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import with_springs
 from flexctrl.linear.pattern import symmetric
 from flexctrl.model.balance import Balance
-from flexctrl.model.laws.families import Family
-from flexctrl.model.laws.loose_kinds import LOOSE_DRIVES
-from flexctrl.model.laws.part_kinds import LINEAR_DRIVE, ROTARY_DRIVE
 from flexctrl.model.model import Model
 from flexctrl.model.rounding import DIGITS, slope_terms
+from flexctrl.model.softened import softened
 from flexctrl.model.state import State
 from flexctrl.model.tangents import tangents
 
@@ -41,7 +39,6 @@ __all__ = ["with_twists"]
 _SOFT = 2.0**-100
 _DROWNED = 2.0**-20
 _DUST = 1e-12
-_KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,23 +196,8 @@ def _of_held(balance: Balance, state: State, sources: np.ndarray) -> tuple[np.nd
     return sources, (rows, K.diagonal()[sources], C.diagonal()[sources])
 
 
-def _drowning(K: sp.csc_matrix, motors: np.ndarray) -> np.ndarray:
-    """Motors of shafts that, together, are nearly all that holds something they drive."""
-    own = K.diagonal()
-    motors = motors[own[motors] > 0.0]
-    borne = _borne(K, motors)
-    left = own - borne.sum(axis=0)
-    left[motors] = np.inf
-    return motors[(borne[:, left < _DROWNED * own] > 0.0).any(axis=1)]
-
-
-def _borne(K: sp.spmatrix, motors: np.ndarray) -> np.ndarray:
-    """What each shaft alone adds to the stiffness of each coordinate, shape (motors, n)."""
-    return K.tocsr()[motors].toarray() ** 2 / K.diagonal()[motors, None]
-
-
 def _bare(linear: LinearModel, balance: Balance, state: State, names: tuple[str, ...]) -> _Bare:
-    model, there = _softened(balance.model, names), _twisted(balance.model, state, names)
+    model, there = softened(balance.model, dict.fromkeys(names, _SOFT)), _twisted(balance.model, state, names)
     _, C, K = tangents(model, there, balance.u)
     terms = slope_terms(model, there, balance.u, K)
     if (held := balance.turning(state, balance.whole_force(state))).nnz:
@@ -231,24 +213,6 @@ def _without(K: sp.spmatrix, shafts: sp.csr_matrix) -> sp.csr_matrix:
     left, size = sp.coo_matrix(K - _SOFT * shafts), np.sqrt(np.abs(shafts.diagonal()))
     held = np.abs(left.data) > _SOFT * _DUST * size[left.row] * size[left.col]
     return sp.csr_matrix((left.data[held], (left.row[held], left.col[held])), left.shape)
-
-
-def _softened(model: Model, names: tuple[str, ...]) -> Model:
-    """The machine with shafts next to nothing in some drives."""
-    soft = replace(model)
-    soft.__dict__.update({name: model.__dict__[name] for name in ("signals", "gusts") if name in model.__dict__})
-    soft.__dict__["forces"] = replace(model.forces, families=tuple(_soft(f, names) for f in model.forces.families))
-    if not model.large:
-        soft.__dict__["_stiffness"] = model.stiffness_but(frozenset(names))
-    return soft
-
-
-def _soft(family: Family, names: tuple[str, ...]) -> Family:
-    if family.kernels.kind not in _KINDS:
-        return family
-    parameters = family.parameters.copy()
-    parameters[np.isin(family.parts, names), :2] *= _SOFT
-    return replace(family, parameters=parameters)
 
 
 def _twisted(model: Model, state: State, names: tuple[str, ...]) -> State:

@@ -12,6 +12,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.pattern import asymmetry, symmetric
 from flexctrl.linear.undamped import ROUND_OFF
 from flexctrl.model.balance import Balance
+from flexctrl.model.eased import told
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.model.tangents import tangents
@@ -40,6 +41,7 @@ def leaving(balance: Balance, state: State) -> int:
     LinearizationError, MechanismError
         Under loads without a potential, if the motions cannot be told; see `growing`.
     """
+    balance, state = told(balance, state)
     if without_energy(balance.model, balance.u):
         M, C, K = tangents(balance.model, state, balance.u)
         if (held := balance.turning(state, balance.whole_force(state))).nnz:

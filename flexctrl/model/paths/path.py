@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import NoneType
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ from flexctrl.errors import (
     shortened,
 )
 from flexctrl.model.balance import Balance
+from flexctrl.model.eased import Eased, eased
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import overturned
@@ -218,18 +219,45 @@ def equilibrium_path(
     count = check_whole(most, "most", "equilibrium_path", least=2)
     balance = Balance(model, model.input_vector(inputs or {}), held)
     try:
-        course, first = _begin(balance, pushed, goals, start, hold, inputs)
+        state, factor = _outset(model, start, hold, inputs)
+        ease = eased(balance, state)
+        outset = (ease.balance, ease.onto(state)) if ease else (balance, state)
+        course, first = _begin(*outset, factor, pushed, goals, start)
         walked = Walk(course, goals, count, isinstance(start, BranchPoint)).from_(first)
     except SingularMatrixError as error:
         raise _unheld(balance, error.where) from None
+
+    def rest(station: Station) -> Rest:
+        found = _rest(course, station)
+        return _behind(ease, model, found) if ease else found
+
     return EquilibriumPath(
         dict(load),
-        tuple(PathPoint(s.factor, _rest(course, s)) for s in walked.stations),
-        tuple(LimitPoint(s.factor, _rest(course, s), _mode(course, s)) for s in walked.limits),
-        tuple(BranchPoint(s.factor, _rest(course, s), _mode(course, s)) for s in walked.crossings),
+        tuple(PathPoint(s.factor, rest(s)) for s in walked.stations),
+        tuple(LimitPoint(s.factor, rest(s), _mode(course, s)) for s in walked.limits),
+        tuple(BranchPoint(s.factor, rest(s), _mode(course, s)) for s in walked.crossings),
         walked.end,
         walked.iterations,
     )
+
+
+def _outset(
+    model: Model,
+    start: State | PathPoint | None,
+    hold: Mapping[str, float] | None,
+    inputs: Mapping[str, float] | None,
+) -> tuple[State, float]:
+    """The first equilibrium, and its λ."""
+    if isinstance(start, PathPoint):
+        return start.rest.state, start.factor
+    return equilibrium(model, hold, inputs, start).state, 0.0
+
+
+def _behind(ease: Eased, model: Model, rest: Rest) -> Rest:
+    """What was found behind eased shafts, behind the shafts themselves."""
+    state = ease.back(rest.state)
+    outputs = dict(zip(model.outputs, model.measure(state).tolist(), strict=True))
+    return replace(rest, state=state, outputs=outputs, model=model)
 
 
 def _unheld(balance: Balance, where: int) -> MechanismError:
@@ -252,18 +280,13 @@ def _goals(model: Model, until: float | Mapping[str, float]) -> dict[str, float]
 
 def _begin(
     balance: Balance,
+    state: State,
+    factor: float,
     load: np.ndarray,
     goals: Mapping[str, float],
     start: State | PathPoint | None,
-    hold: Mapping[str, float] | None,
-    inputs: Mapping[str, float] | None,
 ) -> tuple[Course, Station]:
     """The course and its first station."""
-    model = balance.model
-    if isinstance(start, PathPoint):
-        state, factor = start.rest.state, start.factor
-    else:
-        state, factor = equilibrium(model, hold, inputs, start).state, 0.0
     rough = Course(balance, load, 1.0)
     straight = rough.tangent(state, factor, Direction(np.zeros(len(balance.free)), 1.0))
     way = float(np.sqrt((straight.place**2) @ rough.weight)) / abs(straight.factor or 1.0)

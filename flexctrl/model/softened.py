@@ -1,0 +1,55 @@
+"""Machines with a share of the stiffness of some shafts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from flexctrl.model.laws.families import Family
+from flexctrl.model.laws.loose_kinds import LOOSE_DRIVES
+from flexctrl.model.laws.part_kinds import LINEAR_DRIVE, ROTARY_DRIVE
+from flexctrl.model.model import Model
+
+__all__ = ["softened"]
+
+_KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
+
+
+def softened(model: Model, shares: Mapping[str, float]) -> Model:
+    """Return a machine with a share of the stiffness and damping of the shafts of some drives.
+
+    Parameters
+    ----------
+    model : Model
+        Of no small motion about an equilibrium (`GeometricStiffness`).
+    shares : mapping of str to float
+        By the names of drives.
+
+    Returns
+    -------
+    Model
+    """
+    soft = replace(model)
+    soft.__dict__.update({name: model.__dict__[name] for name in ("signals", "gusts") if name in model.__dict__})
+    soft.__dict__["forces"] = replace(model.forces, families=tuple(_soft(f, shares) for f in model.forces.families))
+    if not model.large:
+        soft.__dict__["_stiffness"] = _stiffness(model, shares)
+    return soft
+
+
+def _soft(family: Family, shares: Mapping[str, float]) -> Family:
+    if family.kernels.kind not in _KINDS:
+        return family
+    parameters = family.parameters.copy()
+    parameters[:, :2] *= np.array([shares.get(name, 1.0) for name in family.parts])[:, None]
+    return replace(family, parameters=parameters)
+
+
+def _stiffness(model: Model, shares: Mapping[str, float]) -> sp.csc_matrix:
+    """K of small motion: without these shafts, and the shares of theirs."""
+    whole, left = model.stiffness(), model.stiffness_but(frozenset(shares))
+    added = (share * (whole - model.stiffness_but(frozenset({name}))) for name, share in shares.items())
+    return sp.csc_matrix(sum(added, start=left))
