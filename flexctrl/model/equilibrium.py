@@ -300,8 +300,9 @@ def _gave_way(balance: Balance, found: Found, share: float) -> str:
         return f"no equilibrium found: the loads carry the machine as far as {share:.4g} of them, where {turned}"
     return (
         f"no equilibrium found: brought on gradually, the loads carry the machine as far as {share:.4g} of them; there "
-        f"it gives way (relative residual of the whole {found.residual:.3g}, worst at {balance.worst(found.state)}). "
-        "Follow it past that limit with flexctrl.equilibrium_path, or start near the shape expected"
+        f"it gives way, or may move freely (relative residual of the whole {found.residual:.3g}, worst at "
+        f"{balance.worst(found.state)}). Follow it past that limit with flexctrl.equilibrium_path, or start near the "
+        "shape expected"
     )
 
 

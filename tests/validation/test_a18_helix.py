@@ -2,7 +2,7 @@
 
 Radius 10, height 50, two coils. The moment (GJ τ, 0, EI κ) in the axes of the end section is constant along the rod,
 so its strains are; a `FollowerTorque` about each axis makes it. From slenderness 10 to 1e4 (cardillo
-``02_helix.py``).
+``02_helix.py``). Where GJ is 0.6 EI, twenty elements a coil leave 3e-2 R0 and eighty 1.9e-3: of second order.
 """
 
 from __future__ import annotations
