@@ -19,9 +19,8 @@ import numpy as np
 from flexctrl.model.balance import Balance
 from flexctrl.model.model import Model
 from flexctrl.model.rounding import DIGITS
-from flexctrl.model.softened import softened
+from flexctrl.model.softened import shafts_of, softened
 from flexctrl.model.state import State
-from flexctrl.structure.drives import LinearDrive, RotaryDrive
 
 __all__ = ["Eased", "eased", "told"]
 
@@ -86,7 +85,7 @@ class Eased:
 
     def __str__(self) -> str:
         """Return the names of the drives."""
-        names = _shafts(self.balance.model)
+        names = shafts_of(self.balance.model)
         return " and ".join(names[i] for i in self.motors.tolist())
 
 
@@ -120,7 +119,7 @@ def eased(balance: Balance, state: State) -> Eased | None:
     -------
     Eased or None
     """
-    shafts = _shafts(balance.model)
+    shafts = shafts_of(balance.model)
     if not shafts or balance.model.about:
         return None
     borne = _borne(balance, state, np.array(list(shafts)))
@@ -131,13 +130,6 @@ def eased(balance: Balance, state: State) -> Eased | None:
     with np.errstate(divide="ignore"):
         least = np.where(borne > 0.0, own / borne, np.inf).min(axis=1)
     return _with(balance, {i: _FIRM * s for i, s in zip(shafts, least.tolist(), strict=True) if s < _DROWNED})
-
-
-def _shafts(model: Model) -> dict[int, str]:
-    """The coordinates of motors behind elastic shafts, and their drives."""
-    drives = zip(model.motion.sources.tolist(), model.structure.drives, strict=True)
-    shafts = [(i, drive.name) for i, drive in drives if isinstance(drive, RotaryDrive | LinearDrive)]
-    return {i: name for i, name in shafts if i < model.n}
 
 
 def _borne(balance: Balance, state: State, motors: np.ndarray) -> np.ndarray:
@@ -165,7 +157,7 @@ def _with(balance: Balance, shares: Mapping[int, float]) -> Eased | None:
     """The balance with shares of the stiffness of shafts, by the coordinates of their motors."""
     if not shares:
         return None
-    model, names = balance.model, _shafts(balance.model)
+    model, names = balance.model, shafts_of(balance.model)
     stiffness = {drive.name: drive.stiffness for drive in model.structure.drives}
     eased, bare = (
         softened(model, {names[i]: by for i, by in s.items()}) for s in (shares, dict.fromkeys(shares, _SOFT))

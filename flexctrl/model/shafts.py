@@ -30,7 +30,7 @@ from flexctrl.linear.pattern import symmetric
 from flexctrl.model.balance import Balance
 from flexctrl.model.model import Model
 from flexctrl.model.rounding import DIGITS, slope_terms
-from flexctrl.model.softened import softened
+from flexctrl.model.softened import shafts_of, softened
 from flexctrl.model.state import State
 from flexctrl.model.tangents import tangents
 
@@ -173,7 +173,7 @@ def with_twists(linear: LinearModel, balance: Balance, state: State) -> LinearMo
 
 def _shafts(linear: LinearModel, balance: Balance, state: State) -> _Shafts:
     """Those of motors that move, and of those that are held where they are."""
-    sources, K, C = balance.model.motion.sources, linear.K.tocsr(), linear.C.diagonal()
+    sources, K, C = list(shafts_of(balance.model)), linear.K.tocsr(), linear.C.diagonal()
     motors = np.flatnonzero(np.isin(balance.free, sources))
     motors = motors[K.diagonal()[motors] > 0.0]
     k, rows = K.diagonal()[motors], K[motors].toarray()

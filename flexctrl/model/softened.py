@@ -12,10 +12,27 @@ from flexctrl.model.laws.families import Family
 from flexctrl.model.laws.loose_kinds import LOOSE_DRIVES
 from flexctrl.model.laws.part_kinds import LINEAR_DRIVE, ROTARY_DRIVE
 from flexctrl.model.model import Model
+from flexctrl.structure.drives import LinearDrive, RotaryDrive
 
-__all__ = ["softened"]
+__all__ = ["shafts_of", "softened"]
 
 _KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
+
+
+def shafts_of(model: Model) -> dict[int, str]:
+    """Return the coordinates of motors behind shafts, and their drives; what pays out a rope is none of them.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    dict of int to str
+    """
+    drives = zip(model.motion.sources.tolist(), model.structure.drives, strict=True)
+    shafts = [(i, drive.name) for i, drive in drives if isinstance(drive, RotaryDrive | LinearDrive)]
+    return {i: name for i, name in shafts if i < model.n}
 
 
 def softened(model: Model, shares: Mapping[str, float]) -> Model:

@@ -279,3 +279,33 @@ def test_a_misfit_is_that_of_two_motions_mixed(angle):
 @pytest.mark.parametrize("k", [1e8, 1e13, 1e18])
 def test_adrift_behind_one_shaft_nothing_is_refused(k, length):
     assert fc.linearize(adrift(k, (0, 1, 0), length, 4, shafts=1)).modes().rigid == 7
+
+
+@pytest.mark.parametrize(
+    "held", [("hoist", "wheels"), ("hoist",), ("wheels",), ()], ids=["both", "hoist", "wheels", "free"]
+)
+@pytest.mark.parametrize("k", [1e8, 1e11])
+def test_a_rope_on_a_winch_is_no_shaft(k, held):
+    """Under a trolley on stiff wheels: pendulum √(g (1/m + 1/M) m/ℓ) and rope √(EA/ℓ m), what moves along added."""
+    trolley, load = fc.PointMass("trolley", (0, 0, 10), 60.0), fc.PointMass("load", (0, 0, 5), 300.0)
+    hoist = fc.Winch("hoist", load.node, trolley.node, EA=1e5, radius=0.1, ratio=15.0, inertia=0.02)
+    motor = {"radius": 0.1, "ratio": 20.0, "stiffness": k, "inertia": 0.01}
+    wheels = fc.LinearDrive("wheels", trolley.node, direction="x", **motor)
+    machine = fc.Structure(
+        [trolley, load],
+        [fc.Support(trolley.node, "v w"), fc.Support(load.node, "v")],
+        [hoist, wheels],
+        [fc.MotorTorque("lift", hoist)],
+    )
+    model = fc.assemble(machine, [fc.LargeRotation(), fc.Gravity(), fc.Flexible()])
+    weight, arm = 300.0 * 9.81, 0.1 / 15.0
+    lift = {} if "hoist" in held else {"lift": -weight * (1.0 + 0.5 * weight / 1e5) * arm}
+    rest = fc.equilibrium(model, hold={f"{name}_source": 0.0 for name in held}, inputs=lift)
+    rolling, turning = 60.0 + 0.01 * 200.0**2, 0.02 / (arm * (1.0 + weight / 1e5)) ** 2
+    lighter = 1.0 / 300.0 + (0.0 if "wheels" in held else 1.0 / rolling)
+    length = 10.0 - rest.state.x[1, 2]
+    pendulum = np.sqrt(weight * lighter / length)
+    rope = np.sqrt(1e5 * (1.0 + weight / 1e5) / length * (1.0 / 300.0 + (0.0 if "hoist" in held else 1.0 / turning)))
+    found = fc.linearize(model, rest).modes()
+    assert found.rigid == 2 - len(held)
+    assert found.omega[found.rigid :][:2] == pytest.approx([pendulum, rope], rel=1e-6)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from flexctrl.dynamics.events.crossings import met, offset
 from flexctrl.dynamics.events.nearing import (
+    ASTRAY,
     LANDINGS,
     LEAD,
     LEAD_MOST,
@@ -120,6 +121,10 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
         if near_enough(off * above / left, h, lead, missed):
             break
         at = inside(bracket, end + on - lead)
+    if found is not before and when - found.state.t > ASTRAY * h:
+        name = watch.corner_names[gauge - len(watch.events) - len(watch.names)]
+        why = f"the longest step that ends short of the corner of {name} leaves {when - found.state.t:.1e} s to it"
+        raise Missed(journey.stepper.counts.worst, why)
     return found, replace(crossing, t=when)
 
 

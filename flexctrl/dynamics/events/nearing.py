@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from flexctrl.kernels.native import seldom
 
 __all__ = [
+    "ASTRAY",
     "LANDINGS",
     "LEAD",
     "LEAST",
@@ -30,6 +31,8 @@ LANDINGS, MOST = 12, 60
 """Corners that a step is shortened to, one after the other; steps taken to one of them."""
 LEAD, LEAD_MOST, _LEAD_FAR = 1e-8, 1e-7, 1e-4
 """Shares of a step left to a corner: by intent, at most, and at most where no step ends nearer."""
+ASTRAY = 1e-3
+"""With more of a step left where the search ends, steps jump from short of the corner to beyond: it is another's."""
 NUDGES, LEAST = 8, 1e-9
 """How often the way beyond a corner is lengthened; the share of a step that it is at first."""
 TRIES = 9

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.events.nearing import (
+    ASTRAY,
     LANDINGS,
     LEAD,
     LEAD_MOST,
@@ -154,7 +155,7 @@ def short_of(m: March, guess: float, h: float) -> bool:
     if not (best > 0.0 and towards(m, best)):
         return False
     c.when += best - m.h
-    return distance(m) > dust
+    return distance(m) > dust and c.when <= ASTRAY * h
 
 
 @seldom
