@@ -38,7 +38,7 @@ __all__ = ["with_twists"]
 
 _SOFT = 2.0**-100
 _DROWNED = 2.0**-20
-_DUST = 1e-12
+_DUST, _ALIKE = 1e-12, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +101,16 @@ class _Shafts:
         lost = np.array([(beside > 0.0) & (beside < _DROWNED * borne) & self._led for borne in self.borne])
         drowns, drowned = np.any(lost, axis=(1, 2)), np.any(lost[:, :-1], axis=(0, 2))
         return np.logical_and(drowns.any(), drowns | ~drowned)
+
+    def as_one(self) -> _Shafts:
+        """Return them with held ones that twist alike, side by side on one joint, as one."""
+        size = np.linalg.norm(self.rows, axis=1)
+        alike = np.abs(self.rows @ self.rows.T) >= (1.0 - _ALIKE) * np.outer(size, size)
+        alike &= (self.motors[:, None] < 0) & (self.motors < 0)
+        first = np.argmax(alike | np.eye(size.size, dtype=bool), axis=1)
+        share = (size / size[first]) ** 2
+        k, c = (np.bincount(first, share * part, size.size) for part in (self.stiffness, self.damping))
+        return replace(self, stiffness=k, damping=c).among(first == np.arange(size.size))
 
     @property
     def _led(self) -> np.ndarray:
@@ -167,6 +177,7 @@ def with_twists(linear: LinearModel, balance: Balance, state: State) -> LinearMo
     if not stiff.all():
         shafts = shafts.among(stiff)
         bare = _bare(linear, balance, state, shafts.names)
+    shafts = shafts.as_one()
     pivots = _pivots(shafts, bare.own, linear.M.diagonal())
     return _written(linear, bare, shafts, pivots) if pivots.size else linear
 

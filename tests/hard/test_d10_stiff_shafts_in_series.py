@@ -140,27 +140,29 @@ def test_behind_a_motor_that_is_held_both_swing_as_one(k, turned):
     assert run["q0"] == pytest.approx((1.0 - np.cos(np.sqrt(K / M) * run.t)) / K, rel=1e-5, abs=1e-9)
 
 
-def spliced(k: float, bending: float, ratio: float = 1000.0) -> fc.Model:
-    """Two beams of 1 m in line, clamped, and a motor on the hinge between them."""
+def spliced(k: float, bending: float, motors: int = 1, ratio: float = 1000.0) -> fc.Model:
+    """Two beams of 1 m in line, clamped, and motors on the hinge between them."""
     section = fc.Section(EA=1e6 * bending, EI_y=bending, EI_z=bending, GJ=bending, rhoA=1.0, rhoJ=1e-3)
     near, far = (fc.Beam(name, (x, 0, 0), (x + 1, 0, 0), section, elements=2) for name, x in (("near", 0), ("far", 1)))
     motor = {"stiffness": k / ratio**2, "ratio": ratio, "inertia": 1e-3}
-    drive = fc.RotaryDrive("d", far.start, near.end, axis="z", **motor)
+    drives = [fc.RotaryDrive(f"d{i}", far.start, near.end, axis="z", **motor) for i in range(motors)]
     joints = [fc.Support(near.start), fc.Hinge(near.end, far.start, "z")]
-    machine = fc.planar(fc.Structure([near, far], joints, [drive]))
+    machine = fc.planar(fc.Structure([near, far], joints, drives))
     return fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])
 
 
+@pytest.mark.parametrize("motors", [1, 2])
 @pytest.mark.parametrize("bending", [100.0, 0.01])
 @pytest.mark.parametrize("k", [1e8, 1e12, 1e16, 1e18, 1e21])
-def test_beams_that_a_held_motor_joins_are_one_beam(k, bending):
+def test_beams_that_held_motors_join_are_one_beam(k, bending, motors):
     """A cantilever of 2 m of as many elements, but for what the shaft gives way."""
-    model = spliced(k, bending)
+    model = spliced(k, bending, motors)
     section = model.structure.elements[0].section
     whole = fc.Beam("whole", (0, 0, 0), (2, 0, 0), section, elements=4)
     machine = fc.planar(fc.Structure([whole], [fc.Support(whole.start)]))
     expected = fc.linearize(fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])).modes()
-    found = fc.linearize(model, fc.equilibrium(model, hold={"d_source": 0.0})).modes()
+    held = {f"d{i}_source": 0.0 for i in range(motors)}
+    found = fc.linearize(model, fc.equilibrium(model, hold=held)).modes()
     assert (found.rigid, found.unstable) == (0, 0)
     assert found.omega[:4] == pytest.approx(expected.omega[:4], rel=10.0 * bending / k + 1e-9)
 
