@@ -294,7 +294,10 @@ def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tu
     if feed is None:
         return _noted(run, f"{_UNCHECKED}: the controller cannot be copied"), None
     changed = replace(journey.plan, model=feed.model, feed=feed, method=beside.method, tolerance=beside.tolerance)
-    work = (end - _time(start)) / (end - beginning.t) / min(beside.longer, 1.0)
+    work = (end - _time(start)) / (end - beginning.t)
+    if not isinstance(start, Checkpoint):  # the whole way, of which this run has gone the last part
+        work = max(work, run.report.steps / max(run.report.steps - beginning.steps, 1))
+    work /= min(beside.longer, 1.0)
     latest = time.perf_counter() + _LONGER * work * run.report.wall_s + _SECONDS
 
     def ended(share: float) -> None:
