@@ -119,7 +119,7 @@ class _Shafts:
 
 @dataclass(frozen=True, eq=False)
 class _Bare:
-    """A machine whose shafts are next to nothing, and the stiffness and damping that they had.
+    """A machine whose shafts are next to nothing.
 
     Attributes
     ----------
@@ -128,8 +128,6 @@ class _Bare:
         In which its shafts bear the torques that they bore.
     K, C : scipy.sparse.csr_matrix, shape (n, n)
         Of the free coordinates, without the shafts.
-    springs, dampers : scipy.sparse.csr_matrix, shape (n, n)
-        What the shafts add.
     rounding : numpy.ndarray, shape (n,)
         Of K's diagonal.
     """
@@ -138,8 +136,6 @@ class _Bare:
     state: State
     K: sp.csr_matrix
     C: sp.csr_matrix
-    springs: sp.csr_matrix
-    dampers: sp.csr_matrix
     rounding: np.ndarray
 
     @property
@@ -214,9 +210,8 @@ def _bare(linear: LinearModel, balance: Balance, state: State, names: tuple[str,
     if (held := balance.turning(state, balance.whole_force(state))).nnz:
         K = K - held
     C, K, terms = (balance.seen(there, A) for A in (C, K, terms))
-    springs, dampers = (linear.K - K).tocsr(), (linear.C - C).tocsr()
-    rounding = DIGITS * np.abs(terms.diagonal())
-    return _Bare(model, there, _without(K, springs), _without(C, dampers), springs, dampers, rounding)
+    K, C = (_without(soft, whole - soft) for soft, whole in ((K, linear.K), (C, linear.C)))
+    return _Bare(model, there, K, C, DIGITS * np.abs(terms.diagonal()))
 
 
 def _without(K: sp.spmatrix, shafts: sp.csr_matrix) -> sp.csr_matrix:

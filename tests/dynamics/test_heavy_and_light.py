@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg as la
 
 import flexctrl as fc
 from flexctrl.design import pd
@@ -65,4 +66,13 @@ def test_growth_behind_a_motor_that_lags_is_told():
     run = fc.simulate(model, law, until=2.0, start=start, method=fc.GeneralizedAlpha(0.02, rho=0.6))
     assert np.ptp(run["angle"][-5:]) < 1e-4
     assert run.status is fc.Status.FAILED
-    assert "the sampled loop is unstable, with a pole at z = -1.126 ± 0.1996i" in run.report.message
+    shaft, A = np.array([250.0, 1e-3, -25.0, -1e-4, 0.0]), np.zeros((6, 6))  # (q, q', a, a', τ) and what is held
+    A[0, 1] = A[2, 3] = 1.0
+    A[1, :5], A[3, :5], A[4, 4:] = -10.0 * shaft / 2.0, shaft / 1e-3, [-500.0, 500.0]
+    A[3, 4] = 1e3
+    over = la.expm(0.02 * A)[:5]
+    poles = np.linalg.eigvals(over[:, :5] + np.outer(over[:, 5], [0.0, 0.0, -2.0, -0.05, 0.0]))
+    worst = max(poles, key=lambda z: (abs(z), z.imag))
+    assert (
+        f"the sampled loop is unstable, with a pole at z = {worst.real:.4g} ± {worst.imag:.4g}i" in run.report.message
+    )

@@ -11,26 +11,26 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.notes.answers import Answers, _kind, answers
+from flexctrl.dynamics.notes.answers import Manner, _kind, answers
 from flexctrl.errors import FlexctrlError
 
 SAMPLE = 5e-3
 WEIGHTS = 9.81 * np.array([8.0 * 0.5 + 4.0 * 1.48, 4.0 * 0.48]) / np.array([60.0, 40.0])
 
 
-def said(law) -> Answers:
+def said(law) -> Manner:
     return _kind(lambda share: np.atleast_1d(np.asarray(law(share), dtype=float)))
 
 
 @pytest.mark.parametrize("law", [lambda s: 3.0 * s, lambda s: np.sin(3.0 * s), lambda s: s**3, lambda s: 2.0])
 def test_what_answers_in_proportion_or_along_a_curve_is_smooth(law):
-    assert said(law) is Answers.SMOOTH
+    assert said(law) is Manner.SMOOTH
 
 
 @pytest.mark.parametrize("limit", [0.1, 0.5, 0.93])
 def test_a_limit_anywhere_along_the_line_is_a_corner(limit):
     for law in (lambda s: min(s, limit), lambda s: max(s - limit, 0.0), lambda s: [7.0, abs(s - limit)]):
-        assert said(law) is Answers.LIMITED
+        assert said(law) is Manner.LIMITED
 
 
 @pytest.mark.parametrize("quantum", [0.011, 0.1, 0.4])
@@ -40,15 +40,15 @@ def test_what_rounds_or_switches_jumps(quantum):
         lambda s: s + quantum * (s > 0.3),
         lambda s: float(s > quantum),
     ):
-        assert said(law) is Answers.ABRUPT
+        assert said(law) is Manner.ABRUPT
 
 
 def test_an_encoder_that_is_fine_beside_the_motion_is_smooth():
-    assert said(lambda s: 1e-4 * round(s / 1e-4)) is Answers.SMOOTH
+    assert said(lambda s: 1e-4 * round(s / 1e-4)) is Manner.SMOOTH
 
 
 def test_a_steep_slope_is_no_jump():
-    assert said(lambda s: np.clip(1e3 * (s - 0.4), -1.0, 1.0)) is Answers.LIMITED
+    assert said(lambda s: np.clip(1e3 * (s - 0.4), -1.0, 1.0)) is Manner.LIMITED
 
 
 def test_a_law_that_says_nothing_elsewhere_is_not_asked():
@@ -74,7 +74,7 @@ def test_a_law_that_says_nothing_elsewhere_is_not_asked():
     feed = feed_of(model, law, np.zeros(2))
     with pytest.raises(FlexctrlError):
         feed.told(0.0, np.zeros(0), np.zeros(1))
-    assert answers(run, type("End", (), {"point": run.checkpoint.point}), feed) is Answers.SMOOTH
+    assert answers(run, type("End", (), {"point": run.checkpoint.point}), feed) is Manner.SMOOTH
 
 
 def arm(*effects: fc.Effect) -> fc.Model:

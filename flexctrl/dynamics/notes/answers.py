@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
     from flexctrl.dynamics.run import Run
 
-__all__ = ["Answers", "answers"]
+__all__ = ["Manner", "answers"]
 
 _PLACES, _HALVINGS = 17, 16
 _JUMP = 5e-3
@@ -26,7 +26,7 @@ _BENT, _AT_ONCE = 0.05, 0.4
 Answer = Callable[[float], np.ndarray]
 
 
-class Answers(Enum):
+class Manner(Enum):
     """What a law's answers look like along a line of measurements."""
 
     SMOOTH = "smooth"
@@ -34,7 +34,7 @@ class Answers(Enum):
     ABRUPT = "with a jump"
 
 
-def answers(run: Run, journey: Journey, feed: Feed | None) -> Answers:
+def answers(run: Run, journey: Journey, feed: Feed | None) -> Manner:
     """Tell how a sampled law answers along the line from the least to the most of all that it has read.
 
     Where the largest change between two places does not become small as they come nearer, it is a jump.
@@ -49,11 +49,11 @@ def answers(run: Run, journey: Journey, feed: Feed | None) -> Answers:
 
     Returns
     -------
-    Answers
+    Manner
         Jumps count from half a percent of all that a command, or a state of the law, changes by along that line.
     """
     if feed is None or not feed.sample_time or not feed.reads.size or not len(run.y):
-        return Answers.SMOOTH
+        return Manner.SMOOTH
     read, end = run.y[:, feed.reads], journey.point
     low, high = read.min(axis=0), read.max(axis=0)
 
@@ -63,17 +63,17 @@ def answers(run: Run, journey: Journey, feed: Feed | None) -> Answers:
     try:
         return _kind(answer)
     except (FlexctrlError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
-        return Answers.SMOOTH
+        return Manner.SMOOTH
 
 
-def _kind(answer: Answer) -> Answers:
+def _kind(answer: Answer) -> Manner:
     places = np.linspace(0.0, 1.0, _PLACES)
     said = np.array([answer(share) for share in places])
     changes, whole = np.diff(said, axis=0), np.ptp(said, axis=0)
     moving, steepest = np.flatnonzero(whole > 0.0).tolist(), np.argmax(np.abs(changes), axis=0)
     if any(_jump(answer, part, places, int(steepest[part])) > _JUMP * whole[part] for part in moving):
-        return Answers.ABRUPT
-    return Answers.LIMITED if any(_cornered(changes[:, part]) for part in moving) else Answers.SMOOTH
+        return Manner.ABRUPT
+    return Manner.LIMITED if any(_cornered(changes[:, part]) for part in moving) else Manner.SMOOTH
 
 
 def _jump(answer: Answer, part: int, places: np.ndarray, at: int) -> float:

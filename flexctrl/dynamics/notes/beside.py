@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.notes.answers import Answers
+from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.gap import Gap
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.run import Run, Status
@@ -73,14 +73,14 @@ def kept_short(journey: Journey) -> bool:
     return sample > 0.0 and journey.mark.steps < _MORE * journey.point.state.t / sample
 
 
-def shorter(journey: Journey, law: Answers) -> float:
+def shorter(journey: Journey, law: Manner) -> float:
     """Return by how much steps of the run beside are to be shorter; 1 where they are to be longer.
 
     Parameters
     ----------
     journey : Journey
         At its end.
-    law : Answers
+    law : Manner
         How a sampled law answers.
 
     Returns
@@ -90,7 +90,7 @@ def shorter(journey: Journey, law: Answers) -> float:
         spare breaks loose is decided by a finer run, where two coarse ones may be wrong alike. A quarter for what jumps
         at every sample: of what half the steps round as the run itself does, they round a quarter otherwise.
     """
-    if law is Answers.ABRUPT:
+    if law is Manner.ABRUPT:
         return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
     return 0.5 if kept_short(journey) or (fixed and _cornered(journey, {*journey.watch.corner_names})) else 1.0
@@ -100,14 +100,14 @@ def _cornered(journey: Journey, names: set[str]) -> bool:
     return any(event.name in names for event in journey.events)
 
 
-def may_grow(journey: Journey, law: Answers) -> bool:
+def may_grow(journey: Journey, law: Manner) -> bool:
     """Tell whether small differences may have grown of themselves.
 
     Parameters
     ----------
     journey : Journey
         At its end.
-    law : Answers
+    law : Manner
         How a sampled law answers.
 
     Returns
@@ -126,7 +126,7 @@ def may_grow(journey: Journey, law: Answers) -> bool:
     swung = sums.moved > least
     if short or isinstance(plan.method.pace, Fixed):
         swung &= sums.path > _OFTEN * least
-    return bool(swung.any()) or feed.reacting or law is not Answers.SMOOTH or _cornered(journey, own)
+    return bool(swung.any()) or feed.reacting or law is not Manner.SMOOTH or _cornered(journey, own)
 
 
 def told_beside(
