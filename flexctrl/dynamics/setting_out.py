@@ -21,6 +21,7 @@ from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.steps import Controlled, Fixed, Mark, Reusable, Stepper
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.swift.layers import beyond_layers
+from flexctrl.dynamics.swift.light_motors import seated
 from flexctrl.dynamics.swift.settling import quasistatic
 from flexctrl.dynamics.unbegun import UNASKED, unbegun
 from flexctrl.dynamics.unheld import needed
@@ -108,7 +109,7 @@ def _begun(
     state = (start.state if isinstance(start, Rest) else start or model.rest).with_(t=0.0)
     drawn = model.motion.counted(state)
     supply = plan.feed.first(drawn)
-    state = model.switches.begin(drawn, supply.u)
+    state = model.switches.begin(seated(model, drawn, supply.u), supply.u)
     stops = Stops(plan.feed.sample_time, plan.feed.breaks)
     stops.skip(0.0)
     state, supply, notes = beyond_layers(plan.feed, state, supply, pace, plan.tolerance)

@@ -24,6 +24,7 @@ from flexctrl.dynamics.records.record import InMemory, Record
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
 from flexctrl.dynamics.steps import Fixed, Integrator
+from flexctrl.dynamics.swift.light_motors import giving_way
 from flexctrl.errors import StructureError
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.consistent import check_state
@@ -118,7 +119,7 @@ def simulate(
     if isinstance(model, LinearModel):
         plant = _plant(model, chosen)
     else:
-        plant = model
+        plant = giving_way(model)
         if isinstance(start, State) and model.__dict__.get("_begun") is not start:
             check_state(model, start, "simulate: start")
             model.__dict__["_begun"] = start

@@ -116,7 +116,7 @@ def complete_pairs(
         if EPS * top > lowest:  # direct ones are blurred past the softest, which then are in all that was found of them
             lam[:low], phi[:, :low] = shifted.ritz(_orthonormal(pencil.M, phi[:, :low]))
     else:
-        shifted = pencil.below_all(-max(top, 1.0))
+        shifted = pencil.below_all(-2.0 * max(top, 1.0))  # at -top there may be an eigenvalue
     pairs = _settled(pencil, _found(pencil, shifted, lam, phi))
     return replace(pairs, misfit=_misfit(shifted, pairs))
 

@@ -22,7 +22,7 @@ from flexctrl.model.rounding import DIGITS
 from flexctrl.model.softened import shafts_of, softened
 from flexctrl.model.state import State
 
-__all__ = ["Eased", "eased", "told"]
+__all__ = ["Eased", "eased", "shares_left", "told"]
 
 _DROWNED, _FIRM = 2.0**-28, 2.0**23
 _SOFT, _DUST, _LAST_DIGITS = 2.0**-100, 2.0**-90, 2.0**-44
@@ -119,17 +119,35 @@ def eased(balance: Balance, state: State) -> Eased | None:
     -------
     Eased or None
     """
+    shares = shares_left(balance, state)
+    return _with(balance, shares) if shares else None
+
+
+def shares_left(balance: Balance, state: State) -> dict[int, float]:
+    """Return which share of their stiffness doubles hold of the shafts that drown what they drive.
+
+    Parameters
+    ----------
+    balance : Balance
+    state : State
+        About which stiffness is asked for.
+
+    Returns
+    -------
+    dict of int to float
+        By the coordinates of motors; of those alone whose shafts are that stiff.
+    """
     shafts = shafts_of(balance.model)
     if not shafts or balance.model.about:
-        return None
+        return {}
     borne = _borne(balance, state, np.array(list(shafts)))
     if not borne.any():
-        return None
+        return {}
     bare = softened(balance.model, dict.fromkeys(shafts.values(), _SOFT))
     own = _own(replace(balance, model=bare), state, borne)
     with np.errstate(divide="ignore"):
         least = np.where(borne > 0.0, own / borne, np.inf).min(axis=1)
-    return _with(balance, {i: _FIRM * s for i, s in zip(shafts, least.tolist(), strict=True) if s < _DROWNED})
+    return {i: _FIRM * s for i, s in zip(shafts, least.tolist(), strict=True) if s < _DROWNED}
 
 
 def _borne(balance: Balance, state: State, motors: np.ndarray) -> np.ndarray:
@@ -153,10 +171,8 @@ def _own(bare: Balance, state: State, borne: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(seen, own, np.minimum(softest, np.where(hidden, terms, np.inf))))
 
 
-def _with(balance: Balance, shares: Mapping[int, float]) -> Eased | None:
+def _with(balance: Balance, shares: Mapping[int, float]) -> Eased:
     """The balance with shares of the stiffness of shafts, by the coordinates of their motors."""
-    if not shares:
-        return None
     model, names = balance.model, shafts_of(balance.model)
     stiffness = {drive.name: drive.stiffness for drive in model.structure.drives}
     eased, bare = (

@@ -400,3 +400,15 @@ def test_columns_that_are_all_but_parallel_are_made_orthonormal():
     assert np.abs(phi.T @ M @ phi - np.eye(5)).max() < 1e-14
     left = nested - phi @ (phi.T @ (M @ nested))
     assert np.abs(left).max() < 1e-14
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 20])
+def test_what_is_unstable_in_every_mode_has_them_all(n):
+    """-A beside A: the lowest λ is the largest of all."""
+    rng = np.random.default_rng(n)
+    for _ in range(100):
+        root, mass = rng.standard_normal((n, n)), rng.standard_normal((n, n))
+        A, M = root @ root.T + np.eye(n), mass @ mass.T + np.eye(n)
+        found = eigen.complete_pairs(-A, M)
+        assert found.values == pytest.approx(-la.eigh(A, M)[0][::-1], rel=1e-9)
+        assert found.misfit.max() <= eigen.MISFIT
