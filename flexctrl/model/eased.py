@@ -25,6 +25,7 @@ from flexctrl.model.state import State
 __all__ = ["Eased", "eased", "shares_left", "told"]
 
 _DROWNED, _FIRM = 2.0**-28, 2.0**23
+_ALIKE, _BESIDE = 1e-12, 2.0**-10
 _SOFT, _DUST, _LAST_DIGITS = 2.0**-100, 2.0**-90, 2.0**-44
 
 
@@ -147,7 +148,21 @@ def shares_left(balance: Balance, state: State) -> dict[int, float]:
     own = _own(replace(balance, model=bare), state, borne)
     with np.errstate(divide="ignore"):
         least = np.where(borne > 0.0, own / borne, np.inf).min(axis=1)
-    return {i: _FIRM * s for i, s in zip(shafts, least.tolist(), strict=True) if s < _DROWNED}
+    shares = np.where(least < _DROWNED, _FIRM * least, 1.0)
+    shares = _side_by_side(shares, borne, np.isin(list(shafts), balance.fixed))
+    return {i: share for i, share in zip(shafts, shares.tolist(), strict=True) if share < 1.0}
+
+
+def _side_by_side(shares: np.ndarray, borne: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """The shares kept by shafts of which those of held motors on one joint, if stiff, bear as they do unless eased."""
+    size, shares = np.linalg.norm(borne, axis=1), shares.copy()
+    alike = borne @ borne.T >= (1.0 - _ALIKE) * np.outer(size, size)
+    alike &= np.outer(held, held) & (size > 0.0)
+    for row in alike[shares < 1.0]:
+        if row.any():
+            least = shares[row].min()
+            shares[row & (size > _BESIDE * least * size[row].max())] = least
+    return shares
 
 
 def _borne(balance: Balance, state: State, motors: np.ndarray) -> np.ndarray:

@@ -245,3 +245,36 @@ def test_torques_that_no_digit_tells_are_refused_by_name_where_modes_are_asked_f
     rest = fc.equilibrium(model, inputs={"t0": 0.015, "t1": 0.011})
     with pytest.raises(LinearizationError, match=r"shafts of d0 and d1 .* leave them out of ShaftElasticity"):
         fc.linearize(model, rest)
+
+
+@FRAMES
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+@pytest.mark.parametrize(
+    "stiff", [(1e3, 1e12), (1e8, 1e10), (1e9, 1e11), (1e10, 8e10), (1e13, 1e10), (1e10, 3e10, 1e15)], ids=str
+)
+def test_held_motors_side_by_side_are_as_one_of_their_stiffness(stiff, turn, turned):
+    """However unlike their shafts are, and by whatever reductions."""
+    ratios = (100.0, 7.0, 300.0)[: len(stiff)]
+    several, one = side_by_side(stiff, ratios, turned), side_by_side((sum(stiff),), (50.0,), turned)
+    rest = fc.equilibrium(several, hold={f"d{i}_source": turn * ratio for i, ratio in enumerate(ratios)}, inputs=PUSHED)
+    expected = fc.equilibrium(one, hold={"d0_source": turn * 50.0}, inputs=PUSHED)
+    assert rest.outputs["tip"] == pytest.approx(expected.outputs["tip"], abs=1e-9)
+    found, known = (fc.linearize(rest.model, rest).modes().omega[:4] for rest in (rest, expected))
+    assert found == pytest.approx(known, rel=1e-8)
+
+
+PUSHED = {"F": 0.3}
+
+
+def side_by_side(stiff, ratios, turned) -> fc.Model:
+    """Two beams of 1 m in line, clamped at the left, with motors on the hinge between them."""
+    x, y, z = (tuple(axis) for axis in turned.T)
+    a = fc.Beam("a", (0, 0, 0), x, section(1.0), up=z, elements=2)
+    b = fc.Beam("b", x, tuple(2.0 * turned[:, 0]), section(1.0), up=z, elements=2)
+    drives = [
+        fc.RotaryDrive(f"d{i}", b.start, a.end, axis=z, stiffness=k / ratio**2, ratio=ratio, inertia=1e-3)
+        for i, (k, ratio) in enumerate(zip(stiff, ratios, strict=True))
+    ]
+    joints = [fc.Support(a.start), fc.Hinge(a.end, b.start, axis=z)]
+    machine = fc.Structure([a, b], joints, drives, [fc.Force("F", b.end, y)], [fc.Position("tip", b.end, y)])
+    return fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])
