@@ -12,10 +12,11 @@ import pytest
 import flexctrl as fc
 from flexctrl.dynamics.swift.light_motors import giving_way
 
-STIFF = [1e6, 1e9, 1e12, 1e16, 1e18, 1e21]
+STIFF = [1e6, 1e9, 1e12, 1e16, 1e21]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 RATIO, G = 100.0, 9.81
 METHODS = [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(5e-4), fc.ConservingMidpoint(5e-4)]
+METHODS = [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-3), fc.ConservingMidpoint(1e-3)]
 TIGHT = fc.Tolerance(1e-6, 1e-9)
 FLEXIBLE = (fc.Flexible(), fc.LargeRotation())
 BEHIND_RIGID_SHAFTS = (fc.BeamFlexibility(), fc.LargeRotation())
@@ -76,24 +77,16 @@ def test_pendulums_that_torques_hold_stay(k, n):
     assert moved(run) < 1e-7
 
 
-@pytest.mark.parametrize(
-    "method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(5e-4), fc.ConservingMidpoint(5e-4)], ids=str
-)
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 @pytest.mark.parametrize("damping", [0.0, 1e-3])
-@pytest.mark.parametrize("k", STIFF)
+@pytest.mark.parametrize("k", [1e6, 1e12, 1e21])
 def test_a_torque_moves_an_arm_as_behind_a_rigid_shaft(k, damping, method):
-    given = {
-        "inputs": {"F": 0.02, "m": -0.4 / RATIO},
-        "until": 0.5,
-        "every": 0.01,
-        "method": method,
-        "tolerance": TIGHT,
-    }
+    given = {"inputs": {"F": 0.02, "m": -0.4 / RATIO}, "until": 0.1, "every": 0.01, "tolerance": TIGHT}
     run = fc.simulate(arm(k, damping=damping), method=method, **given)
     rigid = fc.simulate(arm(k, BEHIND_RIGID_SHAFTS), method=method, **given)
     assert run.status is fc.Status.FINISHED
     for name, unit in (("tip", 1.0), ("middle", 1.0), ("motor", RATIO)):
-        assert np.abs(run[name] - rigid[name]).max() < 2e-4 * unit
+        assert np.abs(run[name] - rigid[name]).max() < 1e-4 * unit
 
 
 @pytest.mark.parametrize("k", [1e9, 1e16, 1e21])
