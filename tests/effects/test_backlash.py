@@ -148,7 +148,7 @@ def test_a_rope_goes_slack_and_taut_again_on_time():
     assert run.report.energy_residual < 1e-6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_long_fixed_steps_follow_play_before_slender_links():
     """The links' fast waves, which such steps do not resolve, are not thrown by the flanks."""
     arm = fc.refine(fc.cranes.flexible_arm(), 2)

@@ -104,7 +104,7 @@ def test_a_tight_tolerance_keeps_what_a_loose_one_drops(scene, drawn_up):
     assert "saturated" not in tight.minimal_set
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_effect_of_no_strength_changes_nothing():
     scene = trolley(effects={"rayleigh_damping": {"alpha": 1e-15, "beta": 0.0}})
     entry = fc.ledger(scene, 1e-6)["mass_damping"]
@@ -260,7 +260,7 @@ def test_what_takes_longer_without_stays(monkeypatch):
     assert found["sampled"].keep
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_kept_does_not_hang_on_times_that_scatter(monkeypatch):
     """Runs that all take as long, but for up to 18 %: whatever chance makes of their times, the set is the same."""
     timed, verdicts = trials_module.timed, set()
@@ -298,6 +298,7 @@ def deflected() -> fc.Scene:
     return fc.Scene(structure, effects, loads={"push": 10.0}, simulation=simulation)
 
 
+@pytest.mark.long
 def test_what_changes_nothing_has_its_reason_where_the_full_set_is_handed_out(monkeypatch):
     """No smaller set is as fast by the clock: each line is over what is borne, or says why the effect stays."""
     monkeypatch.setattr(bookkeeping._Auditor, "_gain", lambda self, trial: 1.0 if trial is self.full else 0.0)

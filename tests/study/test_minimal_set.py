@@ -97,7 +97,7 @@ def test_an_unstable_loop_is_noted(kd, unstable):
     assert ("margins say nothing" in str(found)) == unstable
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_went_with_others_is_not_called_kept():
     """A hoist that nothing balances: small motion about an equilibrium cannot be tried, as if unloaded it can."""
     crab, hook = fc.PointMass("crab", (0, 0, 5), 20.0), fc.PointMass("hook", (0, 0, 2), 4.0)

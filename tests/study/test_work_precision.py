@@ -427,7 +427,7 @@ def test_a_store_that_cannot_be_written_is_refused_before_anything_is_run(store,
         fc.work_precision(hoisted(), 0.05, settings=FEW, store=store, workers=1)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_errors_are_the_same_from_several_processes(scene, study):
     pytest.importorskip("joblib")
     shared = fc.work_precision(scene, 0.02, settings=settings(scene), workers=2)
