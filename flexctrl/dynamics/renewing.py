@@ -43,7 +43,7 @@ def _jump(journey: Journey, fresh: Supply, step: float) -> None:
     stepper, held, after = journey.stepper, journey.point, None
     if isinstance(stepper, MarchingStepper) and journey.plan.model.switches.names and rides(journey):
         after = stepper.leap(held, fresh, step)
-        stepper = stepper.plain
+        stepper, journey.balked = stepper.plain, after is None
     if after is None:
         held = replace(held, state=under(journey, fresh.u))
         after = stepper.renew(held, fresh, step)

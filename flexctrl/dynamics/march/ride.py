@@ -296,7 +296,8 @@ class Ride:
         j.mark.follow, j.mark.cap, j.mark.led = m.follow, m.cap, m.led
         if not self.legs.parts:
             return False
-        j.balked, j.mark.stuck, j.mark.taken = self.balked, 0, m.taken
+        # what breaks loose does so in a step by itself, whoever lets the inputs jump
+        j.balked, j.mark.stuck, j.mark.taken = self.balked or not self.jumped, 0, m.taken
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)

@@ -129,7 +129,11 @@ class MarchingStepper:
         """Return a point under other inputs as a ride does, whose contacts hold; None where one may not."""
         self.enter(point)
         self.marcher.about_to(step)
-        if self.marcher.jump(supply.u) == DONE:
+        contacts = self.marcher.contacts
+        contacts.watched = int(contacts.count > 0)
+        status = self.marcher.jump(supply.u)
+        contacts.watched = 0
+        if status == DONE:
             return self.leave(supply)
         self._here = None
         return None
