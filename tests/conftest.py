@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -159,8 +160,21 @@ _FAMILY, _LARGE = 3, ("tests/dynamics/", "tests/effects/", "tests/model/", "test
 """Of one test in these rooms so many cases are run, evenly spread over all; the others with -m long."""
 
 
+_LAST = ("tests/study/", "tests/examples/", "tests/test_howto", "tests/test_cli", "tests/test_report")
+_END = float(os.environ.get("FLEXCTRL_TESTS_END", "inf"))
+"""When whatever is left is skipped [s since 1970]: CI has twenty minutes, and its machines are not alike."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what there is no time for, before anything is made for it."""
+    if time.time() > _END:
+        pytest.skip("no time is left (FLEXCTRL_TESTS_END)")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the long cases, and those between their like."""
+    """Mark the long cases, and those between their like; whole studies come last."""
+    items.sort(key=lambda item: item.nodeid.startswith(_LAST))
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.nodeid.endswith(LONG):
