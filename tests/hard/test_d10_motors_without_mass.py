@@ -15,7 +15,6 @@ from flexctrl.dynamics.swift.light_motors import giving_way
 STIFF = [1e6, 1e9, 1e12, 1e16, 1e21]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 RATIO, G = 100.0, 9.81
-METHODS = [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(5e-4), fc.ConservingMidpoint(5e-4)]
 METHODS = [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-3), fc.ConservingMidpoint(1e-3)]
 TIGHT = fc.Tolerance(1e-6, 1e-9)
 FLEXIBLE = (fc.Flexible(), fc.LargeRotation())
