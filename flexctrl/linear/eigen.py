@@ -35,7 +35,7 @@ RIGID_NOISE = 30.0
 SOFT_NOISE = 1e6
 RIGID_GAP = 1e-8
 UNCLEAR = 1e5 * EPS
-SHORT_SPAN = 1e4
+SHORT_SPAN, LONG_SPAN = 1e4, 1e7
 WIDTH = 4
 BLUR, STEP = 1e3, 1e4
 MISFIT = 1e-4
@@ -111,14 +111,28 @@ def complete_pairs(
     top = float(np.abs(lam).max())
     if top > SHORT_SPAN * np.abs(lam).min():
         shifted, lowest = _scouted(pencil, lam, phi)
-        low = int(np.count_nonzero(lam <= np.sqrt(top * max(lowest, 0.0))))
+        middle = np.sqrt(top * max(lowest, 0.0))
+        low = int(np.count_nonzero(lam <= middle))
         lam[:low], phi[:, :low] = shifted.ritz(phi[:, :low])
+        if middle > LONG_SPAN * lowest:
+            _mend_between(pencil, lam, phi, middle)
         if EPS * top > lowest:  # direct ones are blurred past the softest, which then are in all that was found of them
             lam[:low], phi[:, :low] = shifted.ritz(_orthonormal(pencil.M, phi[:, :low]))
     else:
         shifted = pencil.below_all(-2.0 * max(top, 1.0))  # at -top there may be an eigenvalue
     pairs = _settled(pencil, _found(pencil, shifted, lam, phi))
     return replace(pairs, misfit=_misfit(shifted, pairs))
+
+
+def _mend_between(pencil: DensePencil, lam: np.ndarray, phi: np.ndarray, middle: float) -> None:
+    """Find pairs about the middle of a long spectrum anew, in place: both ends are too far away to tell their λ.
+
+    A shift of −s leaves in λ an error of about EPS (λ/s + s/λ) λ.
+    """
+    under = int(np.count_nonzero(lam <= middle * np.sqrt(float(lam[-1]) / middle)))
+    found, shapes = pencil.below_all(-middle).ritz(_orthonormal(pencil.M, phi[:, :under]))
+    near = found > middle * np.sqrt(middle / float(lam[-1]))
+    lam[:under][near], phi[:, :under][:, near] = found[near], shapes[:, near]
 
 
 def _misfit(shifted: ShiftedPencil, pairs: Eigenpairs) -> np.ndarray:
@@ -144,7 +158,8 @@ def _scouted(pencil: DensePencil, values: np.ndarray, phi: np.ndarray) -> tuple[
     others. So only vectors that the shift spans are looked at. They hold all that the direct pencil has mixed; where
     nothing but free motion is among them, the shift and their number grow.
     """
-    sigma = min(faint_shift(pencil.K, pencil.M), -TINY * max(_mixed(values), float(values[0])))
+    least = TINY * max(_mixed(values), float(values[0]))
+    sigma = min(faint_shift(pencil.K, pencil.M, pencil.noise(np.eye(len(pencil.K)))), -least)
     while True:
         shifted, lam, x = pencil.below_all(sigma), values, phi
         for _ in range(4):

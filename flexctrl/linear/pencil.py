@@ -35,6 +35,7 @@ HIDDEN, SINGULAR = -1, -2
 TINY = 1e-12
 FAINT = 100.0 * EPS
 FIRM = 1e-9
+SURE = 1e6
 
 Matrix: TypeAlias = "np.ndarray | sp.csc_matrix"
 
@@ -286,20 +287,25 @@ def _below_all(at: Callable[[float], ShiftedPencil], sigma: float) -> ShiftedPen
     raise LinearizationError("K + s M is singular for every s: a freedom has neither mass nor stiffness")
 
 
-def faint_shift(K: Matrix, M: Matrix) -> float:
+def faint_shift(K: Matrix, M: Matrix, noise: np.ndarray | None = None) -> float:
     """A negative σ so small that it is seen only where K has no stiffness at all.
 
     Parameters
     ----------
     K, M : array or sparse matrix, shape (n, n)
+    noise : numpy.ndarray of shape (n,) or None, optional
+        Of K's diagonal, where it is known.
 
     Returns
     -------
     float
     """
-    k, m = K.diagonal(), M.diagonal()
+    k, m = np.abs(K.diagonal()), M.diagonal()
     both = (k > 0) & (m > 0)
     if not both.any():
         return -TINY
     ratios = k[both] / m[both]
-    return -TINY * float(ratios[ratios > FAINT * np.median(ratios)].min())  # less may be rounding over a mass
+    clear = ratios > FAINT * np.median(ratios)  # less may be rounding over a mass
+    if noise is not None:
+        clear |= k[both] > SURE * noise[both]
+    return -TINY * float(ratios[clear].min())
