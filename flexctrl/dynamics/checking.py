@@ -15,7 +15,7 @@ from flexctrl.dynamics.checkpoint import Checkpoint, machine_of
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
-from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, told_beside
+from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
 from flexctrl.dynamics.notes.gap import Gap, between
 from flexctrl.dynamics.records.record import InMemory
 from flexctrl.dynamics.run import Run, Status, Tolerance
@@ -33,6 +33,7 @@ _FARTHER = 5.0 / 3.0
 """How far the last one is, in powers: 243 times the tolerance."""
 _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
+_NEARLY = 0.003
 _UNCHECKED = "how far small differences have grown is not told by another run"
 
 
@@ -162,7 +163,25 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
         return standing
     grown = (farther.longer**run.report.order - 1.0) / (coarser.longer**run.report.order - 1.0)
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
-    return elsewhere(standing, third.gap, journey, farther.said) if astray else standing
+    if astray:
+        return elsewhere(standing, third.gap, journey, farther.said)
+    return _confirmed(run, standing, journey, method, beginning) if rattles(journey) else standing
+
+
+def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning) -> Run:
+    """The run with what a finer one tells of it, if that is more.
+
+    Where corners come one after another errors go by no power of the steps: what coarser runs make of them may well be
+    too little, if it is not far less than what would be noted.
+    """
+    if news(told, run) or max(told.report.error, *told.report.output_errors.values(), 0.0) < _NEARLY:
+        return told
+    again = replace(run, checkpoint=told.checkpoint)
+    finer = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, 0.5), beginning)[0]
+    if finer.report.error > told.report.error:
+        return _as_much(finer, told)
+    notes = (*told.report.notes, *(note for note in finer.report.notes if note not in run.report.notes))
+    return _as_much(replace(told, checkpoint=finer.checkpoint, report=replace(told.report, notes=notes)), finer)
 
 
 @dataclass(frozen=True)

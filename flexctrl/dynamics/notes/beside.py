@@ -19,7 +19,18 @@ from flexctrl.model.model import Model
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["PARTED", "TOLD", "agreeing", "can_be_told", "elsewhere", "kept_short", "may_grow", "shorter", "told_beside"]
+__all__ = [
+    "PARTED",
+    "TOLD",
+    "agreeing",
+    "can_be_told",
+    "elsewhere",
+    "kept_short",
+    "may_grow",
+    "rattles",
+    "shorter",
+    "told_beside",
+]
 
 _SWUNG, _FAR = 0.25, 0.02
 """What swings by less is nearly linear; what goes as far may snap through, or swing on a far larger machine."""
@@ -32,6 +43,7 @@ _LEAST, _ALL = 0.1, 0.995
 _ASTRAY, PARTED = 0.1, 0.2
 """Runs that have parted by more may both be wrong: no share of that is sure to be the finer one's."""
 _MORE = 1.2
+_AGAIN = 4
 _GROWN = "small differences grow, or steps are too long"
 _ELSEWHERE = (
     "{where} goes elsewhere in a run {how} ({far:.2g} of the motion away, from t = {t:.3g} s): {grown}, and what is "
@@ -94,6 +106,22 @@ def shorter(journey: Journey, law: Manner) -> float:
         return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
     return 0.5 if kept_short(journey) or (fixed and _cornered(journey, {*journey.watch.corner_names})) else 1.0
+
+
+def rattles(journey: Journey) -> bool:
+    """Tell whether a run has met corners again and again: what two coarser ones tell is a guess there.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    bool
+    """
+    names = {*journey.watch.corner_names}
+    return sum(event.name in names for event in journey.events) >= _AGAIN
 
 
 def _cornered(journey: Journey, names: set[str]) -> bool:
