@@ -296,8 +296,7 @@ class Ride:
         j.mark.follow, j.mark.cap, j.mark.led = m.follow, m.cap, m.led
         if not self.legs.parts:
             return False
-        # what breaks loose does so in a step by itself, whoever lets the inputs jump
-        j.balked, j.mark.stuck, j.mark.taken = self.balked or not self.jumped, 0, m.taken
+        j.balked, j.mark.stuck, j.mark.taken = self.balked, 0, m.taken
         self.legs.end = j.point = self.stepper.leave(self.supply)
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)
@@ -308,7 +307,18 @@ class Ride:
         if self.leapt:
             leapt(j)
         if not self.jumped:
-            held = replace(j.point, state=under(j, self.supply.u))
-            j.point = self.stepper.plain.renew(held, self.supply, j.mark.size)
-            j.books.turn(j.point, j.mark.size)
+            self._torn()
         return True
+
+    def _torn(self) -> None:
+        """Let inputs jump under which contacts may not hold.
+
+        What breaks loose does so in a step by itself, whoever lets the inputs jump.
+        """
+        j = self.journey
+        after = self.stepper.leap(j.point, self.supply, j.mark.size)
+        if after is None:
+            j.balked, held = True, replace(j.point, state=under(j, self.supply.u))
+            after = self.stepper.plain.renew(held, self.supply, j.mark.size)
+        j.point = after
+        j.books.turn(j.point, j.mark.size)

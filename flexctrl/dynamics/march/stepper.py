@@ -126,16 +126,22 @@ class MarchingStepper:
         return self.plain.renew(point, supply, step)
 
     def leap(self, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint | None:
-        """Return a point under other inputs as a ride does, whose contacts hold; None where one may not."""
-        self.enter(point)
-        self.marcher.about_to(step)
-        contacts = self.marcher.contacts
-        contacts.watched = int(contacts.count > 0)
-        status = self.marcher.jump(supply.u)
-        contacts.watched = 0
-        if status == DONE:
-            return self.leave(supply)
-        self._here = None
+        """Return a point under other inputs as a ride does, whose contacts hold; None where one does not.
+
+        Contacts that share what they bear are looked at where a single one could not bear it all.
+        """
+        contacts, switches = self.marcher.contacts, self.plain.model.switches
+        for watched in (1, 0):
+            self.enter(point)
+            self.marcher.about_to(step)
+            contacts.watched = watched * int(contacts.count > 0)
+            status = self.marcher.jump(supply.u)
+            contacts.watched = 0
+            if status == DONE:
+                return self.leave(supply)
+            self._here = None
+            if switches.phases(switches.under(point.state, supply.u)).tolist() != switches.phases(point.state).tolist():
+                return None
         return None
 
     def exactly(self, point: AlphaPoint, h: float) -> AlphaPoint:
