@@ -10,6 +10,7 @@ from flexctrl.dynamics.events.nearing import LEAST, NUDGES
 from flexctrl.dynamics.march.books import accept, copy, reach
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import comes_through, value
+from flexctrl.dynamics.march.holding import lets_go
 from flexctrl.dynamics.march.impact import follow_impact, pushed, stiffness
 from flexctrl.dynamics.march.joining import start_anew
 from flexctrl.dynamics.march.judging import chosen
@@ -31,11 +32,11 @@ def turn_corner(m: March, size: float) -> int:
     Steps are of some size from there on. Where that is not for the loops, nothing has happened.
     """
     h = m.h
-    if m.corners.turning == 0 or m.leaping == 1 or m.contacts.count > 0:
+    if m.corners.turning == 0 or m.leaping == 1 or m.contacts.stuck > 0:
         return CORNER
     found = shortened(m)
     end = m.h
-    if not found or in_the_way(m):
+    if not found or in_the_way(m) or (m.contacts.count > 0 and lets_go(m)):
         m.h = h
         m.phase = FRESH
         return CORNER
