@@ -160,7 +160,9 @@ _FAMILY, _LARGE = 3, ("tests/dynamics/", "tests/effects/", "tests/model/", "test
 """Of one test in these rooms so many cases are run, evenly spread over all; the others with -m long."""
 
 
+_LATER = ("tests/dynamics/",)
 _LAST = ("tests/study/", "tests/examples/", "tests/test_howto", "tests/test_cli", "tests/test_report")
+"""Rooms that take the longest: where time runs out, all others have been through."""
 _END = float(os.environ.get("FLEXCTRL_TESTS_END", "inf"))
 """When whatever is left is skipped [s since 1970]: CI has twenty minutes, and its machines are not alike."""
 
@@ -173,8 +175,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the long cases, and those between their like; whole studies come last."""
-    items.sort(key=lambda item: item.nodeid.startswith(_LAST))
+    """Mark the long cases, and those between their like; what takes longest comes last."""
+    items.sort(key=lambda item: (item.nodeid.startswith(_LAST), item.nodeid.startswith(_LATER)))
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.nodeid.endswith(LONG):
