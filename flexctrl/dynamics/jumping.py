@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +14,12 @@ from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
+    from flexctrl.dynamics.alpha.point import AlphaPoint
+    from flexctrl.dynamics.feed import Supply
     from flexctrl.dynamics.journey import Journey
+    from flexctrl.dynamics.march.stepper import MarchingStepper
 
-__all__ = ["coming", "leapt", "under"]
+__all__ = ["coming", "leapt", "torn", "under"]
 
 
 def coming(journey: Journey, t: float) -> float:
@@ -34,6 +38,19 @@ def under(journey: Journey, u: np.ndarray) -> State:
     for switch in np.flatnonzero(loose):
         journey.happens(Crossing(state.t, len(journey.watch.events) + int(switch), True), state, u)
     return torn
+
+
+def torn(journey: Journey, stepper: MarchingStepper, fresh: Supply, step: float) -> tuple[AlphaPoint, AlphaPoint]:
+    """Let inputs jump under which contacts may not hold; return the point before and after.
+
+    What breaks loose does so in a step by itself, whoever lets the inputs jump.
+    """
+    held = journey.point
+    after = stepper.leap(held, fresh, step)
+    if after is None:
+        journey.balked, held = True, replace(held, state=under(journey, fresh.u))
+        after = stepper.plain.renew(held, fresh, step)
+    return held, after
 
 
 def leapt(journey: Journey) -> None:

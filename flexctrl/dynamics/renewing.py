@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.jumping import coming, leapt, under
+from flexctrl.dynamics.jumping import coming, leapt, torn, under
 from flexctrl.dynamics.march.ride import rides
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.steps import Twofold
@@ -40,11 +40,11 @@ def renew(journey: Journey, stop: float) -> None:
 
 def _jump(journey: Journey, fresh: Supply, step: float) -> None:
     """Let the inputs jump, as a ride does where steps are marched, with a step about to be taken."""
-    stepper, held, after = journey.stepper, journey.point, None
+    stepper, held = journey.stepper, journey.point
     if isinstance(stepper, MarchingStepper) and journey.plan.model.switches.names and rides(journey):
-        after = stepper.leap(held, fresh, step)
-        stepper, journey.balked = stepper.plain, after is None
-    if after is None:
+        journey.balked = False
+        held, after = torn(journey, stepper, fresh, step)
+    else:
         held = replace(held, state=under(journey, fresh.u))
         after = stepper.renew(held, fresh, step)
     journey.point = after

@@ -20,6 +20,7 @@ from flexctrl.linear.krylov import Space
 from flexctrl.linear.pencil import (
     EPS,
     HIDDEN,
+    SOFT_NOISE,
     TINY,
     DensePencil,
     Matrix,
@@ -32,7 +33,6 @@ from flexctrl.linear.pencil import (
 __all__ = ["Eigenpairs", "complete_pairs", "coordinate_scales", "lowest_pairs", "stiffness_noise"]
 
 RIGID_NOISE = 30.0
-SOFT_NOISE = 1e6
 RIGID_GAP = 1e-8
 UNCLEAR = 1e5 * EPS
 SHORT_SPAN, LONG_SPAN = 1e4, 1e7
@@ -115,7 +115,7 @@ def complete_pairs(
         low = int(np.count_nonzero(lam <= middle))
         lam[:low], phi[:, :low] = shifted.ritz(phi[:, :low])
         if middle > LONG_SPAN * lowest:
-            _mend_between(pencil, lam, phi, middle)
+            _mend_between(pencil, lam, phi, middle, float(np.sqrt(top / middle)))
         if EPS * top > lowest:  # direct ones are blurred past the softest, which then are in all that was found of them
             lam[:low], phi[:, :low] = shifted.ritz(_orthonormal(pencil.M, phi[:, :low]))
     else:
@@ -124,14 +124,14 @@ def complete_pairs(
     return replace(pairs, misfit=_misfit(shifted, pairs))
 
 
-def _mend_between(pencil: DensePencil, lam: np.ndarray, phi: np.ndarray, middle: float) -> None:
+def _mend_between(pencil: DensePencil, lam: np.ndarray, phi: np.ndarray, middle: float, reach: float) -> None:
     """Find pairs about the middle of a long spectrum anew, in place: both ends are too far away to tell their λ.
 
     A shift of −s leaves in λ an error of about EPS (λ/s + s/λ) λ.
     """
-    under = int(np.count_nonzero(lam <= middle * np.sqrt(float(lam[-1]) / middle)))
+    under = int(np.count_nonzero(lam <= middle * reach))
     found, shapes = pencil.below_all(-middle).ritz(_orthonormal(pencil.M, phi[:, :under]))
-    near = found > middle * np.sqrt(middle / float(lam[-1]))
+    near = found > middle / reach
     lam[:under][near], phi[:, :under][:, near] = found[near], shapes[:, near]
 
 

@@ -21,6 +21,7 @@ __all__ = [
     "EPS",
     "HIDDEN",
     "SINGULAR",
+    "SOFT_NOISE",
     "TINY",
     "DensePencil",
     "Matrix",
@@ -35,7 +36,7 @@ HIDDEN, SINGULAR = -1, -2
 TINY = 1e-12
 FAINT = 100.0 * EPS
 FIRM = 1e-9
-SURE = 1e6
+SOFT_NOISE = 1e6
 
 Matrix: TypeAlias = "np.ndarray | sp.csc_matrix"
 
@@ -307,5 +308,5 @@ def faint_shift(K: Matrix, M: Matrix, noise: np.ndarray | None = None) -> float:
     ratios = k[both] / m[both]
     clear = ratios > FAINT * np.median(ratios)  # less may be rounding over a mass
     if noise is not None:
-        clear |= k[both] > SURE * noise[both]
+        clear |= k[both] > SOFT_NOISE * noise[both]
     return -TINY * float(ratios[clear].min())

@@ -16,7 +16,7 @@ import numpy as np
 from flexctrl.dynamics.events.switching import beyond
 from flexctrl.dynamics.events.watch import Crossing
 from flexctrl.dynamics.inputs import Stepwise
-from flexctrl.dynamics.jumping import coming, leapt, under
+from flexctrl.dynamics.jumping import coming, leapt, torn
 from flexctrl.dynamics.march.guarding import EVENT, guarded, warily
 from flexctrl.dynamics.march.law_inside import told
 from flexctrl.dynamics.march.law_outside import samples
@@ -307,18 +307,6 @@ class Ride:
         if self.leapt:
             leapt(j)
         if not self.jumped:
-            self._torn()
+            j.point = torn(j, self.stepper, self.supply, j.mark.size)[1]
+            j.books.turn(j.point, j.mark.size)
         return True
-
-    def _torn(self) -> None:
-        """Let inputs jump under which contacts may not hold.
-
-        What breaks loose does so in a step by itself, whoever lets the inputs jump.
-        """
-        j = self.journey
-        after = self.stepper.leap(j.point, self.supply, j.mark.size)
-        if after is None:
-            j.balked, held = True, replace(j.point, state=under(j, self.supply.u))
-            after = self.stepper.plain.renew(held, self.supply, j.mark.size)
-        j.point = after
-        j.books.turn(j.point, j.mark.size)

@@ -44,6 +44,7 @@ _ASTRAY, PARTED = 0.1, 0.2
 """Runs that have parted by more may both be wrong: no share of that is sure to be the finer one's."""
 _MORE = 1.2
 _AGAIN = 4
+"""So many corners: what follows the last hangs on all before."""
 _GROWN = "small differences grow, or steps are too long"
 _ELSEWHERE = (
     "{where} goes elsewhere in a run {how} ({far:.2g} of the motion away, from t = {t:.3g} s): {grown}, and what is "
