@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -103,12 +103,21 @@ class Signals:
 
     def slopes(self, state: State, rates: np.ndarray, raw: int) -> tuple[sp.csr_matrix, sp.csr_matrix]:
         """Return ∂outputs/∂(raw motion) and ∂outputs/∂(raw rates)."""
-        place, speed = [], []
-        for i, m in enumerate(self.measures):
-            cells, on_place, speed_cells, on_speed = m.slope(state, rates)
-            place += [(i, c, v) for c, v in zip(cells, on_place, strict=True)]
-            speed += [(i, c, v) for c, v in zip(speed_cells, on_speed, strict=True)]
-        return _matrix(place, len(self.measures), raw), _matrix(speed, len(self.measures), raw)
+        slopes = [m.slope(state, rates) for m in self.measures]
+        return _slope([s[:2] for s in slopes], raw), _slope([s[2:] for s in slopes], raw)
+
+    def sight(self, state: State, rates: np.ndarray, raw: int) -> sp.csr_matrix:
+        """Return ∂outputs/∂(raw motion) alone."""
+        return _slope([m.slope(state, rates)[:2] for m in self.measures], raw)
+
+
+def _slope(rows: Sequence[tuple[np.ndarray, np.ndarray]], raw: int) -> sp.csr_matrix:
+    """Cells of rows and what is in them, as a matrix."""
+    ends = np.cumsum([0, *(len(cells) for cells, _ in rows)])
+    cells, values = (np.concatenate(part) for part in zip(_none, *rows, strict=True))
+    found = sp.csr_matrix((values, cells, ends), shape=(len(rows), raw))
+    found.sum_duplicates()
+    return found
 
 
 def _matrix(entries: list, rows: int, columns: int) -> sp.csr_matrix:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeGuard
@@ -346,10 +345,8 @@ class Marcher(Loops):
         self.supply(u)
         return self._through(START)
 
-    def states(self) -> Sequence[State]:
+    def states(self) -> Later:
         """Return the states kept in the last call; they are made when one is looked at."""
         count, width = self.march.kept, self._state_width
-        if not count:
-            return ()
         table = self.march.states[: count * width].reshape(count, width).copy()
-        return Later(count, float(table[-1, -1]), partial(states_of, self.flattened, table, self.dry))
+        return Later(table, partial(states_of, self.flattened, dry=self.dry))

@@ -213,7 +213,7 @@ class Ride:
             rows.between(self.weaver, table, Stepwise(np.vstack([before, commands])), to_jump)
             return
         states, kept = self.marcher.states(), done - to_jump
-        states = states[:kept] if len(states) == done else states
+        states = states.picked(slice(kept)) if len(states) == done else states
         if kept:
             rows.sampled(table[:kept], commands[:kept], states, 1e-6 * self.journey.mark.size)
 
@@ -253,7 +253,7 @@ class Ride:
             return
         states = marcher.states()
         rows.ridden(self.last, marcher.rows[: leg.steps], states, leg.supply, inputs, to_jump)
-        self.last = states[-1] if len(states) == leg.steps else self.last
+        self.last = states.newest if len(states) == leg.steps else self.last
 
     def _renew(self, stop: float) -> bool:
         """Take a sample, or pass a break of a continuous command, and let the inputs jump."""

@@ -58,8 +58,7 @@ class Weaver:
     @property
     def last(self) -> Later:
         """The state that the next steps start from, to be made when it is looked at."""
-        row = self.weave.first.copy()
-        return Later(1, float(row[-1]), partial(states_of, self.flattened, row[None], self.dry))
+        return Later(self.weave.first.copy()[None], partial(states_of, self.flattened, dry=self.dry))
 
     def rows(
         self, steps: np.ndarray, times: np.ndarray, ends: np.ndarray, due: float, spacing: float
@@ -93,9 +92,7 @@ class Weaver:
             found[part] = w.rows[: count * self.columns].reshape(count, -1)
             if w.kept:
                 table = w.drawn[: w.kept * self.width].reshape(w.kept, -1).copy()
-                drawn.append(
-                    Later(len(table), float(table[-1, -1]), partial(states_of, self.flattened, table, self.dry))
-                )
+                drawn.append(Later(table, partial(states_of, self.flattened, dry=self.dry)))
         return found, drawn
 
     def reading(self, step: int, t: float) -> list[float]:

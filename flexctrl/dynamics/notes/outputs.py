@@ -62,8 +62,9 @@ def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:
     model, late = journey.plan.model, journey.drift.late
     if not (isinstance(model, Model) and late.size and len(y) > 2):
         return OutputErrors({})
-    off = reach(journey) @ late
-    way, judged = seen(journey, y)
+    sight = reach(journey)
+    off = sight @ late
+    way, judged = _seen(journey, y, sight)
     shares = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in judged}
     return OutputErrors(shares, _notes(journey, y, shares, journey.drift.share, _BY_SUMS))
 
@@ -106,15 +107,19 @@ def reach(journey: Journey) -> sp.csr_matrix:
     """Return by how much each degree of freedom moves each output, without signs, shape (outputs, n)."""
     model, state = journey.plan.model, journey.point.state
     still = np.zeros(model.motion.raw)
-    return abs(model.signals.slopes(state, still, still.size)[0] @ model.motion.jacobian(state))
+    return abs(model.signals.sight(state, still, still.size) @ model.motion.jacobian(state))
 
 
 def seen(journey: Journey, y: np.ndarray) -> tuple[np.ndarray, list[int]]:
     """Return how far outputs go, and which are places or angles that go farther than absolute tolerances."""
+    return _seen(journey, y, reach(journey))
+
+
+def _seen(journey: Journey, y: np.ndarray, sight: sp.csr_matrix) -> tuple[np.ndarray, list[int]]:
     model, tolerance = journey.plan.model, journey.plan.tolerance
     assert isinstance(model, Model)
     yards = yardsticks(model)
-    least = _SEEN * tolerance.absolute * (reach(journey) @ np.where(np.isfinite(yards), yards, 0.0))
+    least = _SEEN * tolerance.absolute * (sight @ np.where(np.isfinite(yards), yards, 0.0))
     way = _ways(journey, y)
     return way, [i for i in placed(model) if way[i] > least[i]]
 

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import overload
 
+import numpy as np
+
 from flexctrl.model.state import State
 
 __all__ = ["Frames", "Later"]
@@ -41,22 +43,35 @@ class Later(_Made):
 
     Parameters
     ----------
-    count : int
-    last : float
-        Time of the last one [s].
+    table : numpy.ndarray, shape (states, numbers)
+        A row of each; the last number is its time [s].
     make : callable
-        Makes them all.
+        Makes the states of rows.
     """
 
-    def __init__(self, count: int, last: float, make: Callable[[], list[State]]) -> None:
-        self.size, self.last, self.make = count, last, make
+    def __init__(self, table: np.ndarray, make: Callable[[np.ndarray], list[State]]) -> None:
+        self.table, self.make = table, make
 
     def __len__(self) -> int:
-        return self.size
+        return len(self.table)
+
+    @property
+    def last(self) -> float:
+        """Time of the last one [s]."""
+        return float(self.table[-1, -1])
+
+    @cached_property
+    def newest(self) -> State:
+        """The last one, without all others."""
+        return self.make(self.table[-1:])[0]
+
+    def picked(self, which: slice | np.ndarray) -> Later:
+        """Return some of them."""
+        return Later(self.table[which], self.make)
 
     def made(self) -> list[State]:
         """Make them."""
-        return self.make()
+        return self.make(self.table)
 
 
 class Frames(_Made):

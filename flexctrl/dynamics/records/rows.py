@@ -148,7 +148,7 @@ class Rows:
         self.count += len(chosen)
         self.recorder.rows(table[chosen], inputs.at(chosen, np.ones(len(chosen), dtype=bool), table[chosen]))
 
-    def sampled(self, table: np.ndarray, commands: np.ndarray, states: Sequence[State], slack: float) -> None:
+    def sampled(self, table: np.ndarray, commands: np.ndarray, states: Later, slack: float) -> None:
         """Write the rows of many steps with inputs of their own, and keep the states due for drawing."""
         if self.every is not None:
             times = table[:, 0]
@@ -156,7 +156,7 @@ class Rows:
             found = np.searchsorted(times, self.every * np.arange(self.count, ahead) - slack)
             chosen = found[found < len(times)]
             if len(states) == len(table):
-                states = [states[i] for i in chosen]
+                states = states.picked(chosen)
             table, commands = table[chosen], commands[chosen]
         self.frames.take(states)
         self.count += len(table)
