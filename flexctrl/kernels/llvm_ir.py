@@ -213,8 +213,12 @@ def translate(kernel: Kernel, lanes: int, chunks: tuple[int, ...] = (), written:
 
 
 def _chunk(number: int, lanes: int) -> list[str]:
-    """Assembly that reads a chunk: a vector for each lane, made into rows of x."""
-    name, real, lines = f"%c{number}", f"<{lanes} x double>", []
+    """Assembly that reads a chunk: a vector for each lane, made into rows of x.
+
+    It is read in halves, put together as the first exchange would put them: shuffles across halves are slow.
+    """
+    name, lines, half = f"%c{number}", [], lanes // 2
+    part, mask = f"<{half} x double>", ", ".join(f"i32 {j}" for j in range(lanes))
     for i in range(lanes):
         at = f"{name}.{i}"
         lines += [
@@ -222,9 +226,15 @@ def _chunk(number: int, lanes: int) -> list[str]:
             f"  {at}.s = load i32, ptr {at}.i",
             f"  {at}.w = zext i32 {at}.s to i64",
             f"  {at}.z = getelementptr double, ptr %z, i64 {at}.w",
-            f"  {at}.1 = load {real}, ptr {at}.z, align 8",
+            f"  {at}.r = getelementptr double, ptr {at}.z, i64 {half}",
+            f"  {at}.low = load {part}, ptr {at}.z, align 8",
+            f"  {at}.high = load {part}, ptr {at}.r, align 8",
         ]
-    return [*lines, *_transposed(name, lanes), *_stored(name, number, lanes, "x")]
+    for i in range(half):
+        for row, side in ((i, "low"), (i + half, "high")):
+            pair = f"{part} {name}.{i}.{side}, {part} {name}.{i + half}.{side}"
+            lines.append(f"  {name}.{row}.1 = shufflevector {pair}, <{lanes} x i32> <{mask}>")
+    return [*lines, *_exchanged(name, lanes, half), *_stored(name, number, lanes, half, "x")]
 
 
 def _lanes_of(number: int, lanes: int) -> list[str]:
@@ -235,13 +245,13 @@ def _lanes_of(number: int, lanes: int) -> list[str]:
             f"  {name}.{i}.y = getelementptr {real}, ptr %y, i64 {number * lanes + i}",
             f"  {name}.{i}.1 = load {real}, ptr {name}.{i}.y, align 8",
         ]
-    return [*lines, *_transposed(name, lanes), *_stored(name, number, lanes, "y")]
+    return [*lines, *_exchanged(name, lanes, lanes), *_stored(name, number, lanes, lanes, "y")]
 
 
-def _transposed(name: str, lanes: int) -> list[str]:
-    """Assembly that exchanges rows and columns of a square of vectors, halves by halves."""
+def _exchanged(name: str, lanes: int, end: int) -> list[str]:
+    """Assembly that exchanges rows and columns of a square of vectors: single ones, pairs, up to half the end."""
     real, lines, half = f"<{lanes} x double>", [], 1
-    while half < lanes:
+    while half < end:
         for i in (i for i in range(lanes) if not i & half):
             pair = f"{real} {name}.{i}.{half}, {real} {name}.{i + half}.{half}"
             for row, shift in ((i, 0), (i + half, half)):
@@ -252,12 +262,12 @@ def _transposed(name: str, lanes: int) -> list[str]:
     return lines
 
 
-def _stored(name: str, number: int, lanes: int, matrix: str) -> list[str]:
+def _stored(name: str, number: int, lanes: int, end: int, matrix: str) -> list[str]:
     real, lines = f"<{lanes} x double>", []
     for i in range(lanes):
         lines += [
             f"  {name}.{i}.to = getelementptr {real}, ptr %{matrix}, i64 {number * lanes + i}",
-            f"  store {real} {name}.{i}.{lanes}, ptr {name}.{i}.to, align 8",
+            f"  store {real} {name}.{i}.{end}, ptr {name}.{i}.to, align 8",
         ]
     return lines
 

@@ -27,6 +27,7 @@ def function(make, *shapes):
 
 VECTOR = function(rotation.rotation_vector, (3, 3))
 MATRIX = function(rotation.rotation_of, (3,))
+NEAR = function(rotation.near_rotation_of, (3,))
 INVERSE = function(rotation.inverse_tangent, (3,), (3,))
 
 
@@ -35,6 +36,16 @@ INVERSE = function(rotation.inverse_tangent, (3,), (3,))
 def test_rotation_vector_undoes_the_exponential(axis, angle):
     theta = angle * axis
     assert np.allclose(VECTOR(expm(skew(theta))), theta, rtol=0, atol=1e-13 + 1e-15 * angle)
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("angle", [a for a in ANGLES if a <= rotation.NEAR] + [rotation.NEAR])
+def test_polynomials_turn_as_the_exponential_does(axis, angle):
+    """For all components within NEAR: up to 1.39 rad."""
+    theta = angle * axis / np.abs(axis).max()
+    exact = Rotation.from_rotvec(theta).as_matrix()
+    assert np.allclose(NEAR(theta), exact, rtol=0, atol=3e-16)
+    assert np.allclose(NEAR(theta), MATRIX(theta), rtol=0, atol=5e-16)
 
 
 @pytest.mark.parametrize(("gap", "tolerance"), [(1e-2, 1e-12), (1e-4, 1e-10), (1e-6, 1e-8)])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
 from flexctrl.kernels.native import Packed, Reals
@@ -92,6 +93,20 @@ def test_flat_models_do_what_models_do(name, bending, compiled):
     if model.motion.plain:
         slope = model.slope(end, v, a, (1.0, 20.0, 400.0), u).tocoo()
         close(m.entries[flattened.plan.places(slope.row, slope.col)], slope.data)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("turn", [1e-9, 0.3, 0.799, 0.801, 2.5, 9.0, 300.0])
+def test_steps_turn_nodes_by_any_angle(turn, compiled):
+    """By polynomials where they turn little, by sine and cosine elsewhere."""
+    body = fc.RigidBody("body", (0, 0, 0), mass=2.0, inertia=(0.1, 0.2, 0.25))
+    model = fc.assemble(fc.Structure([body]), [fc.LargeRotation()])
+    step = turn * np.array([0.1, -0.2, 0.05, 0.6, -1.0, 0.8])
+    start, still = model.displace(np.array([0.0, 0, 0, 1.0, -0.4, 0.7])), np.zeros(model.n)
+    flattened = evaluated(model, start, step, still, still, np.zeros(0), compiled)[1]
+    reached = flattened.state(still, 0.8, model.rest.dry)
+    exact = Rotation.from_rotvec(step[3:]) * Rotation.from_matrix(start.R[0])
+    assert np.abs(reached.R[0] - exact.as_matrix()).max() < 1e-15 * max(2.0, turn)
 
 
 def evaluated(model, start, step, v, a, u, compiled) -> tuple[Once, Flattened]:

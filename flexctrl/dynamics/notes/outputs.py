@@ -106,6 +106,7 @@ def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float, kind
 def reach(journey: Journey) -> sp.csr_matrix:
     """Return by how much each degree of freedom moves each output, without signs, shape (outputs, n)."""
     model, state = journey.plan.model, journey.point.state
+    assert isinstance(model, Model)
     still = np.zeros(model.motion.raw)
     return abs(model.signals.sight(state, still, still.size) @ model.motion.jacobian(state))
 

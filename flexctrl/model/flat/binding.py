@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.mechanics.rotation import turn_kernel
+from flexctrl.mechanics.rotation import near_rotation_of, rotation_of, turn_kernel
 from flexctrl.model.flat.entries import entry, entry_energy, entry_slope
 from flexctrl.model.flat.unfolding import unfolded_tangents
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
@@ -82,12 +82,14 @@ def _gust_slopes(layout: Layout, places: np.ndarray) -> Run:
     return bind(gusts.kernels.tangent, gather, gusts.parameters, scatter)
 
 
-def turn(layout: Layout, nodes: np.ndarray) -> Run:
-    """Rotations of nodes, turned by a step."""
+def turn(layout: Layout, nodes: np.ndarray) -> tuple[Run, Run]:
+    """Rotations of nodes, turned by a step that turns them little, or by any."""
     old = layout.starts["pose"] + 12 * nodes[:, None] + 3 + np.arange(9)
     theta = layout.starts["step"] + layout.position[layout.owned[nodes, 3:]]
     new = NODE_SLOT * nodes[:, None] + 3 + np.arange(9)
-    return layout.backend.bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(nodes), 0)), new)
+    both, none = np.hstack([old, theta]), np.zeros((len(nodes), 0))
+    near, far = (layout.backend.bind(turn_kernel(by), both, none, new) for by in (near_rotation_of, rotation_of))
+    return near, far
 
 
 def linkage(layout: Layout) -> dict[str, tuple[Run, ...]]:

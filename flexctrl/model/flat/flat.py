@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.eights import eight, larger, largest, put
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
+from flexctrl.mechanics.rotation import NEAR
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.motion import FAST
 
@@ -40,6 +41,7 @@ HIDDEN = frozenset({"slots", "drawn", "back", "units"})
 _TURN = 2.0 * math.pi
 _POSE = 12
 _FAST = FAST
+_NEAR = NEAR
 
 
 @dataclass
@@ -89,7 +91,9 @@ class Flat:
         Inputs.
     shift : Reals *
         How far all nodes are shifted and turned from the drawn shape, for models in small motion.
-    turn, winding, forces, tangents, energies, shifts : Runs
+    turn : Runs
+        Kernels that turn nodes by a step: by little, and by any.
+    winding, forces, tangents, energies, shifts : Runs
         Kernels; of the linkage's drives: driven coordinates, and what steps add to them.
     placing, rating, changing, carrying : Runs
         What levers do: places, rates, accelerations; forces.
@@ -204,8 +208,8 @@ def place(f: Flat) -> None:
         i = f.moved[k]
         for j in range(3):
             f.z[NODE_SLOT * i + j] = f.pose[_POSE * i + j] + f.step[f.cells[6 * i + j]]
-    for k in range(f.turns):
-        f.turn[k](f.z, f.z)
+    if f.turns > 0:
+        f.turn[turned_far(f)](f.z, f.z)
     if f.shifting > 0:
         clear(f.shifting, f.shift)
         f.shifts[0](f.z, f.z)
@@ -219,6 +223,14 @@ def place(f: Flat) -> None:
         wind(f)
     for i in range(f.drives, f.drives + f.inner):
         f.z[f.drive_base + DRIVE_SLOT * i] = f.q[f.shafts[i]] + f.step[f.shafts[i]]
+
+
+def turned_far(f: Flat) -> int:
+    """Return 1 where the step may turn nodes far, 0 elsewhere: which kernel turns them."""
+    most = abs(eight(f.step))
+    for i in range(8, f.padded, 8):
+        most = larger(most, abs(eight(f.step[i:])))
+    return 0 if largest(most) <= _NEAR else 1
 
 
 def clear(n: int, x: Reals) -> None:

@@ -261,7 +261,7 @@ class Layout:
         own_tangents = (m.plain and not self.model.signals.follows) or self.unfolds
         damped = bool(self.model.viscous.nnz)
         return {
-            "turn": (binding.turn(self, turned),) if len(turned) else (),
+            "turn": binding.turn(self, turned) if len(turned) else (),
             **binding.linkage(self),
             "winding": binding.winding(self, "pose") if m.drives else (),
             "forces": (*binding.forces(self), *([binding.entry_forces(self)] if damped else [])),

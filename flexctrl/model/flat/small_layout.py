@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.mechanics.rotation import turned_rows
+from flexctrl.mechanics.rotation import rotation_of, turned_rows
 from flexctrl.model.flat import binding
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.layout import Layout
@@ -163,7 +163,7 @@ def _shifted() -> Kernel:
     import casadi as ca
 
     pose, shift = ca.SX.sym("pose", 12), ca.SX.sym("shift", 6)
-    turned = turned_rows(pose[3:], shift[3:])
+    turned = turned_rows(pose[3:], rotation_of(shift[3:]))
     return Kernel("shifted", ca.vertcat(pose, shift), ca.SX.sym("p", 0), ca.vertcat(pose[:3] + shift[:3], turned))
 
 

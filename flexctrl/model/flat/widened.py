@@ -59,7 +59,7 @@ def _runs(layout: Layout, chart: Chart, flat: Flat) -> tuple[Sequence[Run], Sequ
     if (turned := layout.own[2]).size:
         old, new = (start[:, None] + 3 + np.arange(9) for start in (starts["pose"] + 12 * turned, NODE_SLOT * turned))
         theta = steps[wide.owned[: wide.source_base].reshape(-1, 6)[turned, 3:]]
-        turn = (bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(turned), 0)), new),)
+        turn = (bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(turned), 0)), new),) * 2
     if isinstance(wide.linkage, Levers):
         at = replace(layout.lever_places, step=np.append(steps[wide.linked], none))
         beside = np.full(len(at.step) - len(at.v), at.v[-1])  # only places are asked for
