@@ -16,7 +16,10 @@ PERIOD, TORN = 0.02, 0.06
 class Rising:
     """A law whose command rises from sample to sample, and holds the arm a little."""
 
-    inputs, outputs, sample_time = ("a1", "a2"), ("t1", "t2"), PERIOD
+    inputs, outputs = ("a1", "a2"), ("t1", "t2")
+
+    def __init__(self, sample_time: float = PERIOD, haste: float = 1.0) -> None:
+        self.sample_time, self.haste = sample_time, haste
 
     def initial(self) -> np.ndarray:
         return np.zeros(0)
@@ -25,11 +28,12 @@ class Rising:
         return x
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return np.array([4.0 * t - 0.5 * y[0], 25.0 * t - 3.0 * y[1]])
+        rise = self.haste * t
+        return np.array([4.0 * rise - 0.5 * y[0], 25.0 * rise - 3.0 * y[1]])
 
 
 @cache
-def arm() -> fc.Model:
+def arm(*more: fc.Effect) -> fc.Model:
     """Two links behind elastic drives, a dry contact at each motor."""
     one = fc.RigidBody("one", (0.5, 0, 0), 1.0, (1e-3, 0.1, 0.1), {"root": (0, 0, 0), "end": (1, 0, 0)})
     two = fc.RigidBody("two", (1.3, 0, 0), 0.5, (1e-3, 0.03, 0.03), {"root": (1, 0, 0)})
@@ -42,7 +46,7 @@ def arm() -> fc.Model:
     inputs = [fc.MotorTorque(f"t{i}", drive) for i, drive in enumerate(drives, 1)]
     outputs = [fc.DriveAngle(f"a{i}", drive) for i, drive in enumerate(drives, 1)]
     dry = fc.CoulombFriction({"d1": fc.Coulomb(0.5), "d2": fc.Coulomb(1.2, 1.2, 0.1)})
-    effects = [fc.LargeRotation(), fc.ShaftElasticity(), dry]
+    effects = [fc.LargeRotation(), fc.ShaftElasticity(), dry, *more]
     return fc.assemble(fc.Structure([one, two], joints, drives, inputs, outputs), effects)
 
 
@@ -59,3 +63,19 @@ def test_it_goes_on_bit_for_bit(method):
         for name in ("x", "R", "q", "v"):
             assert np.array_equal(getattr(rest.final, name), getattr(whole.final, name)), cut
         assert rest.report.newton_iterations == whole.report.newton_iterations, cut
+
+
+@pytest.mark.parametrize("samples", [2, 5, 8, 13, 18])
+def test_it_goes_on_whatever_the_last_steps_were(samples):
+    """Steps between samples of 1 ms differ in their last digits, and torque that lags behind jumps by their length."""
+    model, law = arm(fc.MotorLag({"d1": 0.007})), Rising(1e-3, 0.05 / (1e-3 * samples))
+
+    def lagging(until: float, start: Any = None) -> fc.Run:
+        return fc.simulate(model, law, until=until, start=start, method=fc.Unchecked(fc.GeneralizedAlpha(1.3e-3)))
+
+    whole = lagging(0.05)
+    torn = whole.events[0].t
+    assert torn == pytest.approx(1e-3 * samples, abs=1e-9)
+    rest = lagging(0.05, lagging(torn + 1e-4).checkpoint)
+    for name in ("x", "R", "q", "v"):
+        assert np.array_equal(getattr(rest.final, name), getattr(whole.final, name))

@@ -307,6 +307,7 @@ class Ride:
         if self.leapt:
             leapt(j)
         if not self.jumped:
-            j.point = torn(j, self.stepper, self.supply, j.mark.size)[1]
-            j.books.turn(j.point, j.mark.size)
+            ahead = coming(j, j.point.state.t)  # not the last step: that hangs on where a run is cut
+            j.point = torn(j, self.stepper, self.supply, ahead)[1]
+            j.books.turn(j.point, ahead)
         return True
