@@ -17,6 +17,7 @@ from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
 from flexctrl.dynamics.notes.gap import Gap, between
+from flexctrl.dynamics.notes.peaks import peaked
 from flexctrl.dynamics.records.record import InMemory
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
@@ -287,7 +288,8 @@ def _said(run: Run, other: Other, journey: Journey, beginning: Beginning, order:
     """The run with what one other tells, if errors are of an order."""
     if other.run.final.t <= beginning.t:
         return _noted(run, f"{_UNCHECKED}, which ended at t = {other.run.final.t:.3g} s")
-    return told_beside(run, other.run, other.gap, journey, other.beside.longer, order, feared)
+    told = told_beside(run, other.run, other.gap, journey, other.beside.longer, order, feared)
+    return peaked(told, other.run, journey, other.beside.longer) if other.beside.longer < 1.0 else told
 
 
 def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Other | None]:

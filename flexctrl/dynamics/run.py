@@ -139,7 +139,8 @@ class Report:
     output_errors : mapping of str to float
         By how much places and angles among the outputs may be off, each over the range of its own values (1: all of
         it): a deflection of millimetres beside a travel of metres. Empty for linear models and streamed rows; those
-        that move by no more than absolute tolerances are left out.
+        that move by no more than absolute tolerances are left out. Of forces and rates those that get more than 5 %
+        larger or less so in a finer run, where one is made: over their largest value.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str

@@ -11,6 +11,7 @@ import numpy as np
 from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.gap import Gap
 from flexctrl.dynamics.notes.outputs import by_rows
+from flexctrl.dynamics.notes.peaks import unresolved
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
@@ -99,14 +100,16 @@ def shorter(journey: Journey, law: Manner) -> float:
     Returns
     -------
     float
-        A half where samples keep steps short, and in steps of one length past corners: whether a contact with little to
-        spare breaks loose is decided by a finer run, where two coarse ones may be wrong alike. A quarter for what jumps
+        A half where samples keep steps short, in steps of one length past corners, and in those that do not see a line
+        vibrate whose tension is asked for: whether a contact with little to spare breaks loose is decided by a finer
+        run, where two coarse ones may be wrong alike. A quarter for what jumps
         at every sample: of what half the steps round as the run itself does, they round a quarter otherwise.
     """
     if law is Manner.ABRUPT:
         return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
-    return 0.5 if kept_short(journey) or (fixed and _cornered(journey, {*journey.watch.corner_names})) else 1.0
+    cornered = fixed and _cornered(journey, {*journey.watch.corner_names})
+    return 0.5 if kept_short(journey) or cornered or unresolved(journey) else 1.0
 
 
 def rattles(journey: Journey) -> bool:
@@ -143,10 +146,11 @@ def may_grow(journey: Journey, law: Manner) -> bool:
     -------
     bool
         Whether something has swung by more than a quarter of a radian, gone farther than a fiftieth of the machine's
-        size, met corners, or followed a law that has corners or jumps, or is continuous, which may have some; in steps
-        of one length, if it has gone twelve times that way to and fro. Where samples keep steps short the other run is
-        a finer one, which costs twice as much as the run itself: only for what turns so far and often, or goes a
-        quarter of the machine's size so often, and for corners and jumps.
+        size, met corners, or followed a law that has corners or jumps, or is continuous, which may have some; or the
+        tension of a line is asked for whose vibration steps do not see. In steps of one length, if it has gone twelve
+        times that way to and fro. Where samples keep steps short the other run is a finer one, which costs twice as
+        much as the run itself: only for what turns so far and often, or goes a quarter of the machine's size so often,
+        and for corners and jumps.
     """
     plan, sums, watch, short = journey.plan, journey.books.sums, journey.watch, kept_short(journey)
     feed, model = plan.feed, plan.model
@@ -155,7 +159,8 @@ def may_grow(journey: Journey, law: Manner) -> bool:
     swung = sums.moved > least
     if short or isinstance(plan.method.pace, Fixed):
         swung &= sums.path > _OFTEN * least
-    return bool(swung.any()) or feed.reacting or law is not Manner.SMOOTH or _cornered(journey, own)
+    bounds = feed.reacting or law is not Manner.SMOOTH or _cornered(journey, own)
+    return bool(swung.any()) or bounds or unresolved(journey)
 
 
 def told_beside(

@@ -20,7 +20,18 @@ from flexctrl.model.rounding import DIGITS
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope, Spring
 
-__all__ = ["SHORT", "STIFF", "SURE", "TURNING", "Caution", "firmest", "noise", "stiffest", "told_by_differences"]
+__all__ = [
+    "SHORT",
+    "STIFF",
+    "SURE",
+    "TURNING",
+    "Caution",
+    "firmest",
+    "frequency_of",
+    "noise",
+    "stiffest",
+    "told_by_differences",
+]
 
 STIFF = 10.0
 """Radians of its vibration against the masses at its ends in a step that a line is stiff from on."""
@@ -85,6 +96,22 @@ def firmest(model: Plant) -> float:
     """
     wall = np.inf if once(model, _spreads).max(initial=0.0) > _HEAVY else 0.0
     return float(max(once(model, _frequencies).max(initial=0.0), wall))
+
+
+def frequency_of(model: Model, line: Line) -> float:
+    """Return the frequency of one of them [rad/s]; 0 for one that does not give way.
+
+    Parameters
+    ----------
+    model : Model
+    line : Rope, Spring or Winch
+
+    Returns
+    -------
+    float
+    """
+    lines = _lines(model)
+    return float(once(model, _frequencies)[lines.index(line)]) if line in lines else 0.0
 
 
 def told_by_differences(model: Plant) -> bool:
