@@ -98,20 +98,20 @@ def firmest(model: Plant) -> float:
     return float(max(once(model, _frequencies).max(initial=0.0), wall))
 
 
-def frequency_of(model: Model, line: Line) -> float:
-    """Return the frequency of one of them [rad/s]; 0 for one that does not give way.
+def frequency_of(model: Model, name: str) -> float:
+    """Return the frequency of one line [rad/s]; 0 where it does not give way, or does not turn.
 
     Parameters
     ----------
     model : Model
-    line : Rope, Spring or Winch
+    name : str
 
     Returns
     -------
     float
     """
-    lines = _lines(model)
-    return float(once(model, _frequencies)[lines.index(line)]) if line in lines else 0.0
+    found = dict(zip([line.name for line in _lines(model)], once(model, _frequencies).tolist(), strict=True))
+    return float(found.get(name, 0.0))
 
 
 def told_by_differences(model: Plant) -> bool:
