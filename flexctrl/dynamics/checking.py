@@ -34,8 +34,8 @@ _FARTHER = 5.0 / 3.0
 """How far the last one is, in powers: 243 times the tolerance."""
 _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
-_NEARLY = 0.003
-"""A tenth of what is noted: coarser runs have told of rattling too little by as much."""
+_NEARLY = 0.001
+"""A thirtieth of what is noted: coarser runs have told of rattling too little by seven times."""
 _UNCHECKED = "how far small differences have grown is not told by another run"
 
 
