@@ -8,7 +8,6 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from flexctrl.design.controller import Controller
 from flexctrl.dynamics.checkpoint import Checkpoint, machine_of
@@ -210,6 +209,8 @@ def _order(near: Other, far: Other, most: float) -> float:
     With errors that grow as rᵖ the gaps are as rᵖ − 1; what does not grow so, as where corners come one after another,
     has a lower order than its method.
     """
+    from scipy.optimize import brentq
+
     if not near.gap.most or _reached(near.run) != _reached(far.run):
         return most
     one, other = math.log(near.beside.longer), math.log(far.beside.longer)

@@ -15,9 +15,9 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.spatial.transform import Rotation
 
 from flexctrl.errors import EquilibriumError, StructureError
+from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.balance import Balance
 from flexctrl.model.eased import told
 from flexctrl.model.equilibrium import Rest, equilibrium, settled
@@ -251,7 +251,7 @@ def _posed(model: Model, cells: np.ndarray, state: State) -> np.ndarray:
     if model.about:  # whose rest is no drawn shape
         drawn = np.array([*(n.position for n in model.structure.nodes), (0.0, 0.0, 0.0)])
         driven = motion.unwound(drawn, np.tile(np.eye(3), (len(drawn), 1, 1)), 0.0 * driven)
-    turned = Rotation.from_matrix(state.R).as_rotvec()
+    turned = logarithm(state.R)
     nodes = np.hstack([state.x - drawn, turned]).ravel()
     return np.asarray(np.concatenate([nodes, motion.ratios * (state.driven - driven)])[cells])
 
@@ -335,7 +335,7 @@ def _leaning(model: Model, cells: np.ndarray, state: State, cell: int) -> bool:
     first = cell - cell % 6 + 3
     if {first, first + 1, first + 2} <= set(cells.tolist()):
         return False
-    theta = Rotation.from_matrix(state.R[cell // 6]).as_rotvec()
+    theta = logarithm(state.R[[cell // 6]])[0]
     rates = inverse_tangents(np.tile(theta, (3, 1)), np.eye(3)).T[cell % 6 - 3]
     rates[cell % 6 - 3] -= 1.0
     return bool(np.abs(rates).max() > _LEANING)
