@@ -188,7 +188,7 @@ class Report:
 
 
 def worst_output(errors: Mapping[str, float]) -> str:
-    """Return which output is off by the largest share of its own motion, in words.
+    """Return which output is off by the largest share of what it goes through, in words.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def worst_output(errors: Mapping[str, float]) -> str:
     str
     """
     name = max(errors, key=lambda output: errors[output])
-    return f"of the outputs {name} is off by the largest share of its own motion, up to {errors[name]:.2g}"
+    return f"of the outputs {name} is off by the largest share of what it goes through, up to {errors[name]:.2g}"
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ def test_a_deflection_of_millimetres_is_told_by_how_much_it_is_off_itself(truth,
     assert all(note.startswith("bend has moved by 0.026") for note in notes)
     assert run.report.output_errors["s"] < 1e-3
     assert set(run.report.output_errors) == {"s", "bend", "load"}
-    assert f"bend is off by the largest share of its own motion, up to {told:.2g}" in str(run.report)
+    assert f"bend is off by the largest share of what it goes through, up to {told:.2g}" in str(run.report)
 
 
 def test_the_tolerance_that_a_note_names_leaves_a_hundredth_or_so(truth):
