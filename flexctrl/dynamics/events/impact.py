@@ -26,15 +26,17 @@ LASTING = 56
 DAMPED = 0.01
 """Twice the damping ratio of an impact that is followed whether or not it is seen."""
 NO_IMPACT = 0, 0.0
-_USUAL = 1e-4
+_USUAL, _FEWEST = 1e-4, 0.2
 
 
 def finer(share: float) -> float:
     """Return how many times more steps follow a damped impact, where errors are to be less than a share of the way.
 
-    Of second order, as steps chosen by errors are: those go with the cube root of the tolerance.
+    Of second order, as steps chosen by errors are: those go with the cube root of the tolerance. Under a far larger
+    tolerance fewer do, or runs that are laid beside others to tell their errors would be off alike.
     """
-    return max(1.0, math.pow(_USUAL / share, 1.0 / 3.0))
+    times = math.pow(_USUAL / share, 1.0 / 3.0)
+    return max(1.0 if share < 2.0 * _USUAL else _FEWEST, times)
 
 
 def lasts(
