@@ -1,0 +1,82 @@
+"""Loads put on at once make stiff shafts and ropes ring: what steps see little of is named, with its closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+MOTOR, LOAD, TORQUE = 1e-4, 5.0, 5.0
+
+
+def drive(stiffness: float) -> fc.Model:
+    """A light motor that turns a heavy body by a shaft."""
+    body = fc.RigidBody("body", (0.5, 0, 0), 1.0, (3.0, 3.0, LOAD - 0.25), {"hub": (0, 0, 0)})
+    hub = body.point("hub")
+    motor = fc.RotaryDrive("motor", hub, axis="z", stiffness=stiffness, ratio=1.0, inertia=MOTOR)
+    outputs = [fc.DriveSpeed("speed", motor), fc.Rotation("angle", hub, "z")]
+    inputs = [fc.MotorTorque("torque", motor)]
+    plan = fc.Structure([body], [fc.Support(hub, "u v w rx ry")], [motor], inputs, outputs)
+    return fc.assemble(plan, [fc.LargeRotation(), fc.ShaftElasticity()])
+
+
+def ripple(stiffness: float) -> float:
+    """Of two masses under a step of torque: T I/(J (I + J) ω), ω² = k (1/J + 1/I)."""
+    omega = np.sqrt(stiffness * (1.0 / MOTOR + 1.0 / LOAD))
+    return TORQUE * LOAD / (MOTOR * (LOAD + MOTOR) * omega)
+
+
+def said(run: fc.Run) -> list[str]:
+    return [note for note in run.report.notes if "from the start on" in note]
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "method"),
+    [(1e3, fc.GeneralizedAlpha(1e-2)), (1e6, fc.GeneralizedAlpha(1e-2)), (1e6, fc.ConservingMidpoint(1e-2))],
+    ids=["alpha", "alpha, stiff", "midpoint, stiff"],
+)
+def test_motors_that_ring_behind_stiff_shafts(stiffness, method):
+    """The largest speed was a sixteenth of what it is, with nothing said."""
+    run = fc.simulate(drive(stiffness), until=1.0, inputs={"torque": TORQUE}, method=method)
+    (note,) = said(run)
+    assert run["speed"].max() < 0.9 * (1.0 + ripple(stiffness))
+    assert note.startswith(f"speed rings by up to {ripple(stiffness):.2g} from the start on")
+
+
+def test_what_steps_resolve_is_right_and_not_named():
+    run = fc.simulate(drive(1e3), until=0.05, inputs={"torque": TORQUE}, method=fc.GeneralizedAlpha(2e-5))
+    assert run["speed"].max() == pytest.approx(0.05 * TORQUE / LOAD + ripple(1e3), rel=0.01)
+    assert not said(run)
+
+
+def test_motors_at_rest_do_not_ring():
+    assert not said(fc.simulate(drive(1e6), until=1.0, method=fc.GeneralizedAlpha(1e-2)))
+
+
+def hanging(angle: float) -> fc.Model:
+    """Two kilograms on a stiff rope drawn at an angle from the vertical, and a force along it."""
+    rope = fc.Rope("rope", (0, 0, 0), (np.sin(angle), 0, -np.cos(angle)), EA=1e8, length=1.0)
+    load = fc.PointMass("load", rope.end, 2.0)
+    joints = [fc.Support(rope.start), fc.Pin(rope.end, load.node)]
+    inputs, outputs = [fc.Force("pull", load.node, "z")], [fc.Tension("tension", rope)]
+    plan = fc.Structure([rope, load], joints, inputs=inputs, outputs=outputs)
+    return fc.assemble(plan, [fc.LargeRotation(), fc.RopeStretch(), fc.Gravity()])
+
+
+def test_a_taut_rope_under_a_load_put_on_at_once():
+    """It swings about the tension that the load adds, by as much as that; at rest under its weight it does not."""
+    model, method = hanging(0.0), fc.GeneralizedAlpha(2e-3)
+    hung = fc.equilibrium(model)
+    run = fc.simulate(model, until=0.2, start=hung.state, inputs={"pull": -100.0}, method=method)
+    (note,) = said(run)
+    assert note.startswith("tension rings by up to 1e+02 from the start on")
+    assert not said(fc.simulate(model, until=0.2, start=hung, method=method))
+
+
+def test_chosen_steps_that_see_the_first_peak_but_lose_the_ringing():
+    """First twice m g cos a + F cos a; then steps grow, as what they err by in places is small."""
+    run = fc.simulate(hanging(0.3), until=0.2, inputs={"pull": -100.0})
+    assert run["tension"].max() == pytest.approx(2.0 * (2.0 * 9.81 + 100.0) * np.cos(0.3), rel=0.01)
+    (note,) = said(run)
+    assert note.startswith("tension rings by up to 1.1e+02 from the start on")
