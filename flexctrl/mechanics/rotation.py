@@ -85,7 +85,7 @@ def rotation_of(theta: ca.SX) -> ca.SX:
 
 
 def near_rotation_of(theta: ca.SX) -> ca.SX:
-    """Return exp(θ×) (casadi) of components up to `NEAR`: by polynomials, a third quicker."""
+    """Return exp(θ×) (casadi) of components up to `NEAR`: by polynomials, without roots and quotients."""
     import casadi as ca
 
     square = ca.dot(theta, theta)

@@ -102,8 +102,8 @@ def shorter(journey: Journey, law: Manner) -> float:
     float
         A half where samples keep steps short, in steps of one length past corners, and in those that do not see a line
         vibrate whose tension is asked for: whether a contact with little to spare breaks loose is decided by a finer
-        run, where two coarse ones may be wrong alike. A quarter for what jumps
-        at every sample: of what half the steps round as the run itself does, they round a quarter otherwise.
+        run, where two coarse ones may be wrong alike. A quarter for what jumps at every sample: of what half the steps
+        round as the run itself does, they round a quarter otherwise.
     """
     if law is Manner.ABRUPT:
         return 0.25
