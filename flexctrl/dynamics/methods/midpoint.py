@@ -26,7 +26,7 @@ from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step,
 from flexctrl.dynamics.swift.massless import massless
 from flexctrl.dynamics.swift.reflected import Motors
 from flexctrl.dynamics.swift.settling import settled, steadied
-from flexctrl.dynamics.swift.stiff_lines import STIFF, Caution, firmest
+from flexctrl.dynamics.swift.stiff_lines import STIFF, Caution, firmest, firmest_freedom, firmest_shaft
 from flexctrl.errors import SingularMatrixError, StructureError
 from flexctrl.model.momenta import momenta_of
 from flexctrl.model.plant import Plant
@@ -38,6 +38,8 @@ __all__ = ["ConservingMidpoint"]
 _NEWTON = 1e-12
 _ITERATIONS = 15
 _TURNED = 0.02
+_BLURRED = 1e3
+"""Radians of a single freedom in a step from where on the last digits of places make more of momenta than steps do."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,8 @@ class _Stepper:
         self.masses = Masses(self.model, self.counts)
         self.massless = False
         self.light = massless(self.feed)
-        self.firmest = firmest(self.model)
+        lines = max(firmest(self.model), firmest_shaft(self.model))
+        self.careful = min(STIFF / max(lines, 1e-300), _BLURRED / max(firmest_freedom(self.model), 1e-300))
 
     @property
     def memory(self) -> _Memory:
@@ -203,7 +206,7 @@ class _Stepper:
 
     def step(self, point: _Point, h: float) -> _Point:
         """Return the point a step later."""
-        if h * self.firmest > STIFF:
+        if h > self.careful:
             return self._carefully(point, h)
         try:
             return self._attempt(point, h, fresh=False)
@@ -239,7 +242,7 @@ class _Stepper:
         raise _astray(worst, t, h)
 
     def _carefully(self, point: _Point, h: float) -> _Point:
-        """Take a step over lines that are stiff in it, with a tangent of its own in every iteration.
+        """Take a step over what is stiff in it, with a tangent of its own in every iteration.
 
         Their force hangs on the last digits of places: it is not summed up, momenta follow from where the step ends.
         """

@@ -7,6 +7,7 @@ force across it: (h ω/2)² times the angle between, of the correction itself. S
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from flexctrl.dynamics.scales import once
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.rounding import DIGITS
-from flexctrl.structure.drives import Winch
+from flexctrl.structure.drives import LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.lines import Rope, Spring
 
 __all__ = [
@@ -27,6 +28,8 @@ __all__ = [
     "TURNING",
     "Caution",
     "firmest",
+    "firmest_freedom",
+    "firmest_shaft",
     "frequency_of",
     "noise",
     "stiffest",
@@ -98,6 +101,34 @@ def firmest(model: Plant) -> float:
     return float(max(once(model, _frequencies).max(initial=0.0), wall))
 
 
+def firmest_shaft(model: Plant) -> float:
+    """Return the highest frequency of a drive's shaft against what turns at its ends [rad/s]; 0 where none gives way.
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    float
+    """
+    return float(once(model, _shafts).max(initial=0.0))
+
+
+def firmest_freedom(model: Plant) -> float:
+    """Return the highest frequency of a degree of freedom as if all others were held [rad/s].
+
+    Parameters
+    ----------
+    model : Plant
+
+    Returns
+    -------
+    float
+    """
+    return float(once(model, _freedoms).max(initial=0.0))
+
+
 def frequency_of(model: Model, name: str) -> float:
     """Return the frequency of one line [rad/s]; 0 where it does not give way, or does not turn.
 
@@ -151,13 +182,35 @@ def _frequencies(model: Plant) -> np.ndarray:
     lines = _lines(model)
     if not (lines and isinstance(model, Model)):
         return np.zeros(0)
+    return _alone(model, _pulls(model, lines), [_stiffness(line) for line in lines])
+
+
+def _shafts(model: Plant) -> np.ndarray:
+    """Frequencies of the shafts as drawn, each as if nothing else held their ends, shape (shafts,)."""
+    if not isinstance(model, Model):
+        return np.zeros(0)
+    drives = [d for d in model.structure.drives if isinstance(d, RotaryDrive | LinearDrive) and model.bends(d)]
+    return _alone(model, _twists(model, drives), [d.stiffness for d in drives]) if drives else np.zeros(0)
+
+
+def _freedoms(model: Plant) -> np.ndarray:
+    """Frequencies of the degrees of freedom at rest, each alone, shape (n,); 0 of what has no mass."""
     still = np.zeros(model.n)
-    slope = model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs)))
-    mass = -slope.diagonal()
-    pulls = _pulls(model, lines) @ model.motion.jacobian(model.rest)
+    slope = model.slope(model.rest, still, still, (1.0, 0.0, 0.0), np.zeros(len(model.inputs)))
+    return np.sqrt(np.maximum(-slope.diagonal(), 0.0) * _mobility(model))
+
+
+def _alone(model: Model, moves: sp.csr_matrix, stiffness: Sequence[float]) -> np.ndarray:
+    """Frequencies of springs that raw coordinates lengthen, against the masses that they move."""
+    return np.sqrt((moves @ model.motion.jacobian(model.rest)).power(2) @ _mobility(model) * stiffness)
+
+
+def _mobility(model: Plant) -> np.ndarray:
+    """One over the mass of each degree of freedom at rest, shape (n,); 0 of what has none."""
+    still = np.zeros(model.n)
+    mass = -model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs))).diagonal()
     light = mass <= model.dust
-    mobility = np.where(light, 0.0, 1.0 / np.where(light, 1.0, mass))
-    return np.sqrt(pulls.power(2) @ mobility * [_stiffness(line) for line in lines])
+    return np.where(light, 0.0, 1.0 / np.where(light, 1.0, mass))
 
 
 def _lines(model: Plant) -> tuple[Line, ...]:
@@ -188,6 +241,18 @@ def _pulls(model: Model, lines: tuple[Line, ...]) -> sp.csr_matrix:
             values.append(-1.0 / line.effective_ratio)
         rows += [i] * (7 if isinstance(line, Winch) else 6)
     return sp.csr_matrix((values, (rows, columns)), shape=(len(lines), model.motion.raw))
+
+
+def _twists(model: Model, drives: Sequence[RotaryDrive | LinearDrive]) -> sp.csr_matrix:
+    """How each raw coordinate twists each shaft, on the motor's side, shape (drives, raw)."""
+    found = sp.lil_matrix((len(drives), model.motion.raw))
+    for i, drive in enumerate(drives):
+        for node, sign in ((drive.node, 1.0), (drive.against, -1.0)):
+            if node is not None:
+                first = 6 * model.structure.number(node) + drive.column
+                found[i, first : first + 3] = sign * drive.effective_ratio * np.asarray(drive.direction)
+        found[i, model.motion.source_base + model.structure.drives.index(drive)] = -1.0
+    return found.tocsr()
 
 
 def stiffest(model: Plant) -> tuple[str, float]:
