@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.design import Step
 
 MOTOR, LOAD, TORQUE = 1e-4, 5.0, 5.0
 
@@ -80,3 +81,33 @@ def test_chosen_steps_that_see_the_first_peak_but_lose_the_ringing():
     assert run["tension"].max() == pytest.approx(2.0 * (2.0 * 9.81 + 100.0) * np.cos(0.3), rel=0.01)
     (note,) = said(run)
     assert note.startswith("tension rings by up to 1.1e+02 from the start on")
+
+
+SWITCHED = {
+    "a step": fc.OpenLoop({"torque": Step(TORQUE, at=0.3)}),
+    "sampled": fc.OpenLoop({"torque": lambda t: TORQUE * (t >= 0.3)}, sample_time=0.05),
+    "untold": fc.OpenLoop({"torque": lambda t: TORQUE * (t >= 0.3)}),
+}
+
+
+@pytest.mark.parametrize("every", [None, 0.05], ids=["all steps", "spaced rows"])
+@pytest.mark.parametrize("law", SWITCHED.values(), ids=SWITCHED.keys())
+def test_a_torque_switched_on_later(law, every):
+    """The motor rings as from a start; no step sees it."""
+    run = fc.simulate(drive(1e6), law, until=1.0, method=fc.GeneralizedAlpha(1e-2), every=every)
+    (note,) = run.report.notes
+    assert run["speed"].max() < 0.71
+    assert note.startswith(f"speed rings by up to {ripple(1e6):.2g} from t = 0.3 s on")
+
+
+def test_a_torque_that_rises_slowly():
+    law = fc.OpenLoop({"torque": lambda t: min(t / 0.8, 1.0) * TORQUE})
+    assert not fc.simulate(drive(1e6), law, until=1.0, method=fc.GeneralizedAlpha(1e-2)).report.notes
+
+
+def test_a_rope_pulled_later():
+    """After 0.1 s the load has swung by a little: its rope rings by F cos a, as from the start."""
+    law = fc.OpenLoop({"pull": Step(-100.0, at=0.1)})
+    hung = fc.equilibrium(hanging(0.0))
+    run = fc.simulate(hanging(0.0), law, until=0.4, start=hung, method=fc.GeneralizedAlpha(2e-3))
+    assert run.report.notes[-1].startswith("tension rings by up to 1e+02 from t = 0.1 s on")

@@ -1,4 +1,4 @@
-"""What the start sets ringing so fast that steps see little of it: lines and shafts under loads put on at once."""
+"""What loads put on at once set ringing so fast that steps see little of it: lines and shafts."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ __all__ = ["ringing"]
 _SEEN, _LITTLE, _RESOLVED = 1.0, 0.05, 0.2
 _SEEDS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 _SAID = (
-    "{name} rings by up to {swing:.2g} from the start on, by {turned:.2g} rad in a step, which sees little of that: "
+    "{name} rings by up to {swing:.2g} from {since} on, by {turned:.2g} rad in a step, which sees little of that: "
     "its peaks may be missed; bring loads up more slowly, or take steps of {finer:.1g} s"
 )
 
 
 def ringing(run: Run, journey: Journey) -> Run:
-    """Return a run with notes on tensions and motor speeds whose ringing from the start on its steps do not resolve.
+    """Return a run with notes on tensions and motor speeds that ring in ways that its steps do not resolve.
 
     What is out of balance at the start accelerates a line's ends, or a motor, by a: they swing about where forces
-    balance by a/ω², and a motor's speed by a/ω. Where that is 5 % of what the output gets to, and steps turn it by more
-    than a radian on average, its peaks are a matter of chance, but for the first, which short first steps may see.
-    Where dry contacts may hold, the start tells nothing of that.
+    balance by a/ω², and a motor's speed by a/ω. So do they where an input jumps, by what it adds to a. Where that is
+    5 % of what the output gets to, and steps turn it by more than a radian on average, its peaks are a matter of
+    chance, but for the first, which short first steps may see. Where dry contacts may hold, this tells nothing.
 
     Parameters
     ----------
@@ -58,35 +58,71 @@ def ringing(run: Run, journey: Journey) -> Run:
 
 
 def _notes(run: Run, journey: Journey, model: Model, asked: list[Tension | DriveSpeed]) -> Iterator[str]:
-    step, start = journey.point.state.t / max(journey.mark.steps, 1), _Start.of(journey)
+    step, shocks = journey.point.state.t / max(journey.mark.steps, 1), [_start(journey, model)]
+    shocks += _jumps(run, journey, model)
     for output in asked:
-        swing, frequency = start.tension(output) if isinstance(output, Tension) else start.speed(output)
+        (swing, frequency), since = max((shock.swing(output), shock.since) for shock in shocks)
         turned, most = step * frequency, float(np.abs(run[output.name]).max())
         if turned > _SEEN and swing > _LITTLE * most:
-            yield _SAID.format(name=output.name, swing=swing, turned=turned, finer=_RESOLVED / frequency)
+            finer = _RESOLVED / frequency
+            yield _SAID.format(name=output.name, swing=swing, since=since, turned=turned, finer=finer)
+
+
+def _start(journey: Journey, model: Model) -> _Shock:
+    """What is out of balance where the run begins."""
+    state, u = journey.origin.state, journey.origin.u
+    force = model.balance(state, state.v, np.zeros(model.n)) + model.loads(state, u)
+    return _Shock.of(model, state, u, force, "the start")
+
+
+def _jumps(run: Run, journey: Journey, model: Model) -> Iterator[_Shock]:
+    """The largest jump of each input, or what it changes by from one row to the next as steps see no more of it."""
+    leaps, seen = np.abs(np.diff(run.u, axis=0)), _as_steps(run, journey)
+    for i in np.flatnonzero((leaps[seen] > 0.0).any(axis=0)).tolist() if seen.any() else []:
+        row = 1 + int(np.argmax(np.where(seen, leaps[:, i], 0.0)))
+        before, after = run.u[row - 1], run.u[row]
+        t = float(run.t[row])
+        state = run.track.state(t)[0] if run.track.stretches else journey.origin.state
+        force = model.loads(state, after) - model.loads(state, before)
+        yield _Shock.of(model, state, after, force, f"t = {t:.3g} s")
+
+
+def _as_steps(run: Run, journey: Journey) -> np.ndarray:
+    """Between which rows inputs change as steps see it: one after the other, or those with a jump between them."""
+    feed, t = journey.plan.feed, run.t
+    if feed.controller is None or len(t) < 2:
+        return np.zeros(max(len(t) - 1, 0), dtype=bool)
+    if journey.rows.every is None or feed.sample_time > 0.5 * journey.rows.every:
+        return np.ones(len(t) - 1, dtype=bool)
+    found = np.zeros(len(t) - 1, dtype=bool)
+    breaks = np.array([b for b in (*feed.breaks, *feed.met) if t[0] < b <= t[-1]])
+    found[np.searchsorted(t, breaks * (1.0 - 1e-9), side="left") - 1] = True
+    return found
 
 
 @dataclass(frozen=True)
-class _Start:
-    """A machine where it begins: accelerations and squares of own frequencies, (n,) each, 0 of what has no mass."""
+class _Shock:
+    """Forces put on at once: accelerations by them and squares of own frequencies, (n,) each, 0 of what has no mass."""
 
     model: Model
     state: State
     rates: np.ndarray
     square: np.ndarray
+    since: str
 
     @classmethod
-    def of(cls, journey: Journey) -> _Start:
-        model, state, u = journey.plan.model, journey.origin.state, journey.origin.u
-        assert isinstance(model, Model)
+    def of(cls, model: Model, state: State, u: np.ndarray, force: np.ndarray, since: str) -> _Shock:
         still, rates, square = np.zeros((3, model.n))
         mass, stiffness = (-model.slope(state, state.v, still, seeds, u).tocsr() for seeds in _SEEDS)
         heavy = np.flatnonzero(mass.diagonal() > model.dust)
-        force = model.balance(state, state.v, still) + model.loads(state, u)
         square[heavy] = np.maximum(stiffness.diagonal()[heavy] / mass.diagonal()[heavy], 0.0)
         with suppress(SingularMatrixError):
             rates[heavy] = factorise(mass[heavy][:, heavy])(force[heavy])
-        return cls(model, state, rates, square)
+        return cls(model, state, rates, square, since)
+
+    def swing(self, output: Tension | DriveSpeed) -> tuple[float, float]:
+        """By how much an output rings, and how fast [rad/s]."""
+        return self.tension(output) if isinstance(output, Tension) else self.speed(output)
 
     def tension(self, output: Tension) -> tuple[float, float]:
         """By how much a tension rings [N], and how fast [rad/s]; 0 where its line does not give way."""
