@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.swift.stiff_lines import frequency_of
 from flexctrl.errors import SingularMatrixError
@@ -23,10 +24,16 @@ if TYPE_CHECKING:
 __all__ = ["ringing"]
 
 _SEEN, _LITTLE, _RESOLVED = 1.0, 0.05, 0.2
+_LAG = 0.3
+"""Radians by which two runs part in phase from where on an extrapolation of them is larger than either."""
 _SEEDS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 _SAID = (
     "{name} rings by up to {swing:.2g} from {since} on, by {turned:.2g} rad in a step, which sees little of that: "
     "its peaks may be missed; bring loads up more slowly, or take steps of {finer:.1g} s"
+)
+_PARTED = (
+    "{name} rings by up to {swing:.2g} from {since} on, and the two runs that are extrapolated part by {lag:.2g} rad of "
+    "that: its peaks may be too large; bring loads up more slowly, or take steps of {finer:.1g} s"
 )
 
 
@@ -36,7 +43,8 @@ def ringing(run: Run, journey: Journey) -> Run:
     What is out of balance at the start accelerates a line's ends, or a motor, by a: they swing about where forces
     balance by a/ω², and a motor's speed by a/ω. So do they where an input jumps, by what it adds to a. Where that is
     5 % of what the output gets to, and steps turn it by more than a radian on average, its peaks are a matter of
-    chance, but for the first, which short first steps may see. Where dry contacts may hold, this tells nothing.
+    chance, but for the first, which short first steps may see; where `Richardson` has runs in it that part by a third of
+    a radian, they are too large. Where dry contacts may hold, this tells nothing.
 
     Parameters
     ----------
@@ -61,11 +69,23 @@ def _notes(run: Run, journey: Journey, model: Model, asked: list[Tension | Drive
     step, shocks = journey.point.state.t / max(journey.mark.steps, 1), [_start(journey, model)]
     shocks += _jumps(run, journey, model)
     for output in asked:
-        (swing, frequency), since = max((shock.swing(output), shock.since) for shock in shocks)
+        (swing, frequency), shock = max(((shock.swing(output), shock) for shock in shocks), key=lambda found: found[0])
         turned, most = step * frequency, float(np.abs(run[output.name]).max())
-        if turned > _SEEN and swing > _LITTLE * most:
-            finer = _RESOLVED / frequency
-            yield _SAID.format(name=output.name, swing=swing, since=since, turned=turned, finer=finer)
+        if swing <= _LITTLE * most:
+            continue
+        lag = _parted(journey, shock, step, frequency)
+        said = {"name": output.name, "swing": swing, "since": shock.since}
+        if turned > _SEEN:
+            yield _SAID.format(**said, turned=turned, finer=_RESOLVED / frequency)
+        elif lag > _LAG:
+            yield _PARTED.format(**said, lag=lag, finer=step * np.sqrt(0.1 * _LAG / lag))
+
+
+def _parted(journey: Journey, shock: _Shock, step: float, frequency: float) -> float:
+    """By how much the runs of an extrapolation part in phase [rad]: that of whole steps lags by (h ω)²/12 of its way."""
+    if not isinstance(journey.plan.method, Richardson):
+        return 0.0
+    return 0.75 * (journey.point.state.t - shock.state.t) * frequency * (step * frequency) ** 2 / 12.0
 
 
 def _start(journey: Journey, model: Model) -> _Shock:
