@@ -32,8 +32,8 @@ _SAID = (
     "its peaks may be missed; bring loads up more slowly, or take steps of {finer:.1g} s"
 )
 _PARTED = (
-    "{name} rings by up to {swing:.2g} from {since} on, and the two runs that are extrapolated part by {lag:.2g} rad of "
-    "that: its peaks may be too large; bring loads up more slowly, or take steps of {finer:.1g} s"
+    "{name} rings by up to {swing:.2g} from {since} on, and the two runs that are extrapolated part by {lag:.2g} rad "
+    "of that: its peaks may be too large; bring loads up more slowly, or take steps of {finer:.1g} s"
 )
 
 
@@ -43,8 +43,8 @@ def ringing(run: Run, journey: Journey) -> Run:
     What is out of balance at the start accelerates a line's ends, or a motor, by a: they swing about where forces
     balance by a/ω², and a motor's speed by a/ω. So do they where an input jumps, by what it adds to a. Where that is
     5 % of what the output gets to, and steps turn it by more than a radian on average, its peaks are a matter of
-    chance, but for the first, which short first steps may see; where `Richardson` has runs in it that part by a third of
-    a radian, they are too large. Where dry contacts may hold, this tells nothing.
+    chance, but for the first, which short first steps may see; where the two runs of `Richardson` part by a third of a
+    radian in it, they are too large. Where dry contacts may hold, this tells nothing.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def _notes(run: Run, journey: Journey, model: Model, asked: list[Tension | Drive
 
 
 def _parted(journey: Journey, shock: _Shock, step: float, frequency: float) -> float:
-    """By how much the runs of an extrapolation part in phase [rad]: that of whole steps lags by (h ω)²/12 of its way."""
+    """By how much the runs of an extrapolation part in phase [rad]: a run lags by (h ω)²/12 of its way."""
     if not isinstance(journey.plan.method, Richardson):
         return 0.0
     return 0.75 * (journey.point.state.t - shock.state.t) * frequency * (step * frequency) ** 2 / 12.0
