@@ -20,6 +20,7 @@ from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.notes.answers import answers
 from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
+from flexctrl.dynamics.notes.leaving import leaves
 from flexctrl.dynamics.notes.ringing import ringing
 from flexctrl.dynamics.records.record import InMemory, Record
 from flexctrl.dynamics.run import Run, Status, Tolerance
@@ -146,7 +147,7 @@ def simulate(
             return run
         if check and beginning and can_be_told(journey):
             law = answers(run, journey, beginning.again)
-            if isinstance(method, Checked) or may_grow(journey, law):
+            if isinstance(method, Checked) or may_grow(journey, law) or leaves(run, journey, beginning.again):
                 told = laid_beside(run, journey, check, beginning, shorter(journey, law))
                 return ringing(loosened(told, run, journey, beginning), journey)
             return ringing(run, journey)

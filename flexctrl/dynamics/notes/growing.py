@@ -1,4 +1,4 @@
-"""Loops that grow faster than steps see: an implicit step maps what grows fast into the unit circle, as what decays."""
+"""What grows faster than steps see: an implicit step maps what grows fast into the unit circle, as what decays."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
+from flexctrl.model.model import Model
+from flexctrl.model.plant import Plant
+from flexctrl.model.stability import without_energy
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -23,14 +26,17 @@ _DOUBTED, _MISSED = 0.5, 1.5
 _GROWN = 4.0
 _INFINITE = 1e6
 _SAME = 1e-3
+_LOOP = "the continuous loop"
 _SMALL = 1e-7
 
 
 class Growth(NamedTuple):
-    """A pole by which a loop grows.
+    """A pole by which a loop grows, or a machine that loads without a potential drive.
 
     Attributes
     ----------
+    grown : str
+        What grows.
     pole : complex
         [1/s]
     step : float
@@ -41,6 +47,7 @@ class Growth(NamedTuple):
         Whether the loop was and is one that steps by far do not see grow, at the start and at the end.
     """
 
+    grown: str
     pole: complex
     step: float
     span: float
@@ -48,18 +55,20 @@ class Growth(NamedTuple):
 
     def __str__(self) -> str:
         pole = f"{self.pole.real:.3g}" + (f" ± {abs(self.pole.imag):.3g}i" if self.pole.imag else "")
-        unstable = f"the continuous loop is unstable, with a pole at {pole} 1/s"
+        unstable = f"{self.grown} is unstable, with a pole at {pole} 1/s"
         if abs(self.pole) * self.step > _DOUBTED:
-            finer = f"look at the gains, or take steps below {0.1 / abs(self.pole):.1g} s"
+            cause = "gains" if self.grown == _LOOP else "loads"
+            finer = f"look at the {cause}, or take steps below {0.1 / abs(self.pole):.1g} s"
             return f"{unstable} that steps of {self.step:.2g} s do not see grow; {finer}"
         return f"{unstable}: over the run what steps err by grows with it, by up to e^{self.pole.real * self.span:.0f}"
 
 
 def growth(journey: Journey, start: tuple[State, Supply]) -> Growth | None:
-    """Return the pole by which a continuous loop grows in truth, and may not in implicit steps; None if there is none.
+    """Return the pole by which a machine grows in truth, and may not in implicit steps; None if there is none.
 
-    Linear about the start and about the end: at one of these, if steps do not see it grow, at both otherwise. What
-    grows by less than e⁴ over the run is let pass.
+    That of a continuous loop, or under loads that have no potential: what has one and leaves by itself does so without
+    turning, as steps see it. Linear about the start and about the end: at one of these, if steps do not see it grow, at
+    both otherwise. What grows by less than e⁴ over the run is let pass.
 
     Parameters
     ----------
@@ -75,14 +84,25 @@ def growth(journey: Journey, start: tuple[State, Supply]) -> Growth | None:
     feed, method, end = journey.plan.feed, journey.plan.method, journey.point
     method = method.method if isinstance(method, Richardson) else method
     span = end.state.t - start[0].t
-    if not feed.continuous or isinstance(method, ExplicitRungeKutta | Exact) or not journey.mark.steps or span <= 0.0:
+    driven = () if feed.reacting else _driven(feed, start[1].u, end.supply.u)
+    if not (feed.reacting or driven) or isinstance(method, ExplicitRungeKutta | Exact):
         return None
-    step = end.state.t / journey.mark.steps
+    if not journey.mark.steps or span <= 0.0:
+        return None
+    grown, step = f"the machine under {', '.join(driven)}" if driven else _LOOP, end.state.t / journey.mark.steps
     found = [_growing(loop_poles(feed, at, to, step), span) for at, to in (start, (end.state, end.supply))]
     least, worst = sorted(found, key=lambda pole: pole.real)
     if least or abs(worst) * step > _DOUBTED:
-        return Growth(worst, step, span, abs(least) * step > _MISSED)
+        return Growth(grown, worst, step, span, abs(least) * step > _MISSED)
     return None
+
+
+def _driven(feed: Feed, *inputs: np.ndarray) -> tuple[str, ...]:
+    """The loads without a potential, at the start or at the end."""
+    model = feed.model
+    if not isinstance(model, Model):
+        return ()
+    return tuple(dict.fromkeys(name for u in inputs for name in without_energy(model, u)))
 
 
 def _growing(poles: np.ndarray, span: float) -> complex:
@@ -91,12 +111,12 @@ def _growing(poles: np.ndarray, span: float) -> complex:
 
 
 def loop_poles(feed: Feed, state: State, supply: Supply, step: float) -> np.ndarray:
-    """Return the finite poles of a model under a continuous law, linear about a state in motion [1/s].
+    """Return the finite poles of a model and of a continuous law, linear about a state in motion [1/s].
 
     Parameters
     ----------
     feed : Feed
-        With a continuous law.
+        With a continuous law that reads the motion; else of the model alone, its inputs held.
     state : State
     supply : Supply
         The inputs there.
@@ -106,12 +126,12 @@ def loop_poles(feed: Feed, state: State, supply: Supply, step: float) -> np.ndar
     Returns
     -------
     numpy.ndarray of complex
-        Empty for a law that reads nothing, for machines too large for it, and while contacts stick.
+        Empty for machines too large for it, and while contacts stick.
     """
     model = feed.model
-    if not feed.reads.size or 2 * model.n + supply.x.size > _MOST or model.switches.sticks(state):
+    if 2 * model.n + supply.x.size > _MOST or model.switches.sticks(state):
         return np.zeros(0, complex)
-    J, E = _pencil(feed, state, supply, step)
+    J, E = _looped(feed, state, supply, step) if feed.reacting else _scaled(*_alone(feed.model, state, supply.u, step))
     poles = _finite(J, E)
     if (poles.real > _SAME).any():  # what has no mass has poles that round-off makes finite: others each time
         columns = 2.0 ** np.random.default_rng(0).integers(-4, 5, len(J))
@@ -126,25 +146,32 @@ def _finite(J: np.ndarray, E: np.ndarray) -> np.ndarray:
     return np.asarray(over[finite] / under[finite])
 
 
-def _pencil(feed: Feed, state: State, supply: Supply, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """J z = λ h E z of places, h times rates, and the law's states; rows of one size."""
-    model, n, still, x = feed.model, feed.model.n, np.zeros(feed.model.n), supply.x.size
+def _alone(model: Plant, state: State, u: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """J z = λ h E z of places and h times rates."""
+    n, still = model.n, np.zeros(model.n)
     kinds = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    place, rate, mass = (model.slope(state, state.v, still, seeds, supply.u).toarray() for seeds in kinds)
+    place, rate, mass = (model.slope(state, state.v, still, seeds, u).toarray() for seeds in kinds)
+    J = np.block([[np.zeros((n, n)), np.eye(n) / step], [place, rate / step]])
+    return J, la.block_diag(np.eye(n), -mass / step) / step
+
+
+def _looped(feed: Feed, state: State, supply: Supply, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """The same with the law's states after them."""
+    model, n, x = feed.model, feed.model.n, supply.x.size
+    J, E = _alone(model, state, supply.u, step)
     on_place, on_rate = model.signals.slopes(state, model.rates(state), model.motion.raw)
     T = model.motion.jacobian(state)[: model.motion.raw]
-    reads, reads_rate = ((part[feed.reads] @ T).toarray() for part in (on_place, on_rate))
+    reads = np.hstack([(on_place[feed.reads] @ T).toarray(), (on_rate[feed.reads] @ T).toarray() / step])
     push = (T.T @ model.reach(state, supply.u)).toarray()
     on_y, on_x = _answers(feed, state, supply)
     says, follows = (on_y[: len(supply.u)], on_y[len(supply.u) :])
-    J = np.block(
-        [
-            [np.zeros((n, n)), np.eye(n) / step, np.zeros((n, x))],
-            [place + push @ says @ reads, (rate + push @ says @ reads_rate) / step, push @ on_x[: len(supply.u)]],
-            [follows @ reads, follows @ reads_rate / step, on_x[len(supply.u) :]],
-        ]
-    )
-    E = la.block_diag(np.eye(n), -mass / step, np.eye(x)) / step
+    J = np.block([[J, np.zeros((2 * n, x))], [follows @ reads, on_x[len(supply.u) :]]])
+    J[n : 2 * n] += push @ np.hstack([says @ reads, on_x[: len(supply.u)]])
+    return _scaled(J, la.block_diag(E, np.eye(x) / step))
+
+
+def _scaled(J: np.ndarray, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of one size."""
     size = np.maximum(abs(J).max(axis=1), abs(E).max(axis=1))
     size[size == 0.0] = 1.0
     return J / size[:, None], E / size[:, None]

@@ -23,7 +23,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["of_sampled_loop"]
+__all__ = ["grows", "of_sampled_loop"]
 
 _MOST = 400
 _GROWN, _LOST, _TURNED = 1.0, 3.0, 0.5
@@ -85,6 +85,30 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     if len(missed) == _ENDS and all(one.lost for one in missed):
         return replace(run, status=Status.FAILED, report=replace(run.report, message=missed[-1].said))
     return _noted(run, missed[0].said)
+
+
+def grows(journey: Journey, feed: Feed | None) -> bool:
+    """Tell whether a sampled loop grows by e over a run, linear about the start or the end.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+    feed : Feed or None
+        With a law that may be asked anew; None if there is none.
+
+    Returns
+    -------
+    bool
+    """
+    span = journey.point.state.t - journey.origin.state.t
+    if feed is None or not (feed.sample_time and isinstance(journey.plan.model, Model) and span > 0.0):
+        return False
+    growth = math.exp(_GROWN * feed.sample_time / max(span, feed.sample_time))
+    try:
+        return any(loop.poles(growth).size for loop in _loops(journey, feed))
+    except (FlexctrlError, ArithmeticError, ValueError):  # `of_sampled_loop` has said so
+        return False
 
 
 def _noted(run: Run, note: str) -> Run:
