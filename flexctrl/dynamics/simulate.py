@@ -149,9 +149,8 @@ def simulate(
             law = answers(run, journey, beginning.again)
             if isinstance(method, Checked) or may_grow(journey, law) or leaves(run, journey, beginning.again):
                 told = laid_beside(run, journey, check, beginning, shorter(journey, law))
-                return ringing(loosened(told, run, journey, beginning), journey)
-            return ringing(run, journey)
-    return run
+                run = loosened(told, run, journey, beginning)
+        return ringing(run, journey) if check else run
 
 
 def _default(model: Model | LinearModel, step: float) -> Integrator:

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.feed import Feed
-from flexctrl.dynamics.methods.extrapolation import Richardson
-from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
+from flexctrl.dynamics.notes.fading import radius
 from flexctrl.dynamics.notes.sampled_loop import Answers, SampledLoop
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Controlled
@@ -46,14 +44,6 @@ class Missed(NamedTuple):
     lost: bool
 
 
-def _rho(method: object) -> float:
-    """The spectral radius of the steps of a method; NaN for one that is not told of."""
-    method = method.method if isinstance(method, Richardson) else method
-    if isinstance(method, AdaptiveAlpha | GeneralizedAlpha):
-        return method.rho
-    return 1.0 if isinstance(method, ConservingMidpoint) else math.nan
-
-
 def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     """Return a run with what is to be said of a sampled loop that grows as its steps do not see.
 
@@ -71,7 +61,7 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     -------
     Run
     """
-    rho, model, steps = _rho(journey.plan.method), journey.plan.model, run.report.steps
+    rho, model, steps = radius(journey.plan.method), journey.plan.model, run.report.steps
     ended = run.status in (Status.FINISHED, Status.STOPPED) and steps > 0
     if feed is None or not feed.sample_time or math.isnan(rho) or not (ended and isinstance(model, Model)):
         return run

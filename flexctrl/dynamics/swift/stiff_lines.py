@@ -130,7 +130,7 @@ def firmest_freedom(model: Plant) -> float:
 
 
 def frequency_of(model: Model, name: str) -> float:
-    """Return the frequency of one line [rad/s]; 0 where it does not give way, or does not turn.
+    """Return the frequency of one line [rad/s]; 0 where it does not give way.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def frequency_of(model: Model, name: str) -> float:
     -------
     float
     """
-    found = dict(zip([line.name for line in _lines(model)], once(model, _frequencies).tolist(), strict=True))
+    found = dict(zip([line.name for line in _giving_way(model)], once(model, _own).tolist(), strict=True))
     return float(found.get(name, 0.0))
 
 
@@ -179,7 +179,12 @@ def _spreads(model: Plant) -> np.ndarray:
 
 def _frequencies(model: Plant) -> np.ndarray:
     """Frequencies of the lines as drawn, each as if the others let go, shape (lines,)."""
-    lines = _lines(model)
+    return _own(model) if _lines(model) else np.zeros(0)
+
+
+def _own(model: Plant) -> np.ndarray:
+    """The same, also where they do not turn."""
+    lines = _giving_way(model) if isinstance(model, Model) else ()
     if not (lines and isinstance(model, Model)):
         return np.zeros(0)
     return _alone(model, _pulls(model, lines), [_stiffness(line) for line in lines])
@@ -215,8 +220,11 @@ def _mobility(model: Plant) -> np.ndarray:
 
 def _lines(model: Plant) -> tuple[Line, ...]:
     """What pulls along a line between two nodes and turns with it: nothing in small motion."""
-    if not (isinstance(model, Model) and model.large):
-        return ()
+    return _giving_way(model) if isinstance(model, Model) and model.large else ()
+
+
+def _giving_way(model: Model) -> tuple[Line, ...]:
+    """What pulls along a line between two nodes that may part."""
     parts = (*model.structure.elements, *model.structure.drives)
     return tuple(p for p in parts if isinstance(p, Spring) or (isinstance(p, Rope | Winch) and model.bends(p)))
 
