@@ -9,7 +9,7 @@ from flexctrl.dynamics.notes.adding import drifted
 from flexctrl.dynamics.notes.left_out import left_out
 from flexctrl.dynamics.notes.outputs import by_sums
 from flexctrl.dynamics.notes.straying import strayed
-from flexctrl.dynamics.notes.unsized import unsized
+from flexctrl.dynamics.notes.unsized import little, unsized
 from flexctrl.dynamics.notes.unsure import unsure
 from flexctrl.dynamics.records.record import Unwritten
 from flexctrl.dynamics.run import EnergyBalance, Report, Run, Status
@@ -44,7 +44,7 @@ def result(journey: Journey) -> Run:
     journey.drift = drift = drifted(journey)
     y = rows[:, 1 : 1 + width]
     journey.outputs = by_sums(journey, y)
-    journey.notes += strayed(journey) + unsized(journey) + unsure(journey, y) + left_out(journey)
+    journey.notes += strayed(journey) + unsized(journey) + little(journey) + unsure(journey, y) + left_out(journey)
     if journey.status is not Status.FAILED:
         journey.notes += (drift.note,) * bool(drift.note) + journey.outputs.notes
     return Run(

@@ -1,4 +1,4 @@
-"""Springs and ropes that vibrate on machines that travel: steps damp that away, or have it lag, where places are right."""
+"""Springs and ropes that vibrate on machines that travel: steps damp that away, where places are right."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_what_rings_out_by_itself_is_not_named():
 @pytest.mark.parametrize("stiffness", [1e6, 1e7, 1e8], ids="{:.0e}".format)
 @pytest.mark.parametrize("later", [0.0, 1.0], ids=["at once", "later"])
 def test_a_hoist_whose_torque_jumps_by_little(stiffness, later):
-    """By the third of the weight: the rope rings by 49 N, of what it goes through a half, of the tension a twentieth."""
+    """By a third of the weight: the rope rings by 49 N, half of what it goes through, a twentieth of its tension."""
     sheave, load = fc.PointMass("sheave", (0, 0, 10), 1e3), fc.PointMass("load", (0, 0, 0), 100.0)
     hoist = fc.Winch("hoist", load.node, sheave.node, EA=stiffness, radius=0.1, ratio=10.0, inertia=0.05)
     joints = [fc.Support(sheave.node, "u v w"), fc.Support(load.node, "u v")]

@@ -1,4 +1,4 @@
-"""Machines without a length of their own: a tolerance does not know what is little for them."""
+"""Machines without a length of their own, and motions below all tolerances: what is little there is not known."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from flexctrl.dynamics.steps import Controlled
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["unsized"]
+__all__ = ["little", "unsized"]
+
+_LITTLE, _NOTHING, _FIT = 2.0, 1e-4, 1e-3
+"""Absolute tolerances that a motion goes through: as little as steps may err by, no more than rounding; what fits."""
 
 
 def unsized(journey: Journey) -> tuple[str, ...]:
@@ -40,4 +43,29 @@ def unsized(journey: Journey) -> tuple[str, ...]:
     return (
         f"nothing in the machine has a length: errors count against one unit of length, and it has moved by {way:.1g} "
         f"of it: give Tolerance({tolerance.relative:g}, {fit:.0e})",
+    )
+
+
+def little(journey: Journey) -> tuple[str, ...]:
+    """Return what is to be said of a motion that is smaller than what each of its steps may err by.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    tuple of str
+    """
+    plan, reach, tolerance = journey.plan, journey.books.reach, journey.plan.tolerance
+    if not (plan.model.structure.sized and isinstance(plan.method.pace, Controlled) and journey.mark.steps):
+        return ()
+    gone = float((journey.books.sums.moved / reach).max(initial=0.0))
+    if not _NOTHING * tolerance.absolute < gone < _LITTLE * tolerance.absolute:
+        return ()
+    fit = _FIT * 10.0 ** np.floor(np.log10(gone))
+    return (
+        f"nothing moves by more than {gone:.1g} of the machine's size or of a radian, and each step may err by "
+        f"{tolerance.absolute:.1g} of that: give Tolerance({tolerance.relative:g}, {fit:.0e})",
     )

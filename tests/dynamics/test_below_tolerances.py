@@ -1,0 +1,42 @@
+"""Motions smaller than what steps may err by are told of, and a tolerance that fits them is right."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+STIFFNESS, MASS = 400.0, 1.0
+
+
+def oscillator() -> fc.Model:
+    """A mass on a spring of one metre."""
+    spring = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=STIFFNESS)
+    mass = fc.PointMass("mass", (1, 0, 0), MASS)
+    joints = [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")]
+    inputs, outputs = [fc.Force("push", mass.node, "x")], [fc.Position("x", mass.node, "x")]
+    return fc.assemble(fc.Structure([spring, mass], joints, [], inputs, outputs), [fc.LargeRotation()])
+
+
+def off(run: fc.Run, push: float) -> float:
+    right = push / STIFFNESS * (1.0 - np.cos(np.sqrt(STIFFNESS / MASS) * run.t))
+    return float(np.abs(run["x"] - 1.0 - right).max() / np.ptp(right))
+
+
+@pytest.mark.parametrize("push", [1e-7, 1e-6, 1e-5])
+def test_what_is_smaller_than_errors_of_steps(push):
+    run = fc.simulate(oscillator(), until=1.0, inputs={"push": push})
+    (note,) = [note for note in run.report.notes if note.startswith("nothing moves by more than")]
+    assert off(run, push) > 0.05
+    relative, absolute = map(float, re.search(r"Tolerance\((\S+), (\S+)\)", note).groups())  # type: ignore[union-attr]
+    fit = fc.simulate(oscillator(), until=1.0, inputs={"push": push}, tolerance=fc.Tolerance(relative, absolute))
+    assert off(fit, push) < 0.03
+    assert not any("nothing moves" in note for note in fit.report.notes)
+
+
+def test_what_rests_or_moves_is_not_named():
+    for inputs in ({}, {"push": 1.0}):
+        assert not fc.simulate(oscillator(), until=1.0, inputs=inputs).report.notes
