@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,12 +14,13 @@ import scipy.sparse as sp
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.notes.fading import fading
 from flexctrl.dynamics.run import Run
-from flexctrl.dynamics.swift.stiff_lines import frequency_of
+from flexctrl.dynamics.swift.stiff_lines import lengthening
 from flexctrl.errors import SingularMatrixError
 from flexctrl.model.model import Model
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
-from flexctrl.structure.outputs import DriveSpeed, Tension
+from flexctrl.structure.drives import Winch
+from flexctrl.structure.outputs import AngularVelocity, DriveSpeed, Tension, Velocity
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -46,8 +48,11 @@ _FADING = (
 )
 
 
+_Fast = Tension | DriveSpeed | Velocity | AngularVelocity
+
+
 def ringing(run: Run, journey: Journey) -> Run:
-    """Return a run with notes on tensions and motor speeds that ring in ways that its steps do not resolve.
+    """Return a run with notes on tensions and rates that ring in ways that its steps do not resolve.
 
     What is out of balance at the start accelerates a line's ends, or a motor, by a: they swing about where forces
     balance by a/ω², and a motor's speed by a/ω. So do they where an input jumps, by what it adds to a. Where that is
@@ -69,13 +74,13 @@ def ringing(run: Run, journey: Journey) -> Run:
     model = journey.plan.model
     if not (isinstance(model, Model) and len(run.y)) or model.switches.names:
         return run
-    asked = [o for o in model.structure.outputs if isinstance(o, Tension | DriveSpeed)]
+    asked = [o for o in model.structure.outputs if isinstance(o, _Fast)]
     asked = [o for o in asked if o.name not in run.report.output_errors]
     notes = tuple(_notes(run, journey, model, asked)) if asked else ()
     return replace(run, report=replace(run.report, notes=(*run.report.notes, *notes))) if notes else run
 
 
-def _notes(run: Run, journey: Journey, model: Model, asked: list[Tension | DriveSpeed]) -> Iterator[str]:
+def _notes(run: Run, journey: Journey, model: Model, asked: list[_Fast]) -> Iterator[str]:
     step, shocks = journey.point.state.t / max(journey.mark.steps, 1), [_start(journey, model)]
     told = max(run.report.error, *run.report.output_errors.values(), 0.0)
     shocks += _jumps(run, journey, model)
@@ -156,10 +161,29 @@ class _Swing(NamedTuple):
     decay: float
 
 
+class _Vibration(NamedTuple):
+    """A line or a motor that swings as if all else let go.
+
+    Attributes
+    ----------
+    part : str
+        Its name.
+    rates : numpy.ndarray, shape (n,)
+        Amplitudes of the rates of degrees of freedom.
+    frequency, decay : float
+        [rad/s, 1/s]
+    """
+
+    part: str
+    rates: np.ndarray
+    frequency: float
+    decay: float
+
+
 _NONE = _Swing(0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Shock:
     """Forces put on at once.
 
@@ -169,8 +193,7 @@ class _Shock:
     state : State
     moves, rates : numpy.ndarray, shape (n,)
         Rates that it begins with, and accelerations by them; 0 of what has no mass.
-    mass, damping, stiffness : numpy.ndarray or scipy.sparse.csr_matrix
-        Of each freedom, (n,), but damping, (n, n).
+    mass, damping, stiffness : numpy.ndarray, shape (n,), or scipy.sparse.csr_matrix, shape (n, n)
     since : str
         When, in words.
     """
@@ -181,7 +204,7 @@ class _Shock:
     rates: np.ndarray
     mass: np.ndarray
     damping: sp.csr_matrix
-    stiffness: np.ndarray
+    stiffness: sp.csr_matrix
     since: str
 
     @classmethod
@@ -191,36 +214,59 @@ class _Shock:
         heavy = np.flatnonzero(M.diagonal() > model.dust)
         with suppress(SingularMatrixError):
             rates[heavy] = factorise(M[heavy][:, heavy])(force[heavy])
-        mass = np.where(M.diagonal() > model.dust, M.diagonal(), np.inf)
-        return cls(model, state, moves, rates, mass, C, np.maximum(K.diagonal(), 0.0), since)
+        return cls(model, state, moves, rates, np.where(M.diagonal() > model.dust, M.diagonal(), np.inf), C, K, since)
 
-    def swing(self, output: Tension | DriveSpeed) -> _Swing:
-        """What becomes of an output; nothing of lines and shafts that do not give way."""
-        return self._tension(output) if isinstance(output, Tension) else self._speed(output)
+    def swing(self, output: _Fast) -> _Swing:
+        """What becomes of an output: the most that one line or motor makes of it."""
+        by_place, by_rate = (part[self.model.outputs.index(output.name)].toarray().ravel() for part in self._sights)
+        found = [_NONE]
+        for part in self._vibrations:
+            if isinstance(output, Velocity | AngularVelocity) or part.part == _source(output):
+                size = np.hypot(by_place @ part.rates / part.frequency, by_rate @ part.rates)
+                found.append(_Swing(float(size), part.frequency, part.decay))
+        return max(found)
 
-    def _tension(self, output: Tension) -> _Swing:
-        """About where forces balance: by T̈/ω², and by Ṫ/ω."""
-        model, frequency = self.model, frequency_of(self.model, output.line)
-        if not frequency:
-            return _NONE
-        raw = np.zeros(model.motion.raw)
-        sight = model.signals.sight(self.state, raw, raw.size) @ model.motion.jacobian(self.state)
-        pull = sight[model.outputs.index(output.name)].toarray().ravel()
-        size = np.hypot(pull @ self.rates / frequency**2, pull @ self.moves / frequency)
-        return _Swing(float(size), frequency, self._decay(pull / self.mass))
+    @cached_property
+    def _sights(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """How outputs change with places and with rates, (outputs, n) each; tensions are told without damping."""
+        model, state = self.model, self.state
+        raw = model.motion.raw
+        on_rate = model.signals.slopes(state, model.rates(state), raw)[1]
+        T, pulls = model.motion.jacobian(state)[:raw], model.signals.sight(state, np.zeros(raw), raw)
+        tense = sp.diags([float(isinstance(o, Tension)) for o in model.structure.outputs])
+        calm = sp.diags([float(not isinstance(o, Tension)) for o in model.structure.outputs])
+        return sp.csr_matrix(tense @ pulls @ T), sp.csr_matrix(calm @ on_rate @ T)
 
-    def _speed(self, output: DriveSpeed) -> _Swing:
-        motion, drive = self.model.motion, [d.name for d in self.model.structure.drives].index(output.drive)
-        own = int(motion.sources[drive])
-        if motion.rigid[drive] or own >= self.model.n or not self.stiffness[own] / self.mass[own] > 0.0:
-            return _NONE
-        frequency = float(np.sqrt(self.stiffness[own] / self.mass[own]))
-        along = np.zeros(self.model.n)
-        along[own] = 1.0
-        return _Swing(abs(float(self.rates[own])) / frequency, frequency, self._decay(along))
+    @cached_property
+    def _vibrations(self) -> tuple[_Vibration, ...]:
+        return (*self._lines(), *self._motors())
+
+    def _lines(self) -> Iterator[_Vibration]:
+        """About where forces balance: they part by s̈/ω² and by ṡ/ω."""
+        for name, arm, frequency in lengthening(self.model, self.state):
+            along = arm / self.mass
+            parted = float(arm @ along)
+            if frequency and parted and along @ (self.stiffness @ along) > 0.0:  # it is taut
+                speed = np.hypot(arm @ self.rates / frequency, arm @ self.moves)
+                yield _Vibration(name, speed / parted * along, frequency, self._decay(along))
+
+    def _motors(self) -> Iterator[_Vibration]:
+        motion, square = self.model.motion, np.maximum(self.stiffness.diagonal(), 0.0) / self.mass
+        for drive, rigid, own in zip(self.model.structure.drives, motion.rigid, motion.sources, strict=True):
+            if rigid or isinstance(drive, Winch) or own >= self.model.n or not square[own]:
+                continue
+            along = np.zeros(self.model.n)
+            along[own] = 1.0
+            frequency = float(np.sqrt(square[own]))
+            yield _Vibration(drive.name, abs(float(self.rates[own])) / frequency * along, frequency, self._decay(along))
 
     def _decay(self, along: np.ndarray) -> float:
         """The rate at which a vibration along some freedoms rings out, masses beside the diagonal left out [1/s]."""
         heavy = np.isfinite(self.mass)
         moved = float(along[heavy] ** 2 @ self.mass[heavy])
         return max(0.5 * float(along @ (self.damping @ along)) / moved, 0.0) if moved > 0.0 else 0.0
+
+
+def _source(output: _Fast) -> str:
+    """The line or the drive that an output is of."""
+    return output.line if isinstance(output, Tension) else output.drive if isinstance(output, DriveSpeed) else ""

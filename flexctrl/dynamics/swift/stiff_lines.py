@@ -7,7 +7,7 @@ force across it: (h ω/2)² times the angle between, of the correction itself. S
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from flexctrl.dynamics.scales import once
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.rounding import DIGITS
+from flexctrl.model.state import State
 from flexctrl.structure.drives import LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.lines import Rope, Spring
 
@@ -31,6 +32,7 @@ __all__ = [
     "firmest_freedom",
     "firmest_shaft",
     "frequency_of",
+    "lengthening",
     "noise",
     "stiffest",
     "told_by_differences",
@@ -145,6 +147,26 @@ def frequency_of(model: Model, name: str) -> float:
     return float(found.get(name, 0.0))
 
 
+def lengthening(model: Model, state: State) -> Iterator[tuple[str, np.ndarray, float]]:
+    """Return how each degree of freedom lengthens each line that gives way.
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+
+    Returns
+    -------
+    iterator of (str, numpy.ndarray of shape (n,), float)
+        The line's name, and its frequency as if all others let go [rad/s].
+    """
+    lines = _giving_way(model)
+    if lines:
+        rows = (_pulls(model, lines, state) @ model.motion.jacobian(state)).tocsr()
+        for i, (line, frequency) in enumerate(zip(lines, once(model, _own).tolist(), strict=True)):
+            yield line.name, rows[[i]].toarray().ravel(), frequency
+
+
 def told_by_differences(model: Plant) -> bool:
     """Tell whether differences of forces make tangents for loads beside the inertia of motors that they hang from.
 
@@ -187,7 +209,7 @@ def _own(model: Plant) -> np.ndarray:
     lines = _giving_way(model) if isinstance(model, Model) else ()
     if not (lines and isinstance(model, Model)):
         return np.zeros(0)
-    return _alone(model, _pulls(model, lines), [_stiffness(line) for line in lines])
+    return _alone(model, _pulls(model, lines, model.rest), [_stiffness(line) for line in lines])
 
 
 def _shafts(model: Plant) -> np.ndarray:
@@ -234,14 +256,14 @@ def _stiffness(line: Line) -> float:
     return line.stiffness if isinstance(line, Rope | Spring) else line.EA / line.length
 
 
-def _pulls(model: Model, lines: tuple[Line, ...]) -> sp.csr_matrix:
-    """How each raw coordinate lengthens each line, shape (lines, raw)."""
+def _pulls(model: Model, lines: tuple[Line, ...], state: State) -> sp.csr_matrix:
+    """How each raw coordinate lengthens each line in a state, shape (lines, raw)."""
     rows, columns, values = [], [], []
     for i, line in enumerate(lines):
         nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
         first, second = (model.structure.number(node) for node in nodes)
-        arm = model.rest.x[second] - model.rest.x[first]
-        arm = arm / np.linalg.norm(arm)
+        arm = state.x[second] - state.x[first]
+        arm = arm / max(float(np.linalg.norm(arm)), np.finfo(float).tiny)
         columns += [6 * end + k for end in (second, first) for k in range(3)]
         values += [*arm.tolist(), *(-arm).tolist()]
         if isinstance(line, Winch):
