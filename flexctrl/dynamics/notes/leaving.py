@@ -20,14 +20,15 @@ if TYPE_CHECKING:
 
 __all__ = ["leaves"]
 
-_LOOKED_AT = 12
+_LOOKED_AT, _GROWN = 12, 3.0
+"""States, and powers of e over the run."""
 _STIFFNESS, _MASS = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def leaves(run: Run, journey: Journey, feed: Feed | None) -> bool:
-    """Tell whether small differences may have grown by e, however little has moved.
+    """Tell whether small differences may have grown by e³, however little has moved.
 
-    So they may where K + M/T² is not positive, T the duration of the run: something leaves at a rate of more than 1/T.
+    So they may where K + 9 M/T² is not positive, T the duration of the run: something leaves at a rate of 3/T.
     Looked at are the start, the end and some states between, evenly in time, as what leaves lingers before it does; so
     may all that moves under loads without a potential. Under a sampled law it is the poles of the loop that count.
 
@@ -54,7 +55,7 @@ def leaves(run: Run, journey: Journey, feed: Feed | None) -> bool:
     if without_energy(model, end.supply.u) or without_energy(model, journey.origin.u):
         return True
     u, still = end.supply.u, np.zeros(model.n)
-    M = -model.slope(end.state, still, still, _MASS, u) / end.state.t**2
+    M = -model.slope(end.state, still, still, _MASS, u) * (_GROWN / end.state.t) ** 2
     return any(_leaves(model, state, u, M) for state in (journey.origin.state, *_between(run), end.state))
 
 
