@@ -365,10 +365,10 @@ class Journey:
         """Tell whether an event asked for has been told, or is beyond the end."""
         return crossing.gauge < len(self.watch.events) and crossing.t <= self.told
 
-    def happens(self, crossing: Crossing, state: State, u: np.ndarray) -> None:
-        """Note an event, unless that has been done."""
+    def happens(self, crossing: Crossing, state: State, u: np.ndarray, ends: tuple[State, State] | None = None) -> None:
+        """Note an event, unless that has been done, in a state that may be within a step of given ends."""
         if crossing.t > self.told:
-            self.events.append(self.watch.occurrence(crossing, state, u))
+            self.events.append(self.watch.occurrence(crossing, state, u, ends))
 
     def tell(self, event: Occurrence) -> None:
         """Note what has happened on the way of many steps, unless that has been done."""

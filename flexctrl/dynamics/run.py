@@ -309,8 +309,8 @@ class Run:
         slack = 1e-12 * max(1.0, abs(last))
         if not first - slack <= t <= last + slack:
             raise StructureError(f"run.at({t}): expected a time from {first:.6g} to {last:.6g} s")
-        state, u = track.state(min(max(t, first), last))
-        values = (*track.feed.model.measure(state).tolist(), *u.tolist())
+        state, outputs, u = track.moment(min(max(t, first), last))
+        values = (*outputs.tolist(), *u.tolist())
         return Moment(state.t, state, dict(zip((*self.outputs, *self.inputs), values, strict=True)))
 
     def plot(self, signals: tuple[str, ...] | None = None) -> Figure:

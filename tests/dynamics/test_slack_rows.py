@@ -43,7 +43,7 @@ def test_steps_of_a_row_grow_as_the_number_of_its_pieces():
 
 def test_pieces_pull_at_six_places_each():
     model = slack_rope(200)
-    pulls = _pulls(model, _lines(model))
+    pulls = _pulls(model, _lines(model), model.rest)
     assert pulls.shape[0] == 200
     assert pulls.nnz <= 6 * 200
     piece = 10.5 / 200

@@ -158,17 +158,25 @@ class _Along:
 
     def __call__(self, t: float) -> np.ndarray:
         state = self.curve.at(t)
-        return self.watch.values(state, self.supply(state).u, self.before.state)
+        values = self.watch.values(state, self.supply(state).u, self.before.state)
+        if self.watch.events:
+            values[: len(self.watch.events)] = self._asked(state)
+        return values
 
     def events(self, t: float) -> list[float]:
         """Those of the events asked for."""
-        state = self.curve.at(t)
-        signals = self.watch.signals(state, self.supply(state).u)
+        return self._asked(self.curve.at(t))
+
+    def _asked(self, state: State) -> list[float]:
+        outputs = self.watch.tensions.within(state, self.before.state, self.after.state)
+        signals = self.watch.named_signals(outputs, self.supply(state).u)
         return [event.value(signals) for event in self.watch.events]
 
     def one(self, gauge: int, t: float) -> float:
         """One of them."""
         state = self.curve.at(t)
+        if gauge < len(self.watch.events):
+            return self._asked(state)[gauge]
         return self.watch.value(state, self.supply(state).u, self.before.state, gauge)
 
 

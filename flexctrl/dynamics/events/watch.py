@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.events.event import Direction, Event, Occurrence
 from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.records.tensions import Tensions
 from flexctrl.dynamics.steps import Point
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.state import State
@@ -117,9 +118,15 @@ class Watch:
 
     def signals(self, state: State, u: np.ndarray) -> dict[str, float]:
         """Return all signals by name."""
-        return self._signals(self.feed.model.measure(state), u)
+        return self.named_signals(self.feed.model.measure(state), u)
 
-    def _signals(self, outputs: np.ndarray, u: np.ndarray) -> dict[str, float]:
+    @cached_property
+    def tensions(self) -> Tensions:
+        """The tensions among the outputs."""
+        return Tensions(self.feed.model)
+
+    def named_signals(self, outputs: np.ndarray, u: np.ndarray) -> dict[str, float]:
+        """Return all signals by name, where outputs are known."""
         model = self.feed.model
         values = [*outputs.tolist(), *np.asarray(u).tolist()]
         return dict(zip((*model.outputs, *model.inputs), values, strict=True))
@@ -230,14 +237,18 @@ class Watch:
         """Note that a gauge has crossed, though its value may still be on either side of zero by round-off."""
         self.sides[crossing.gauge] = 1.0 if crossing.rising else -1.0
 
-    def occurrence(self, crossing: Crossing, state: State, u: np.ndarray) -> Occurrence:
-        """Return what is told of a crossing."""
-        return self.named(crossing, self.feed.model.measure(state), u)
+    def occurrence(
+        self, crossing: Crossing, state: State, u: np.ndarray, ends: tuple[State, State] | None = None
+    ) -> Occurrence:
+        """Return what is told of a crossing, by a state that may be within a step of given ends."""
+        outputs = self.tensions.within(state, *ends) if ends else self.feed.model.measure(state)
+        return self.named(crossing, outputs, u)
 
     def named(self, crossing: Crossing, outputs: np.ndarray, u: np.ndarray) -> Occurrence:
         """Return what is told of a crossing, where outputs are known."""
         named = (*(e.name for e in self.events), *self.names, *self.corner_names)
-        return Occurrence(named[crossing.gauge], float(crossing.t), bool(crossing.rising), self._signals(outputs, u))
+        signals = self.named_signals(outputs, u)
+        return Occurrence(named[crossing.gauge], float(crossing.t), bool(crossing.rising), signals)
 
     def corner(self, which: int, t: float, rising: bool) -> Crossing:
         """Return that a corner is met."""

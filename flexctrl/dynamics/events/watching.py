@@ -35,7 +35,7 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
         name = watch.names[switch]
         raise StepError(journey.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
     if landing is None or journey.mark.stuck >= _CHATTER:
-        _note(journey, found, curve, before)
+        _note(journey, found, curve, (before, after))
         watch.settle(after)
         journey.mark.stuck = 0
         return after, None
@@ -97,7 +97,8 @@ def _note_before(journey: Journey, before: Point, after: Point, there: set[int],
     watch, curve, asked = journey.watch, journey.track.curve(before, after), len(journey.watch.events)
     passed = met(watch, journey.track.curve, before, after, journey.rows.every)
     within = [c for c in passed if c.gauge < asked and not watch.stops(c.gauge)]
-    _note(journey, [c for c in within if c.gauge not in there or c.t < after.state.t - near], curve, before)
+    told = [c for c in within if c.gauge not in there or c.t < after.state.t - near]
+    _note(journey, told, curve, (before, after))
 
 
 def _is_there(journey: Journey, crossing: Crossing, before: Point, after: Point, slid: Point) -> bool:
@@ -125,7 +126,8 @@ def _switched(journey: Journey, at: Point, landing: Crossing, switch: int, brief
     return fresh
 
 
-def _note(journey: Journey, met: Sequence[Crossing], curve: Curve, before: Point) -> None:
+def _note(journey: Journey, met: Sequence[Crossing], curve: Curve, ends: tuple[Point, Point]) -> None:
+    before, after = ends
     for c in met:
         journey.watch.cross(c)
-        journey.happens(c, curve.at(c.t), before.supply.u)
+        journey.happens(c, curve.at(c.t), before.supply.u, (before.state, after.state))

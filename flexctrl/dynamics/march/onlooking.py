@@ -46,7 +46,7 @@ def looked_at(ride: Ride, before: Any, pacing: float | Pacing) -> tuple[int, int
         return status, done, False
     for crossing, state in told:
         watch.cross(crossing)
-        j.happens(crossing, state, before.supply.u)
+        j.happens(crossing, state, before.supply.u, (before.state, after.state))
     count = len(watch.events)
     j.watch.sides[:count], j.watch.sizes[:count] = watch.sides, watch.sizes
     return status, done, True

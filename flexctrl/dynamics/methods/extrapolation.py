@@ -21,6 +21,7 @@ from flexctrl.dynamics.records.dense import Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Integrator, Joining, Judging, Pace, Point, Stepper
 from flexctrl.dynamics.swift.settling import weightless
+from flexctrl.dynamics.swift.stiff_lines import lengths_of, long_as, stiff_in
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.linkages.chart import LeaningRope
@@ -183,7 +184,7 @@ class _Stepper:
         self.counts.newton += spent[0] - before[0]
         self.counts.factorisations += spent[1] - before[1]
         self.counts.worst = self.fine.counts.worst
-        state = self.moved_on(coarse.state, fine.state)
+        state = self._as_long(self.moved_on(coarse.state, fine.state), coarse.state, fine.state, h)
         rate = fine.rate + self.weight * (fine.rate - coarse.rate)
         return _Point(state, rate, self._supply(point.supply, state, coarse, fine), coarse, fine)
 
@@ -196,6 +197,17 @@ class _Stepper:
         gap = self.between(coarse, fine)
         v = fine.v + self.weight * (fine.v - self.seen(coarse, fine))
         return self.model.advance(fine, self.weight * gap, v, fine.t)
+
+    def _as_long(self, state: State, coarse: State, fine: State, h: float) -> State:
+        """An extrapolated state with the lengths of lines extrapolated: places leave a rope's circle by δ²."""
+        model = self.model
+        stiff = stiff_in(model, h)
+        if not (stiff.size and isinstance(model, Model)):
+            return state
+        longer, own = (lengths_of(model, run) for run in (coarse, fine))
+        for _ in range(_MEASURED):
+            state = long_as(model, state, own + self.weight * (own - longer), stiff)
+        return state
 
     def _supply(self, held: Supply, state: State, coarse: Point, fine: Point) -> Supply:
         if not self.feed.continuous:

@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.methods.local import Local
+from flexctrl.dynamics.records.tensions import Tensions
 from flexctrl.dynamics.steps import Point, Stepper
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
@@ -196,14 +197,34 @@ class Track:
 
     def state(self, t: float) -> tuple[State, np.ndarray]:
         """Return the state and the inputs at a time."""
-        before, after = self._step(self.stretches[max(0, bisect_right(self.starts, t) - 1)].part(t), t)
+        state, u, _ = self._found(t)
+        return state, u
+
+    def moment(self, t: float) -> tuple[State, np.ndarray, np.ndarray]:
+        """Return the state, the outputs and the inputs at a time."""
+        state, u, ends = self._found(t)
+        outputs = Tensions(self.feed.model).within(state, *ends) if ends else self.feed.model.measure(state)
+        return state, outputs, u
+
+    def _found(self, t: float) -> tuple[State, np.ndarray, tuple[State, State] | None]:
+        """The state and the inputs, and the ends of the step that it is within."""
+        before, after = self._ends(t)
         for end in (after, before):
             if t == end.state.t:
-                return end.state, end.supply.u
+                return end.state, end.supply.u, None
         h = after.state.t - before.state.t
         state = self.curve(before, after).at(t)
         share = ((t - before.state.t) / h, h)
-        return state, self.feed.between(before.supply, after.supply, share, state).u
+        u = self.feed.between(before.supply, after.supply, share, state).u
+        return state, u, (before.state, after.state)
+
+    def step(self, t: float) -> float:
+        """Return how long the step at a time is [s]."""
+        before, after = self._ends(t)
+        return float(after.state.t - before.state.t)
+
+    def _ends(self, t: float) -> tuple[Point, Point]:
+        return self._step(self.stretches[max(0, bisect_right(self.starts, t) - 1)].part(t), t)
 
     def _step(self, s: Stretched, t: float) -> tuple[Point, Point]:
         if len(s.states) == 1:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.records.dense import Curve
 from flexctrl.dynamics.records.frames import Frames, Later
 from flexctrl.dynamics.records.record import Recorder
+from flexctrl.dynamics.records.tensions import Tensions
 from flexctrl.dynamics.steps import Fixed, Pace, Point
 from flexctrl.model.state import State
 
@@ -62,7 +64,8 @@ class Rows:
             curve = curve or self.curve(before, after)
             state = curve.at(row)
             share = ((row - before.state.t) / h, h)
-            self._write(state, self.feed.between(before.supply, after.supply, share, state).u)
+            u = self.feed.between(before.supply, after.supply, share, state).u
+            self._write_between(state, before.state, after.state, u)
         if not to_jump:
             self.here(after, near)
 
@@ -75,8 +78,9 @@ class Rows:
             state = states[i]
             if abs(times[i] - row) > near:
                 before, after = (Point(end, np.zeros(0), supply) for end in (states[i - 1] if i else start, state))
-                state = self.curve(before, after).at(row)
-            elif i >= kept:
+                self._write_between(self.curve(before, after).at(row), before.state, state, supply.u)
+                continue
+            if i >= kept:
                 return
             self._write(state, supply.u)
 
@@ -104,11 +108,29 @@ class Rows:
         if len(due):
             rows, drawn = weaver.rows(steps, np.where(ends, times[steps], due), ends, *self.due())
             rows[ends] = table[steps[ends]]
+            self._straighten(rows, table, steps, ends, weaver)
             for states in drawn:
                 self.frames.take(states)
             self.count += len(due)
             self.recorder.rows(rows, inputs.at(steps, ends, rows))
         weaver.go_on(len(table))
+
+    def _straighten(
+        self, rows: np.ndarray, table: np.ndarray, steps: np.ndarray, ends: np.ndarray, weaver: Weaver
+    ) -> None:
+        """Put tensions of stiff lines right in rows within steps."""
+        h = np.diff(table[:, 0], prepend=weaver.t)
+        if ends.all() or not self.tensions.stiff(float(h.max())):
+            return
+        start = np.array([weaver.t, *weaver.reading(0, weaver.t)])
+        at, t, before = steps[~ends], rows[~ends, 0], np.vstack([start, table[:-1]])
+        share = (t - before[at, 0]) / h[at]
+        rows[~ends, 1:] = self.tensions.straight(rows[~ends, 1:], (before[at, 1:], table[at, 1:]), share, h[at])
+
+    @cached_property
+    def tensions(self) -> Tensions:
+        """Those among the outputs."""
+        return Tensions(self.feed.model)
 
     def on_steps(self, pace: Pace, sample: float, t: float) -> bool:
         """Tell whether rows are due at the ends of steps only, as these are from a time on."""
@@ -181,6 +203,11 @@ class Rows:
     def _write(self, state: State, u: np.ndarray) -> None:
         self.count += 1
         self.recorder.row(state.t, self.feed.model.measure(state), u)
+        self.frame(state)
+
+    def _write_between(self, state: State, before: State, after: State, u: np.ndarray) -> None:
+        self.count += 1
+        self.recorder.row(state.t, self.tensions.within(state, before, after), u)
         self.frame(state)
 
     def frame(self, state: State) -> None:

@@ -18,6 +18,7 @@ from flexctrl.dynamics.scales import once
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.rounding import DIGITS
+from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 from flexctrl.structure.drives import LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.lines import Rope, Spring
@@ -33,7 +34,10 @@ __all__ = [
     "firmest_shaft",
     "frequency_of",
     "lengthening",
+    "lengths_of",
+    "long_as",
     "noise",
+    "stiff_in",
     "stiffest",
     "told_by_differences",
 ]
@@ -46,6 +50,9 @@ SURE = 1e-11
 _HEAVY = 5e5
 """Mass that a load moves with along a rigid rope over that across it: from where on lines are stiff as ropes are, and
 up to where differences of forces, right to eight digits, make a tangent."""
+
+_HELD = 1e-10
+"""Share of its own that a line's matrix is firmer by, where lines side by side are one too many."""
 
 TURNING, SHORT = 0.5, 1.0 / 64.0
 """Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
@@ -165,6 +172,69 @@ def lengthening(model: Model, state: State) -> Iterator[tuple[str, np.ndarray, f
         rows = (_pulls(model, lines, state) @ model.motion.jacobian(state)).tocsr()
         for i, (line, frequency) in enumerate(zip(lines, once(model, _own).tolist(), strict=True)):
             yield line.name, rows[[i]].toarray().ravel(), frequency
+
+
+def stiff_in(model: Plant, h: float) -> np.ndarray:
+    """Return the numbers of the lines that turn by more than a radian of their vibration in a step of some length [s].
+
+    Parameters
+    ----------
+    model : Plant
+    h : float
+
+    Returns
+    -------
+    numpy.ndarray of int
+    """
+    return np.flatnonzero(h * once(model, _frequencies) > 1.0)
+
+
+def long_as(model: Model, state: State, lengths: np.ndarray, which: np.ndarray) -> State:
+    """Return a state moved a little, along some lines and as light things move, to lengths of all.
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+    lengths : numpy.ndarray, shape (lines,)
+        As `lengths_of` tells them.
+    which : numpy.ndarray of int
+        The lines that are to have them.
+
+    Returns
+    -------
+    State
+    """
+    pulls = (_pulls(model, _giving_way(model), state) @ model.motion.jacobian(state)).tocsr()[which]
+    moves = sp.diags(once(model, _mobility)) @ pulls.T
+    between = (pulls @ moves).tocsr()
+    own = between.diagonal()
+    firm = between + sp.diags(np.where(own > _HELD * own.max(initial=0.0), _HELD * own, 1.0))
+    gap = (lengths - lengths_of(model, state))[which]
+    return model.advance(state, moves @ factorise(firm.tocsr())(gap), state.v, state.t)
+
+
+def lengths_of(model: Model, state: State) -> np.ndarray:
+    """Return how far apart the ends of lines that give way are, less what winches have paid out, shape (lines,).
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+
+    Returns
+    -------
+    numpy.ndarray
+    """
+    found = []
+    for line in _giving_way(model):
+        nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
+        first, second = (model.structure.number(node) for node in nodes)
+        paid = (
+            state.driven[model.structure.drives.index(line)] / line.effective_ratio if isinstance(line, Winch) else 0.0
+        )
+        found.append(float(np.linalg.norm(state.x[second] - state.x[first])) - paid)
+    return np.array(found)
 
 
 def told_by_differences(model: Plant) -> bool:
