@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["little", "unsized"]
 
-_LITTLE, _NOTHING, _FIT = 2.0, 1e-4, 1e-3
+_LITTLE, _NOTHING, _FIT = 2.0, 1e-2, 1e-3
 """Absolute tolerances that a motion goes through: as little as steps may err by, no more than rounding; what fits."""
 
 
