@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.swift.stiff_lines import _frequencies, _lines, _pulls
+from flexctrl.dynamics.swift.stiff_lines import _lines, frequencies, pulls_of
 from flexctrl.model.laws import kinks
 from flexctrl.model.model import Model
 
@@ -43,11 +43,11 @@ def test_steps_of_a_row_grow_as_the_number_of_its_pieces():
 
 def test_pieces_pull_at_six_places_each():
     model = slack_rope(200)
-    pulls = _pulls(model, _lines(model), model.rest)
+    pulls = pulls_of(model, _lines(model), model.rest)
     assert pulls.shape[0] == 200
     assert pulls.nnz <= 6 * 200
     piece = 10.5 / 200
-    np.testing.assert_allclose(_frequencies(model)[5], np.sqrt(1e5 / piece * 2.0 / (10.0 / 12.0 * piece)))
+    np.testing.assert_allclose(frequencies(model)[5], np.sqrt(1e5 / piece * 2.0 / (10.0 / 12.0 * piece)))
 
 
 @pytest.mark.slow

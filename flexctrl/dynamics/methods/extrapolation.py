@@ -20,8 +20,8 @@ from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.dense import Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Integrator, Joining, Judging, Pace, Point, Stepper
+from flexctrl.dynamics.swift.lengths import lengths_of, long_as, stiff_in
 from flexctrl.dynamics.swift.settling import weightless
-from flexctrl.dynamics.swift.stiff_lines import lengths_of, long_as, stiff_in
 from flexctrl.errors import StructureError
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.linkages.chart import LeaningRope

@@ -46,7 +46,7 @@ def ringing(run: Run, journey: Journey) -> Run:
 
     What is out of balance at the start accelerates a line's ends, or a motor, by a: they swing about where forces
     balance by a/ω², and a motor's speed by a/ω. So do they where an input jumps, by what it adds to a. Where that is
-    5 % of what the output gets to, and steps turn it by more than a radian on average, its peaks are a matter of
+    5 % of what the output gets to, and steps turn it by more than a radian while it rings, its peaks are a matter of
     chance, but for the first, which short first steps may see; where the two runs of `Richardson` part by a third of a
     radian in it, they are too large. What turns by less than a radian, steps may damp away or have lag, if nothing else
     ends it before. Where dry contacts may hold, this tells nothing.
@@ -99,8 +99,17 @@ def _step(run: Run, journey: Journey, since: float, lasts: float) -> float:
 
 
 class _Ringing(NamedTuple):
-    """Of an output: its name, since when it rings, in words, and for how long [s], in what steps [s]; what it goes
-    through, and the largest share that is told of others."""
+    """An output that rings.
+
+    Attributes
+    ----------
+    name, since : str
+        Since when, in words.
+    lasts, step : float
+        For how long, and in what steps [s].
+    way, told : float
+        What it goes through, and the largest share that is told of others.
+    """
 
     name: str
     since: str

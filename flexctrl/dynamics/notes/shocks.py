@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics.run import Run
-from flexctrl.dynamics.swift.stiff_lines import lengthening
-from flexctrl.errors import SingularMatrixError
+from flexctrl.dynamics.swift.lengths import lengthening
+from flexctrl.errors import ControllerError, SingularMatrixError
 from flexctrl.model.model import Model
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
@@ -197,9 +197,10 @@ def _jumps(run: Run, journey: Journey) -> Iterator[_Jump]:
     if feed.continuous:
         beside = _BESIDE * journey.point.state.t
         inner = [b for b in (*feed.breaks, *feed.met) if track.starts[0] + beside < b < journey.point.state.t - beside]
-        for b in sorted(set(inner))[:_MOST]:
-            state, before = track.state(b - beside)
-            yield _Jump(state.with_(t=b), before, track.state(b + beside)[1])
+        with suppress(ControllerError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
+            for b in sorted(set(inner))[:_MOST]:
+                state, before = track.state(b - beside)
+                yield _Jump(state.with_(t=b), before, track.state(b + beside)[1])
     elif len(t) > 1 and (every is None or feed.sample_time > 0.5 * every):
         leaps = np.abs(np.diff(run.u, axis=0))
         for row in np.unique(1 + np.argmax(leaps, axis=0)).tolist() if leaps.any() else []:

@@ -7,7 +7,7 @@ force across it: (h ω/2)² times the angle between, of the correction itself. S
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,6 @@ from flexctrl.dynamics.scales import once
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.rounding import DIGITS
-from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
 from flexctrl.structure.drives import LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.lines import Rope, Spring
@@ -33,11 +32,7 @@ __all__ = [
     "firmest_freedom",
     "firmest_shaft",
     "frequency_of",
-    "lengthening",
-    "lengths_of",
-    "long_as",
     "noise",
-    "stiff_in",
     "stiffest",
     "told_by_differences",
 ]
@@ -50,9 +45,6 @@ SURE = 1e-11
 _HEAVY = 5e5
 """Mass that a load moves with along a rigid rope over that across it: from where on lines are stiff as ropes are, and
 up to where differences of forces, right to eight digits, make a tangent."""
-
-_HELD = 1e-10
-"""Share of its own that a line's matrix is firmer by, where lines side by side are one too many."""
 
 TURNING, SHORT = 0.5, 1.0 / 64.0
 """Corrections that shrink by no more than this go back and forth, between a slack rope and a taut one, and are
@@ -107,7 +99,7 @@ def firmest(model: Plant) -> float:
     float
     """
     wall = np.inf if once(model, _spreads).max(initial=0.0) > _HEAVY else 0.0
-    return float(max(once(model, _frequencies).max(initial=0.0), wall))
+    return float(max(once(model, frequencies).max(initial=0.0), wall))
 
 
 def firmest_shaft(model: Plant) -> float:
@@ -150,91 +142,8 @@ def frequency_of(model: Model, name: str) -> float:
     -------
     float
     """
-    found = dict(zip([line.name for line in _giving_way(model)], once(model, _own).tolist(), strict=True))
+    found = dict(zip([line.name for line in giving_way(model)], once(model, own_frequencies).tolist(), strict=True))
     return float(found.get(name, 0.0))
-
-
-def lengthening(model: Model, state: State) -> Iterator[tuple[str, np.ndarray, float]]:
-    """Return how each degree of freedom lengthens each line that gives way.
-
-    Parameters
-    ----------
-    model : Model
-    state : State
-
-    Returns
-    -------
-    iterator of (str, numpy.ndarray of shape (n,), float)
-        The line's name, and its frequency as if all others let go [rad/s].
-    """
-    lines = _giving_way(model)
-    if lines:
-        rows = (_pulls(model, lines, state) @ model.motion.jacobian(state)).tocsr()
-        for i, (line, frequency) in enumerate(zip(lines, once(model, _own).tolist(), strict=True)):
-            yield line.name, rows[[i]].toarray().ravel(), frequency
-
-
-def stiff_in(model: Plant, h: float) -> np.ndarray:
-    """Return the numbers of the lines that turn by more than a radian of their vibration in a step of some length [s].
-
-    Parameters
-    ----------
-    model : Plant
-    h : float
-
-    Returns
-    -------
-    numpy.ndarray of int
-    """
-    return np.flatnonzero(h * once(model, _frequencies) > 1.0)
-
-
-def long_as(model: Model, state: State, lengths: np.ndarray, which: np.ndarray) -> State:
-    """Return a state moved a little, along some lines and as light things move, to lengths of all.
-
-    Parameters
-    ----------
-    model : Model
-    state : State
-    lengths : numpy.ndarray, shape (lines,)
-        As `lengths_of` tells them.
-    which : numpy.ndarray of int
-        The lines that are to have them.
-
-    Returns
-    -------
-    State
-    """
-    pulls = (_pulls(model, _giving_way(model), state) @ model.motion.jacobian(state)).tocsr()[which]
-    moves = sp.diags(once(model, _mobility)) @ pulls.T
-    between = (pulls @ moves).tocsr()
-    own = between.diagonal()
-    firm = between + sp.diags(np.where(own > _HELD * own.max(initial=0.0), _HELD * own, 1.0))
-    gap = (lengths - lengths_of(model, state))[which]
-    return model.advance(state, moves @ factorise(firm.tocsr())(gap), state.v, state.t)
-
-
-def lengths_of(model: Model, state: State) -> np.ndarray:
-    """Return how far apart the ends of lines that give way are, less what winches have paid out, shape (lines,).
-
-    Parameters
-    ----------
-    model : Model
-    state : State
-
-    Returns
-    -------
-    numpy.ndarray
-    """
-    found = []
-    for line in _giving_way(model):
-        nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
-        first, second = (model.structure.number(node) for node in nodes)
-        paid = (
-            state.driven[model.structure.drives.index(line)] / line.effective_ratio if isinstance(line, Winch) else 0.0
-        )
-        found.append(float(np.linalg.norm(state.x[second] - state.x[first])) - paid)
-    return np.array(found)
 
 
 def told_by_differences(model: Plant) -> bool:
@@ -269,17 +178,17 @@ def _spreads(model: Plant) -> np.ndarray:
     return np.array(found)
 
 
-def _frequencies(model: Plant) -> np.ndarray:
+def frequencies(model: Plant) -> np.ndarray:
     """Frequencies of the lines as drawn, each as if the others let go, shape (lines,)."""
-    return _own(model) if _lines(model) else np.zeros(0)
+    return own_frequencies(model) if _lines(model) else np.zeros(0)
 
 
-def _own(model: Plant) -> np.ndarray:
+def own_frequencies(model: Plant) -> np.ndarray:
     """The same, also where they do not turn."""
-    lines = _giving_way(model) if isinstance(model, Model) else ()
+    lines = giving_way(model) if isinstance(model, Model) else ()
     if not (lines and isinstance(model, Model)):
         return np.zeros(0)
-    return _alone(model, _pulls(model, lines, model.rest), [_stiffness(line) for line in lines])
+    return _alone(model, pulls_of(model, lines, model.rest), [_stiffness(line) for line in lines])
 
 
 def _shafts(model: Plant) -> np.ndarray:
@@ -294,15 +203,15 @@ def _freedoms(model: Plant) -> np.ndarray:
     """Frequencies of the degrees of freedom at rest, each alone, shape (n,); 0 of what has no mass."""
     still = np.zeros(model.n)
     slope = model.slope(model.rest, still, still, (1.0, 0.0, 0.0), np.zeros(len(model.inputs)))
-    return np.sqrt(np.maximum(-slope.diagonal(), 0.0) * _mobility(model))
+    return np.sqrt(np.maximum(-slope.diagonal(), 0.0) * mobility(model))
 
 
 def _alone(model: Model, moves: sp.csr_matrix, stiffness: Sequence[float]) -> np.ndarray:
     """Frequencies of springs that raw coordinates lengthen, against the masses that they move."""
-    return np.sqrt((moves @ model.motion.jacobian(model.rest)).power(2) @ _mobility(model) * stiffness)
+    return np.sqrt((moves @ model.motion.jacobian(model.rest)).power(2) @ mobility(model) * stiffness)
 
 
-def _mobility(model: Plant) -> np.ndarray:
+def mobility(model: Plant) -> np.ndarray:
     """One over the mass of each degree of freedom at rest, shape (n,); 0 of what has none."""
     still = np.zeros(model.n)
     mass = -model.slope(model.rest, still, still, (0.0, 0.0, 1.0), np.zeros(len(model.inputs))).diagonal()
@@ -312,10 +221,10 @@ def _mobility(model: Plant) -> np.ndarray:
 
 def _lines(model: Plant) -> tuple[Line, ...]:
     """What pulls along a line between two nodes and turns with it: nothing in small motion."""
-    return _giving_way(model) if isinstance(model, Model) and model.large else ()
+    return giving_way(model) if isinstance(model, Model) and model.large else ()
 
 
-def _giving_way(model: Model) -> tuple[Line, ...]:
+def giving_way(model: Model) -> tuple[Line, ...]:
     """What pulls along a line between two nodes that may part."""
     parts = (*model.structure.elements, *model.structure.drives)
     return tuple(p for p in parts if isinstance(p, Spring) or (isinstance(p, Rope | Winch) and model.bends(p)))
@@ -326,7 +235,7 @@ def _stiffness(line: Line) -> float:
     return line.stiffness if isinstance(line, Rope | Spring) else line.EA / line.length
 
 
-def _pulls(model: Model, lines: tuple[Line, ...], state: State) -> sp.csr_matrix:
+def pulls_of(model: Model, lines: tuple[Line, ...], state: State) -> sp.csr_matrix:
     """How each raw coordinate lengthens each line in a state, shape (lines, raw)."""
     rows, columns, values = [], [], []
     for i, line in enumerate(lines):
