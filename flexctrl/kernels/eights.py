@@ -24,13 +24,13 @@ def put(x: np.ndarray, value: Eight | float) -> None:
 
 
 def larger(a: Eight, b: Eight) -> Eight:
-    """Return the larger of two, entry by entry; NaN counts as less."""
-    return np.fmax(a, b)
+    """Return the larger of two, entry by entry; NaN counts as less, and symbols as beyond all."""
+    return np.fmax(a, b) if a.dtype != object else np.full(a.shape, np.inf, dtype=object)
 
 
 def largest(a: Eight) -> float:
-    """Return the largest entry."""
-    return float(np.fmax.reduce(a))
+    """Return the largest entry; infinity of symbols, which may be anything."""
+    return float(np.fmax.reduce(a)) if a.dtype != object else np.inf
 
 
 def total(a: Eight) -> float:

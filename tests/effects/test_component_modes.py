@@ -281,3 +281,17 @@ def test_a_plane_keeps_only_the_modes_in_it(backend):
 def test_modes_askew_to_the_plane_are_refused():
     with pytest.raises(StructureError, match="'rod' is held in a plane to which its section lies askew"):
         model(fc.planar(arm(1, up=(0, 1, 1)), "y"), fc.ComponentModes(1))
+
+
+def test_driven_arms_move_alike_in_more_modes():
+    """Links on hinges, compiled as one piece of nodes that turn freely: such a machine could not be run."""
+    arm = fc.cranes.flexible_arm(elements=1)
+    common = [fc.Gravity(), fc.ShaftElasticity(), fc.LargeRotation(), fc.RayleighDamping(beta=1e-3)]
+    runs = [
+        fc.simulate(fc.assemble(arm, [*common, effect]), until=0.1, method=fc.GeneralizedAlpha(1e-3))
+        for effect in (fc.ComponentModes(2), fc.ComponentModes(3))
+    ]
+    assert {run.status for run in runs} == {fc.Status.FINISHED}
+    few, more = (run["tip_z"] for run in runs)
+    assert np.ptp(more) > 1e-3
+    assert np.abs(few - more).max() < 0.05 * np.ptp(more)
