@@ -44,11 +44,10 @@ def leaves(run: Run, journey: Journey, feed: Feed | None) -> bool:
     -------
     bool
     """
-    if feed is not None and feed.sample_time:
+    if feed is not None and feed.sample_time and feed.reads.size:
         from flexctrl.dynamics.notes.sampled_growth import grows  # brings all that modes need
 
-        if grows(journey, feed):
-            return True
+        return grows(journey, feed)
     model, end = journey.plan.model, journey.point
     if not isinstance(model, Model) or not end.state.t > 0.0:
         return False
