@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from flexctrl.dynamics.scales import once
 from flexctrl.dynamics.swift.stiff_lines import (
+    ends_of,
     frequencies,
     giving_way,
     mobility,
@@ -61,8 +62,7 @@ def lengths_of(model: Model, state: State) -> np.ndarray:
     """
     found = []
     for line in giving_way(model):
-        nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
-        first, second = (model.structure.number(node) for node in nodes)
+        first, second = ends_of(model, line)
         paid = (
             state.driven[model.structure.drives.index(line)] / line.effective_ratio if isinstance(line, Winch) else 0.0
         )

@@ -185,8 +185,7 @@ def frequencies(model: Plant) -> np.ndarray:
 
 def own_frequencies(model: Plant) -> np.ndarray:
     """The same, also where they do not turn."""
-    lines = giving_way(model) if isinstance(model, Model) else ()
-    if not (lines and isinstance(model, Model)):
+    if not (isinstance(model, Model) and (lines := giving_way(model))):
         return np.zeros(0)
     return _alone(model, pulls_of(model, lines, model.rest), [_stiffness(line) for line in lines])
 
@@ -239,8 +238,7 @@ def pulls_of(model: Model, lines: tuple[Line, ...], state: State) -> sp.csr_matr
     """How each raw coordinate lengthens each line in a state, shape (lines, raw)."""
     rows, columns, values = [], [], []
     for i, line in enumerate(lines):
-        nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
-        first, second = (model.structure.number(node) for node in nodes)
+        first, second = ends_of(model, line)
         arm = state.x[second] - state.x[first]
         arm = arm / max(float(np.linalg.norm(arm)), np.finfo(float).tiny)
         columns += [6 * end + k for end in (second, first) for k in range(3)]
@@ -250,6 +248,13 @@ def pulls_of(model: Model, lines: tuple[Line, ...], state: State) -> sp.csr_matr
             values.append(-1.0 / line.effective_ratio)
         rows += [i] * (7 if isinstance(line, Winch) else 6)
     return sp.csr_matrix((values, (rows, columns)), shape=(len(lines), model.motion.raw))
+
+
+def ends_of(model: Model, line: Line) -> tuple[int, int]:
+    """The numbers of the nodes that a line is between."""
+    nodes = (line.against, line.node) if isinstance(line, Winch) else line.nodes
+    first, second = (model.structure.number(node) for node in nodes)
+    return first, second
 
 
 def _twists(model: Model, drives: Sequence[RotaryDrive | LinearDrive]) -> sp.csr_matrix:
