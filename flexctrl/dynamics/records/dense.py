@@ -200,10 +200,15 @@ class Track:
         state, u, _ = self._found(t)
         return state, u
 
+    @cached_property
+    def tensions(self) -> Tensions:
+        """The tensions among the outputs."""
+        return Tensions(self.feed.model)
+
     def moment(self, t: float) -> tuple[State, np.ndarray, np.ndarray]:
         """Return the state, the outputs and the inputs at a time."""
         state, u, ends = self._found(t)
-        outputs = Tensions(self.feed.model).within(state, *ends) if ends else self.feed.model.measure(state)
+        outputs = self.tensions.within(state, *ends) if ends else self.feed.model.measure(state)
         return state, outputs, u
 
     def _found(self, t: float) -> tuple[State, np.ndarray, tuple[State, State] | None]:
