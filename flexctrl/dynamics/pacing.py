@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["controlled", "fixed"]
 
 _NEAR = 1e-9
-_HALVED, _CRUMBLED = 64, 2
+_HALVED, _CRUMBLED = 128, 2
 """Where steps under a continuous law fall apart into more pieces, after so many in a row, it chatters."""
 _CAPS, _SHORTER = 2.0, 0.25
 """Steps in which a law is hit are no longer than that many that follow the impact; longer ones are cut to a share."""
