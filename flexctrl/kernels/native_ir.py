@@ -64,6 +64,14 @@ class Translation(Expressions):
             if action is None:
                 raise self._fail(f"{type(statement).__name__} is no statement it knows")
             action(statement)
+            if self._leaves(statement):
+                return
+
+    def _leaves(self, statement: ast.stmt) -> bool:
+        """Tell whether what follows is never reached: after a return, also in the branch that is known to be taken."""
+        if isinstance(statement, ast.If) and (known := self._decided(statement.test)) is not None:
+            return any(self._leaves(inner) for inner in (statement.body if known else statement.orelse))
+        return isinstance(statement, ast.Return)
 
     def _expr(self, s: ast.Expr) -> None:
         if not isinstance(s.value, ast.Constant):

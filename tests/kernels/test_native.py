@@ -201,6 +201,21 @@ def test_no_code_is_made_for_what_is_absent(counts):
     assert Packed(record).bound(forces_of_both)() == forces_of_both(record)
 
 
+def guarded(m: Two) -> int:
+    if m.one.springs == 0 or m.rounds < 0:
+        if m.one.dampers == 0:
+            return 7
+        return 8
+    return int(springy(m.one.x))
+
+
+@pytest.mark.parametrize(("counts", "expected"), [((0, 0), 7), ((0, 1), 8), ((1, 0), 2)])
+def test_no_code_is_made_for_what_is_behind_a_return_for_good(counts, expected):
+    record = Two(*(Parts(*counts, np.array([1.0, 2.0])) for _ in range(2)))
+    assert ("@springy(" in assembly(guarded, lasting_zeros(record))) == (counts[0] > 0)
+    assert Packed(record).bound(guarded)() == guarded(record) == expected
+
+
 def test_a_number_said_to_be_zero_is_left_out():
     record = Two(*(Parts(0, 1, np.array([1.0, 2.0])) for _ in range(2)), rounds=0)
     assert Packed(record).bound(forces_of_both, without=("rounds",))() == forces_of_both(record)
