@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from flexctrl.cli.program import Request
 from flexctrl.errors import SceneError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.laws.idle import idle
@@ -21,7 +21,7 @@ DRIFT = 1e-6
 """Modes slower than this share of the fastest are free motion, but for rounding."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Cut:
     """Where a scene's loop is looked at.
 

@@ -12,18 +12,18 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
 import flexctrl
 from flexctrl.errors import EquilibriumError, FlexctrlError, MechanismError, SceneError, did_you_mean
+from flexctrl.frozen import frozen
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 
 
-@dataclass(frozen=True)
+@frozen
 class Command:
     """One command: where it lives and what its help says.
 
@@ -118,7 +118,7 @@ _OPTIONS: dict[str, dict[str, object]] = {
 }
 
 
-@dataclass(frozen=True)
+@frozen
 class Request:
     """What was asked on the command line.
 

@@ -7,7 +7,7 @@ import platform
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -19,6 +19,7 @@ from flexctrl.cli.health import health
 from flexctrl.cli.program import COMMANDS, Request
 from flexctrl.design.hardware import Noisy
 from flexctrl.errors import FlexctrlError
+from flexctrl.frozen import frozen
 from flexctrl.report.leads import LEADS
 from flexctrl.report.modes import animation
 from flexctrl.report.page import Section, page
@@ -42,7 +43,7 @@ _MODES = 12
 _PACKAGES = ("numpy", "scipy", "control", "casadi", "matplotlib", "llvmlite", "slycot")
 
 
-@dataclass(frozen=True)
+@frozen
 class Chapter:
     """What one command had to say."""
 

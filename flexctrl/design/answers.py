@@ -7,7 +7,6 @@ method towards it. What depends on time alone has to be polynomials in pieces.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
@@ -18,6 +17,7 @@ from flexctrl.design.hardware import AntiWindup, Quantised, Sampled, Saturated
 from flexctrl.design.lowering import LAWS, NotLowered, Told, Tracer, once
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, simplified
 from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Together, Tracking
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ __all__ = ["Answering", "answering"]
 _MOST, _STATES = 4000, 12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Answering:
     """A continuous law as a kernel.
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 
 from flexctrl.errors import ControllerError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import listed
 
 __all__ = ["Controller", "IOSystemController", "LinearController", "as_controller"]
@@ -107,7 +107,7 @@ class Controller(Protocol):
         """
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class LinearController:
     """ẋ (or x at the next sample) = A x + B y,  u = C x + D y.
 
@@ -173,7 +173,7 @@ class LinearController:
         return LinearController(step[:, :n], step[:, n:], self.C, self.D, self.inputs, self.outputs, sample_time)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class IOSystemController:
     """A ``control.NonlinearIOSystem`` (a gain schedule, an own update function) as a controller.
 
@@ -204,7 +204,7 @@ class IOSystemController:
     update = rate
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Completed:
     """An own controller with the members it left out."""
 

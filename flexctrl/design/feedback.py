@@ -8,7 +8,6 @@ is ``-law * plant``. `Tracking` makes them follow a reference.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,13 @@ import numpy as np
 from flexctrl.design.piecewise import require_finite
 from flexctrl.design.wrapping import check_plant, matrix
 from flexctrl.errors import ControllerError, check_kind
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import numbers
 
 __all__ = ["FilteredRate", "observer", "observer_feedback", "pd", "pi", "pid", "state_feedback"]
 
 
-@dataclass(frozen=True)
+@frozen
 class FilteredRate:
     """The rate of a measured signal from the signal itself: s/(T s + 1), where no rate is measured.
 

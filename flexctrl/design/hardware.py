@@ -7,7 +7,7 @@ With zero strength (no limit, no delay, zero step, zero noise) each equals what 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.wrapping import Wrapper, by_name, check_names, discretised
 from flexctrl.errors import ControllerError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import numbers
 
 __all__ = ["AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated", "bare"]
@@ -22,7 +23,7 @@ __all__ = ["AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sample
 Limits = Mapping[str, float | tuple[float, float]]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Sampled(Wrapper):
     """A continuous controller run by a computer: measured, computed and held every ``sample_time`` seconds.
 
@@ -59,7 +60,7 @@ class Sampled(Wrapper):
         return Sampled(self.controller, sample_time)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Saturated(Wrapper):
     """Commands cut off at limits; the states inside do not notice (see `AntiWindup`).
 
@@ -92,7 +93,7 @@ class Saturated(Wrapper):
         return np.minimum(np.maximum(self.controller.command(t, x, y), low), high)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class AntiWindup(Saturated):
     """A linear controller with limits that stops integrating while that would push a command further out.
 
@@ -144,7 +145,7 @@ class AntiWindup(Saturated):
         return places[excess.dot(effect) * change[places] > 0]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class RateLimited(Wrapper):
     """Commands that change by no more than a rate allows from one sample to the next.
 
@@ -187,7 +188,7 @@ class RateLimited(Wrapper):
         return np.concatenate([self.controller.update(t, x[:n], y), self.command(t, x, y)])
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Delayed(Wrapper):
     """Commands that reach the plant a whole number of samples late.
 
@@ -232,7 +233,7 @@ class Delayed(Wrapper):
         return np.concatenate([self.controller.update(t, own, y), waiting, self.controller.command(t, own, y)])
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Quantised(Wrapper):
     """Measurements or commands rounded to whole steps: encoder counts, converter bits.
 
@@ -272,7 +273,7 @@ class Quantised(Wrapper):
         return self.controller.update(t, x, _rounded(y, *self.grids[0]))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Noisy(Wrapper):
     """White Gaussian noise on measurements or commands, the same in every run.
 

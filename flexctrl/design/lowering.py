@@ -18,6 +18,7 @@ from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
 from flexctrl.design.piecewise import Trajectory
 from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Pairs, Signal, Together, Tracking
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Backend, Kernel, Run
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ class Tracer:
         return own(self, x, y)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Lowered:
     """A law as a kernel.
 

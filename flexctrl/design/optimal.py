@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,14 @@ import numpy as np
 from flexctrl.design.feedback import observer_feedback
 from flexctrl.design.wrapping import by_name, check_plant, matrix
 from flexctrl.errors import ControllerError, DesignError
+from flexctrl.frozen import frozen
 
 __all__ = ["Estimator", "Regulator", "bryson", "kalman", "lqg", "lqr"]
 
 _TOLERANCE = 1e-8  # largest Riccati residual accepted, relative to the terms of the equation
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Regulator:
     """A linear-quadratic state feedback u = −K x, checked.
 
@@ -39,7 +39,7 @@ class Regulator:
     residual: float
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Estimator:
     """A steady Kalman filter gain, checked.
 
@@ -179,7 +179,7 @@ def lqg(
 Solution = tuple[np.ndarray, np.ndarray, float]  # gain, Riccati solution, residual
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Riccati:
     """The Riccati equation of min ∫ xᵀQx + uᵀRu, ẋ = A x + B u, or of the sum for x⁺ = A x + B u."""
 

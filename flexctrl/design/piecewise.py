@@ -6,7 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.errors import ControllerError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import listed, numbers
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class Trajectory(ABC):
         return self.derivative(t)
 
 
-@dataclass(frozen=True)
+@frozen
 class PiecewisePolynomial(Trajectory):
     """Σ_k c[i][k] (t − knots[i])^k from knot i until the next, the last one for ever.
 
@@ -231,7 +231,7 @@ class PiecewisePolynomial(Trajectory):
         return (self.knots[i], self.coefficients[i]) if i >= 0 else (self.knots[0], (self.before,))
 
 
-@dataclass(frozen=True)
+@frozen
 class Constant(Trajectory):
     """The same value at all times: a set point, or an operating point to work about.
 
@@ -257,7 +257,7 @@ class Constant(Trajectory):
         return Constant(0.0)
 
 
-@dataclass(frozen=True)
+@frozen
 class Sum(Trajectory):
     """The sum of several trajectories: there and back, a disturbance on a move.
 

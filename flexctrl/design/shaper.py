@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
 from flexctrl.design.piecewise import reals
 from flexctrl.errors import ControllerError
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import numbers
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Mode(NamedTuple):
     zeta: float = 0.0
 
 
-@dataclass(frozen=True)
+@frozen
 class Shaper:
     """Impulses A_i at times t_i that a command is convolved with: r(t) → Σ A_i r(t − t_i).
 

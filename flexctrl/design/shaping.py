@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, distinct, simplified
 from flexctrl.design.shaper import Shaper
 from flexctrl.errors import ControllerError, check_kind
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_seconds
 
 __all__ = ["CoarseGridWarning", "Shaped", "check_grid", "fir"]
@@ -23,7 +23,7 @@ class CoarseGridWarning(UserWarning):
     """A shaper is run on samples too coarse for the fastest mode it is meant for."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Shaped(Trajectory):
     """A trajectory convolved with a shaper, exactly in continuous time: Σ A_i r(t − t_i).
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from itertools import pairwise
 from numbers import Real
@@ -15,6 +15,7 @@ from flexctrl.design.piecewise import distinct
 from flexctrl.design.shaping import check_grid
 from flexctrl.design.wrapping import Stateless, Wrapper, breaks_of, check_mapping, check_names, discretised
 from flexctrl.errors import ControllerError
+from flexctrl.frozen import frozen
 
 __all__ = ["Commanded", "FeedForward", "OpenLoop", "Together", "Tracking"]
 
@@ -22,7 +23,7 @@ Signal = Callable[[float], float]  # a Trajectory, or any function of time
 Pairs = tuple[tuple[int, Signal], ...]  # place in the vector, what is added there
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Tracking(Wrapper):
     """Feedback on the deviation from a reference: u = F(y − r(t)).
 
@@ -77,7 +78,7 @@ class Tracking(Wrapper):
         return deviation
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Commanded(Wrapper):
     """A controller some of whose inputs are reference signals, bound to functions of time: u = F(y, r(t)).
 
@@ -137,7 +138,7 @@ class Commanded(Wrapper):
         return full
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class OpenLoop(Stateless):
     """Plant inputs driven as functions of time, nothing measured.
 
@@ -191,7 +192,7 @@ class OpenLoop(Stateless):
         return OpenLoop(self.commands, sample_time)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class FeedForward(Wrapper):
     """Functions of time added to what a controller commands: u = F(y) + u_ff(t).
 

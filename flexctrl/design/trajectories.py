@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 from numbers import Real
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from flexctrl.design.piecewise import PiecewisePolynomial, Trajectory, reals, require_finite
 from flexctrl.errors import ControllerError, check_kind
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import numbers
 
 __all__ = [
@@ -56,7 +57,7 @@ class _Profile(Trajectory):
         return self.pieces.knots
 
 
-@dataclass(frozen=True)
+@frozen
 class Step(_Profile):
     """A jump of ``size`` at time ``at``; the impulse in its rate is left out.
 
@@ -79,7 +80,7 @@ class Step(_Profile):
         return PiecewisePolynomial((self.at,), ((self.start + self.size,),), self.start)
 
 
-@dataclass(frozen=True)
+@frozen
 class Ramp(_Profile):
     """A rise at a constant slope for ``duration`` seconds, then held.
 
@@ -110,7 +111,7 @@ class Ramp(_Profile):
         return PiecewisePolynomial(knots, (rise, (self.start + self.slope * self.duration,)), self.start)
 
 
-@dataclass(frozen=True)
+@frozen
 class TrapezoidalVelocity(_Profile):
     """Rest to rest: constant acceleration, constant speed, constant deceleration (triangular if short).
 
@@ -148,7 +149,7 @@ class TrapezoidalVelocity(_Profile):
         return self.breaks[-1] - self.at
 
 
-@dataclass(frozen=True)
+@frozen
 class MinimumJerk(_Profile):
     """Rest to rest with d (10 τ³ − 15 τ⁴ + 6 τ⁵), τ = (t − at)/T: the least ∫ jerk² (Flash & Hogan 1985).
 
@@ -177,7 +178,7 @@ class MinimumJerk(_Profile):
         return PiecewisePolynomial((self.at, self.at + T), (move, (self.start + d,)), self.start)
 
 
-@dataclass(frozen=True)
+@frozen
 class Table(_Profile):
     """Values at instants with straight lines between them; held before the first and after the last.
 
@@ -199,7 +200,7 @@ class Table(_Profile):
         return PiecewisePolynomial(tuple(t), tuple(zip(v, slopes, strict=True)), v[0])
 
 
-@dataclass(frozen=True)
+@frozen
 class Spline(_Profile):
     """Values at instants joined by a cubic spline with continuous curvature, at rest at both ends.
 
@@ -223,7 +224,7 @@ class Spline(_Profile):
         return PiecewisePolynomial(tuple(t), (*map(tuple, rows), (v[-1],)), v[0])
 
 
-@dataclass(frozen=True)
+@frozen
 class TimeOptimalPendulum(_Profile):
     """Quickest path of a trolley, rest to rest, that leaves the pendulum under it at rest too.
 

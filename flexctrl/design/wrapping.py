@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.errors import ControllerError, check_kind, did_you_mean, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import numbers
 
 __all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised"]
@@ -44,7 +44,7 @@ class Stateless:
     update = rate
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Wrapper:
     """Passes everything through to the controller it is wrapped around.
 
@@ -103,7 +103,7 @@ class Wrapper:
         return dataclasses.replace(self, controller=discretised(self.controller, sample_time))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class IntegratedController(Wrapper):
     """Any continuous controller, sampled: its state is integrated between samples with y held.
 

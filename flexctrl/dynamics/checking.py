@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
 from flexctrl.dynamics.steps import Fixed
 from flexctrl.errors import FlexctrlError
+from flexctrl.frozen import frozen
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
 
@@ -38,7 +39,7 @@ _NEARLY = 0.001
 _UNCHECKED = "how far small differences have grown is not told by another run"
 
 
-@dataclass(frozen=True)
+@frozen
 class Beginning:
     """Where a run begins, for others to begin there too.
 
@@ -185,7 +186,7 @@ def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning
     return _as_much(replace(told, checkpoint=finer.checkpoint, report=replace(told.report, notes=notes)), finer)
 
 
-@dataclass(frozen=True)
+@frozen
 class Other:
     """A run beside another one.
 

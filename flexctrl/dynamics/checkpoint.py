@@ -9,7 +9,7 @@ import math
 import os
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile, is_zipfile
@@ -20,6 +20,7 @@ from flexctrl.dynamics.records.books import Sums
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Mark, Pace, Point
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_path, check_seconds
@@ -31,7 +32,7 @@ _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Checkpoint:
     """All that the rest of a run depends on beside model, controller and method: from ``run.checkpoint``.
 
@@ -129,7 +130,7 @@ class Checkpoint:
         os.replace(beside, path)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Origin:
     """Where a run began, and where those stand that were laid beside it: what these tell goes on with it.
 
@@ -186,7 +187,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     return found
 
 
-@dataclass(frozen=True)
+@frozen
 class Autosave:
     """Checkpoints written while a run goes on, each replacing the one before.
 

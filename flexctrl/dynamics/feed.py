@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from flexctrl.dynamics.law_state import error, softened, trapezoidal
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.said import CommandError, blamed, reals, state_of
 from flexctrl.errors import ControllerError
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import FLOAT, Compiled
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
@@ -32,7 +33,7 @@ _NEAR = 1e-10
 _NONE = np.zeros(0)
 
 
-@dataclass(frozen=True)
+@frozen
 class Supply:
     """Inputs at an instant: u, the controller's state, and how fast that changes.
 
@@ -61,7 +62,7 @@ class Supply:
         return replace(self, trend=(self.rate - before.rate) / h, most=np.maximum(far, np.abs(self.x)))
 
 
-@dataclass(frozen=True)
+@frozen
 class Feed:
     """A controller on a model; without one the inputs stay as they are.
 

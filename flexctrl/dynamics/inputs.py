@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+
+from flexctrl.frozen import frozen
 
 __all__ = ["Inputs", "Stepwise"]
 
@@ -27,7 +28,7 @@ class Inputs(Protocol):
         """
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Stepwise:
     """Inputs that are constant over each step.
 

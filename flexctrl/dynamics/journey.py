@@ -48,6 +48,7 @@ from flexctrl.dynamics.steps import (
 from flexctrl.dynamics.stops import Stops
 from flexctrl.dynamics.unheld import bare, needed
 from flexctrl.errors import ControllerError
+from flexctrl.frozen import frozen
 from flexctrl.model.modal_region import beyond_modes
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import bent, overturned, twirled
@@ -61,7 +62,7 @@ _SECONDS = 0.1
 _NONE, _NOTHING = Drift(), OutputErrors({})
 
 
-@dataclass(frozen=True)
+@frozen
 class Plan:
     """What a run is to do.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_number
 
@@ -31,7 +32,7 @@ class Status(Enum):
     INTERRUPTED = "interrupted"
 
 
-@dataclass(frozen=True)
+@frozen
 class Tolerance:
     """Accuracy asked of an error-controlled run: of each of its steps.
 
@@ -77,7 +78,7 @@ class Tolerance:
         return self.absolute + self.relative * moved
 
 
-@dataclass(frozen=True)
+@frozen
 class EnergyBalance:
     """Where the energy of a run went [J]: kinetic + stored = start + work − dissipated, but for the residual.
 
@@ -104,7 +105,7 @@ class EnergyBalance:
         return self.kinetic + self.stored - self.start - self.work + self.dissipated
 
 
-@dataclass(frozen=True)
+@frozen
 class Report:
     """Numerical health of a run; ``print(run.report)`` shows it.
 
@@ -203,7 +204,7 @@ def worst_output(errors: Mapping[str, float]) -> str:
     return f"of the outputs {name} is off by the largest share of what it goes through, up to {errors[name]:.2g}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Moment:
     """A run at one instant: ``moment["load_z"]`` gives a signal by name.
 
@@ -225,7 +226,7 @@ class Moment:
         return self.signals[signal]
 
 
-@dataclass(frozen=True)
+@frozen
 class Run:
     """Curves of a simulation; ``run["load_z"]`` gives a signal by name.
 

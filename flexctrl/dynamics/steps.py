@@ -16,6 +16,7 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.errors import FlexctrlError, SingularMatrixError
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds
@@ -42,7 +43,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
+@frozen
 class Point:
     """A state, its accelerations, and what feeds it; methods that remember more extend it."""
 
@@ -144,14 +145,14 @@ def singular_tangent(error: SingularMatrixError, t: float, h: float) -> StepErro
     return StepError(error.where, f"the tangent is singular at t = {t:.6g} s with a step of {h:.3g} s")
 
 
-@dataclass(frozen=True)
+@frozen
 class Fixed:
     """Steps of one length [s], shortened a little so that a whole number of them ends at a sample or break."""
 
     step: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Controlled:
     """Steps chosen from the estimated error.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 
 from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_finite, check_number
 
 __all__ = ["Automatic", "Within"]
@@ -71,7 +72,7 @@ class Within:
         return ", ".join(f"{name} {100.0 * most:.3g} %" for name, most in asked.items() if math.isfinite(most))
 
 
-@dataclass(frozen=True)
+@frozen
 class Automatic(Effect):
     """Of the effects beside it, a run simulates only those that the scene's answer needs.
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.places import by_place, check_large, not_negative
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Spring
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class Backlash(Effect):
     """Gears and springs with play: V = ½ k dz(ε)² with dz(ε) what the strain ε goes beyond ± half the gap.
 

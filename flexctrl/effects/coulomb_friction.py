@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect, Inner
 from flexctrl.effects.places import by_place, check_large, check_static
+from flexctrl.frozen import frozen
 from flexctrl.structure.contacts import contact_of
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class Coulomb:
     """Dry friction: what it takes to break loose, and what holds against sliding.
 
@@ -47,7 +47,7 @@ class Coulomb:
         object.__setattr__(self, "stribeck", check_finite(stribeck, "stribeck", "Coulomb", least=0.0))
 
 
-@dataclass(frozen=True)
+@frozen
 class CoulombFriction(Effect):
     """Dry friction in drives, hinges and slides: it sticks exactly, and slides against a constant force.
 

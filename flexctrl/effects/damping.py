@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.places import by_place, finite
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.beam import BeamForce, viscous_force
 from flexctrl.mechanics.beam_inertia import drag
 from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-@dataclass(frozen=True)
+@frozen
 class RayleighDamping(Effect):
     """C = α M + β K: α on absolute velocities, β on the rates of strain of each part.
 
@@ -96,7 +96,7 @@ class RayleighDamping(Effect):
         return ca.vertcat(-m.p["ratio"] * torque * m.gradient, motor)
 
 
-@dataclass(frozen=True)
+@frozen
 class ModalDamping(Effect):
     """C = M Φ diag(2 ζᵢ ωᵢ) Φᵀ M from the undamped modes about the machine's equilibrium; 0 is no damping.
 

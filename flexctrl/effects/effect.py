@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.beam import BeamForce, no_force
 from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-@dataclass(frozen=True)
+@frozen
 class Inner:
     """A freedom of an effect that no node has: a bristle's bend, a motor's torque.
 

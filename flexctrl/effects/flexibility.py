@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.beam import BeamForce, elastic_force
 from flexctrl.mechanics.corotation import BeamMotion
 from flexctrl.mechanics.pieces import DriveMotion, LineMotion, rope_energy, shaft_energy, shaft_force, spring_tension
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-@dataclass(frozen=True)
+@frozen
 class Deforming(Effect, ABC):
     """Some parts deform; the others, and all parts without it, are rigid.
 
@@ -132,7 +133,7 @@ class RopeStretch(Deforming):
         return isinstance(part, Rope | Winch)
 
 
-@dataclass(frozen=True)
+@frozen
 class Flexible(Effect):
     """All flexibility at once: `BeamFlexibility`, `ShaftElasticity` and `RopeStretch`.
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.effects.places import by_place, finite
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class GeometricStiffness(Effect):
     """Small motion about the equilibrium under the machine's loads, with the stiffness that these give.
 

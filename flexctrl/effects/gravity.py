@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.beam import BeamForce
 from flexctrl.mechanics.beam_inertia import height_energy, weight
 from flexctrl.mechanics.corotation import BeamMotion, NodeMotion
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-@dataclass(frozen=True)
+@frozen
 class Gravity(Effect):
     """The weight of beams, bodies and point masses: V = −∫ g·x dm.
 

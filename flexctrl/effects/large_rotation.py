@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flexctrl.effects.effect import Effect
+from flexctrl.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class LargeRotation(Effect):
     """Parts may move and turn as far as they like: element frames ride along (Crisfield, Galvanetto & Jelenić 1997).
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect, Inner
 from flexctrl.effects.places import by_place, check_large, check_static, identifier
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.contacts import contact_of
 from flexctrl.structure.freedoms import check_finite
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class LuGre:
     """The LuGre law (Canudas de Wit, Olsson, Åström & Lischinsky 1995).
 
@@ -72,7 +72,7 @@ class LuGre:
         object.__setattr__(self, "static", stick)
 
 
-@dataclass(frozen=True)
+@frozen
 class LuGreFriction(Effect):
     """Dry friction with presliding in drives, hinges and slides; its bristle is an inner first-order freedom.
 

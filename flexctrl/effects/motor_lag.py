@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect, Inner
 from flexctrl.effects.places import by_place, check_drives, not_negative
+from flexctrl.frozen import frozen
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class MotorLag(Effect):
     """The torque of a motor follows its command as T τ̇ + τ = M_d, with the electrical time constant T = L/R.
 

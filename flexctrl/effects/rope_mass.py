@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import listed
 from flexctrl.structure.lines import Rope
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class RopeMass(Effect):
     """Ropes have their mass ρA, and as many elements as they are given: they sag, swing and carry waves.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,11 +11,12 @@ from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.structure.freedoms import Vector, parse_point
 
 
-@dataclass(frozen=True)
+@frozen
 class RotatingFrame(Effect):
     """The machine is described in axes that turn at a constant rate Ω about a fixed axis.
 

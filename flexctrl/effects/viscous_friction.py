@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.places import by_place, not_negative
+from flexctrl.frozen import frozen
 from flexctrl.structure.contacts import contact_of
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class ViscousFriction(Effect):
     """Viscous friction in drives, hinges and slides: −c times the speed of one side against the other.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from flexctrl.effects.effect import Effect
@@ -11,6 +10,7 @@ from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.places import by_place, not_negative
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.freedoms import Vector, check_finite, parse_point
 from flexctrl.structure.naming import node_of
@@ -18,7 +18,7 @@ from flexctrl.structure.nodes import Node
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class Wind(Effect):
     """Drag of the air on nodes: F = ½ ρ c_d A |w − v| (w − v) (EN 1991-1-4, EN 13001-2), v the speed of the node.
 

@@ -9,13 +9,14 @@ code through LLVM (the extra ``fast``).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from flexctrl.errors import KernelError, MissingExtraError
+from flexctrl.frozen import frozen
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -29,7 +30,7 @@ _FEW = 64
 _OLDEST_LLVMLITE = (0, 45)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Kernel:
     """The physics of one item as a casadi expression.
 
@@ -120,7 +121,7 @@ class Kernel:
         return self.outputs.shape[0]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Tables:
     """Checked private copies of the index tables of a batch.
 
@@ -218,7 +219,7 @@ class Backend(Protocol):
         """Check the tables and return the run over them."""
 
 
-@dataclass(frozen=True)
+@frozen
 class CasadiVM:
     """casadi's virtual machine: needs nothing else. A bound run has work arrays, so one thread at a time."""
 
@@ -238,7 +239,7 @@ def can_compile() -> bool:
     return tuple(map(int, llvmlite.__version__.split(".")[:2])) >= _OLDEST_LLVMLITE
 
 
-@dataclass(frozen=True)
+@frozen
 class Compiled:
     """Machine code through LLVM, several items at a time; bound runs may be called from several threads.
 
@@ -292,7 +293,7 @@ def best_backend() -> Backend:
     return Compiled() if can_compile() else CasadiVM()
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Batch:
     """A kernel with the tables of its items.
 

@@ -15,7 +15,6 @@ import sys
 import threading
 from collections.abc import Callable
 from ctypes import addressof
-from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
@@ -24,6 +23,7 @@ import llvmlite
 import llvmlite.binding as binding
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import FLOAT, Kernel, Tables, parameter_table
 from flexctrl.kernels.llvm_cache import stored
 from flexctrl.kernels.llvm_ir import LIBRARY, row_order, translate
@@ -43,7 +43,7 @@ _start: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Code:
     """Machine code in memory.
 
@@ -202,7 +202,7 @@ def _library_addresses() -> dict[str, int]:
     return {name: address for name, address in found.items() if address is not None}
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class CompiledRun:
     """A compiled kernel bound to tables; see `flexctrl.kernels.kernel.Run`.
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel, Tables, parameter_table
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class VMRun:
     """A kernel bound to tables, run by casadi; see `flexctrl.kernels.kernel.Run`.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.eights import eight, put, total
 from flexctrl.kernels.native import Reals, Wholes
 
@@ -26,7 +27,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Tiles:
     """Where the tiles stand: those of a panel one after the other, that of the diagonal first.
 
@@ -44,7 +45,7 @@ class Tiles:
     below: Wholes
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Factorising:
     """A = L D Lᵀ without exchange of rows.
 
@@ -72,7 +73,7 @@ class Factorising:
     work: Reals
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Solving:
     """Right-hand sides, solved for in place.
 
@@ -89,7 +90,7 @@ class Solving:
     x: Reals
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Product:
     """A symmetric matrix as it is multiplied.
 

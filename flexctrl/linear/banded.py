@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import can_compile
 from flexctrl.linear.krylov import Space
 
@@ -21,7 +21,7 @@ TRIES = 4
 UNCLEAR = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Factor:
     """L of A = L Lᵀ.
 
@@ -46,7 +46,7 @@ class Factor:
     space: Callable[[np.ndarray, np.ndarray, np.ndarray], Space] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Band:
     """The order (reverse Cuthill–McKee) in which a symmetric pattern is a narrow band, and where entries stand in it.
 

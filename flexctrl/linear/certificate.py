@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from flexctrl.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class Certificate:
     """Evidence that a linear model is the derivative of its machine at an equilibrium.
 

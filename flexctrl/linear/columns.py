@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.eights import eight, lost, put, rounded
 from flexctrl.kernels.kernel import can_compile
 from flexctrl.kernels.native import Packed, Reals, Wholes
@@ -16,7 +15,7 @@ __all__ = ["Columns", "energies", "strain"]
 SMALL = 300
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Columns:
     """A sparse matrix, column by column, and vectors in groups of eight.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.native import Packed
 from flexctrl.linear.band_loops import (
     Factorising,
@@ -29,7 +29,7 @@ from flexctrl.linear.pattern_loops import Arranging, Filling, arrange, fill
 __all__ = ["CompiledBand", "Recurrence"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class CompiledBand(Band):
     """A band in tiles of eight rows and columns; see `band_loops`."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from functools import cached_property
 
@@ -12,6 +12,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 from flexctrl.errors import LinearizationError, MechanismError
+from flexctrl.frozen import frozen
 from flexctrl.linear.banded import Band, band_of
 from flexctrl.linear.eigen import coordinate_scales
 from flexctrl.linear.massless import DENSE_BLOCK, Massless, as_dense, massless, pivots, solved
@@ -33,7 +34,7 @@ class Freedom(Enum):
     MECHANISM = "mechanism"
 
 
-@dataclass(frozen=True)
+@frozen
 class Audit:
     """Label of every coordinate.
 
@@ -79,7 +80,7 @@ class Audit:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True)
+@frozen
 class Scaled:
     """A linear model in coordinates scaled by powers of two, with its massless freedoms.
 

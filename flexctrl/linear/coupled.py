@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from flexctrl.errors import LinearizationError
+from flexctrl.frozen import frozen
 from flexctrl.linear.modal import ModalSystem
 from flexctrl.linear.modal_sum import divided, pole_sum
 from flexctrl.linear.resolvent import cached_resolvent
@@ -18,7 +19,7 @@ __all__ = ["coupled_transfer"]
 CHUNK = 512
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Integrators:
     """States that nothing else depends on (A has a zero column): x = (row x_rest + input u) / s.
 

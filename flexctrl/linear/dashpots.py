@@ -11,11 +11,11 @@ plane or on the axis, the Hermitian part of 1 + s G_ll is at least 1, and elimin
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from flexctrl.errors import LinearizationError
+from flexctrl.frozen import frozen
 from flexctrl.linear.modal import ModalSystem
 from flexctrl.linear.modal_sum import ModalSum
 from flexctrl.linear.model import LinearModel
@@ -35,7 +35,7 @@ EPS = float(np.finfo(float).eps)
 Response = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Dashpots:
     """Φᵀ C Φ = diag(damping) + pull pullᵀ.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import numpy as np
 import scipy.linalg as la
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import FirstOrder, modal_first_order
 
@@ -21,7 +21,7 @@ __all__ = ["FirstOrderHold", "Hold", "ZeroOrderHold", "discretize"]
 Taps = dict[int, np.ndarray]
 
 
-@dataclass(frozen=True)
+@frozen
 class ZeroOrderHold:
     """The input stays at its last sample (a digital-to-analogue converter).
 
@@ -37,7 +37,7 @@ class ZeroOrderHold:
         _check_delay(self.delay)
 
 
-@dataclass(frozen=True)
+@frozen
 class FirstOrderHold:
     """The input runs straight from sample to sample (exact for ramps; needs the next sample at delay 0).
 

@@ -7,7 +7,7 @@ from the inverted one, high pairs from the direct one in the M-orthogonal rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
+from flexctrl.frozen import frozen
 from flexctrl.linear.banded import Band
 from flexctrl.linear.krylov import Space
 from flexctrl.linear.pencil import (
@@ -43,7 +44,7 @@ GROWTH, CLEAR = 1e5, 1e-3
 NEARLY = 1e-3
 
 
-@dataclass(frozen=True)
+@frozen
 class Eigenpairs:
     """Pairs in ascending order of λ; the rigid ones have λ = 0 exactly.
 
@@ -218,7 +219,7 @@ def lowest_pairs(K: sp.csc_matrix, M: sp.csc_matrix, count: int, band: Band | No
     raise LinearizationError("the lowest modes could not be certified by a Sturm count; ask for another count")
 
 
-@dataclass(frozen=True)
+@frozen
 class _Found:
     """Pairs near a shift; soft ones, whose λ may be rounding alone, are polished."""
 

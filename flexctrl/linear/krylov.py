@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import lapack
+
+from flexctrl.frozen import frozen
 
 __all__ = ["NOTHING", "Blocks", "Grown", "Krylov", "Space", "krylov"]
 
@@ -21,7 +22,7 @@ ORTHOGONAL = 1e-2
 SELDOM = 7
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Krylov:
     """What `krylov` found.
 

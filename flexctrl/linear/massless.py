@@ -6,8 +6,6 @@ diagonal, component by component of their graph, so that a light part does not p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -16,6 +14,7 @@ from scipy.linalg import lapack
 from scipy.sparse.csgraph import connected_components
 
 from flexctrl.errors import LinearizationError
+from flexctrl.frozen import frozen
 from flexctrl.linear.banded import Band, band_of
 
 __all__ = ["Massless", "as_dense", "massless", "null_split", "pivots", "solved"]
@@ -29,7 +28,7 @@ DENSE_BLOCK = 300
 SMALL_PIVOT = 1e-8
 
 
-@dataclass(frozen=True)
+@frozen
 class Massless:
     """Bases (columns, in scaled coordinates) of the three kinds of massless freedom.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import PartMatrices
 
@@ -40,7 +41,7 @@ KNOWN_UNITS: dict[str, dict[str, float]] = {
 """Names of units by kind, and their sizes in SI."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Units:
     """Names of the units that the numbers of a model are in; nothing is converted by them.
 

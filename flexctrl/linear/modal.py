@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import NoneType
 
 import numpy as np
@@ -10,6 +10,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, check_kind
+from flexctrl.frozen import frozen
 from flexctrl.linear.condense import Scaled, condense, refuse_improper, scaled, static_response
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
@@ -21,7 +22,7 @@ __all__ = ["ModalSystem", "Relaxation", "modal_damping", "modal_system", "proper
 EPS = float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Relaxation:
     """First-order states a of the freedoms with damping but no mass: ȧ = -rates a + input u - drag η̇.
 
@@ -45,7 +46,7 @@ class Relaxation:
     output_rate: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class ModalSystem:
     """η̈ + damping η̇ + (Λ + circulatory) η + reaction ȧ = φᵀ B u;  y = … + feedthrough u + jump u̇.
 

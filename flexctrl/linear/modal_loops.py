@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from flexctrl.frozen import frozen
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals
 
 __all__ = ["Summing", "add_modes"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Summing:
     """Σ still/(ω_k² − growth² − ω² + i d ω) at many ω.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import can_compile
 from flexctrl.kernels.native import Packed
 from flexctrl.linear.direct import infinite
@@ -19,7 +19,7 @@ CACHED = 8192
 MANY, FEW = 8192, 32
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class ModalSum:
     """Σ (still + s moving)/(s² + d s + λ) for many s, as matrix products.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.parts import PartMatrices, projected_parts
 from flexctrl.linear.place import Place
 from flexctrl.structure.freedoms import listed
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["LinearModel"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class LinearModel:
     """M q̈ + C q̇ + K q = B u,  y = Cq q + Cv q̇ + D u, with names.
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.place import Place
 from flexctrl.structure.freedoms import check_whole
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Modes", "shares_of"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Modes:
     """Modes of K φ = ω² M φ, in ascending order of ω²: unstable, rigid-body, flexible.
 

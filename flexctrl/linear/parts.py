@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
+
 __all__ = ["PartMatrices", "Parts", "energies_by_part", "parts_of", "projected_parts", "with_springs"]
 
 
-@dataclass(frozen=True)
+@frozen
 class PartMatrices:
     """What one part (a beam, a drive …) contributes to K and M: for energy shares by part.
 
@@ -26,7 +28,7 @@ class PartMatrices:
     mass: sp.csc_matrix
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Parts(Mapping[str, PartMatrices]):
     """The shares of all parts in one stack: rows of a part's own freedoms, one part after the other.
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from flexctrl.frozen import frozen
 from flexctrl.kernels.eights import put
 from flexctrl.kernels.native import Reals, Wholes
 
 __all__ = ["Arranging", "Filling", "Mirroring", "arrange", "fill", "reflect"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Arranging:
     """A symmetric pattern, the order of its columns, and what comes of that.
 
@@ -40,7 +39,7 @@ class Arranging:
     where: Wholes
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Filling:
     """Entries on their way to the tiles.
 
@@ -62,7 +61,7 @@ class Filling:
     lower: Reals
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Mirroring:
     """A pattern and its mirror image.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TypeAlias
 
@@ -13,6 +12,7 @@ import scipy.sparse.linalg as sla
 from scipy.linalg import lapack
 
 from flexctrl.errors import LinearizationError
+from flexctrl.frozen import frozen
 from flexctrl.linear.banded import Band, band_of
 from flexctrl.linear.krylov import Blocks, Space, krylov
 from flexctrl.linear.pattern import aligned, with_entries
@@ -65,7 +65,7 @@ def _noise(squared: Matrix, shapes: np.ndarray) -> np.ndarray:
     return EPS * np.sqrt(np.einsum("ij,ij->j", squares, squared @ squares))
 
 
-@dataclass(frozen=True)
+@frozen
 class ShiftedPencil:
     """K − σM, factorised.
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
+
+from flexctrl.frozen import frozen
 
 __all__ = ["Place"]
 
@@ -23,7 +25,7 @@ class Elastic(Protocol):
 Machine = TypeVar("Machine", bound=Elastic)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Place(Generic[Machine, Shape]):
     """The machine that a linear model is of: for drawing its modes, and for stiffnesses to more digits.
 

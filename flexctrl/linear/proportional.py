@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
+
+from flexctrl.frozen import frozen
 
 __all__ = ["Proportional", "proportional"]
 
@@ -16,7 +16,7 @@ NOTHING = 1e-15
 EPS, CAUTION = float(np.finfo(float).eps), 10.0
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Proportional:
     """C = alpha M + beta K + rest.
 

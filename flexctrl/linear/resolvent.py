@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import scipy.linalg as la
+
+from flexctrl.frozen import frozen
 
 __all__ = ["Resolvent", "cached_resolvent", "resolvent"]
 
@@ -14,7 +15,7 @@ WORST_BASIS = 1e3
 BLOCK = 32
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Resolvent:
     """A = Q T Q⁻¹ with T diagonal or upper triangular.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.poles import second_order_roots
@@ -27,7 +27,7 @@ MOST_SOLVES = 3_000
 DENSE_POLES = 300
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class FrequencyResponse:
     """Samples of H(iω) with names.
 

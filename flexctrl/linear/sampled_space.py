@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
@@ -12,6 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.pattern import aligned
 from flexctrl.linear.resolvent import Resolvent, resolvent
@@ -30,7 +30,7 @@ OUTSIDE = 2.0
 Faces: TypeAlias = "tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Metric:
     """A model expanded about s = a, A(s) = A + z C + z² M with z = s − a, and P = sym(A) = Wᵀ W.
 
@@ -102,7 +102,7 @@ def metric_of(model: LinearModel, a: float) -> Metric | None:
     return Metric(model, a, A, sp.csc_matrix(C + 2.0 * a * M), M, sp.csc_matrix(A - P), inverse, root, rows)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Space:
     """The model within the span of V, and its residuals.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.condense import condense
 from flexctrl.linear.modal import ModalSystem, modal_system, proper
 from flexctrl.linear.model import LinearModel
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["FirstOrder", "Form", "ModalForm", "PhysicalForm", "first_order", "to_ss"]
 
 
-@dataclass(frozen=True)
+@frozen
 class ModalForm:
     """Real modal blocks in energy coordinates (ω η, η̇): xᵀx/2 is the energy of a flexible mode.
 
@@ -29,7 +29,7 @@ class ModalForm:
     """
 
 
-@dataclass(frozen=True)
+@frozen
 class PhysicalForm:
     """[q, q̇] in the coordinates kept by condensation.
 
@@ -46,7 +46,7 @@ class PhysicalForm:
 Form = ModalForm | PhysicalForm
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class FirstOrder:
     """ẋ = A x + B u, y = C x + D u.
 

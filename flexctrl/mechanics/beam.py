@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics import component_modes
 from flexctrl.mechanics.corotation import SHEARING, BeamMotion, components
 from flexctrl.mechanics.rotation import inverse_tangent
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-@dataclass(frozen=True)
+@frozen
 class BeamForce:
     """A force on an element by what it works on; shares add, and reach the nodes by `nodal_force` once.
 

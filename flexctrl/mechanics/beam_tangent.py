@@ -9,9 +9,10 @@ the frame adds. This takes half the instructions of differentiating the whole.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.beam import BeamForce, whole_force
 from flexctrl.mechanics.corotation import BeamMotion, NodeMotion, OwnMotion, beam_motion, framed_motion
 from flexctrl.mechanics.rotation import inverse_tangent
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-@dataclass(frozen=True)
+@frozen
 class _Seen:
     """What is seen in the element frame, and the frame; symbols or values."""
 

@@ -7,17 +7,18 @@ polynomials. Lengths are over that of the beam, s = x/L.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+
+from flexctrl.frozen import frozen
 
 __all__ = ["ClampedModes", "HeldShapes", "clamped_modes", "held_shapes"]
 
 _POINTS = 200
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class ClampedModes:
     """Integrals over s from 0 to 1 of the first modes φᵢ, ∫φᵢ² = 1, with the cubics N of (v₁, θ₁ L, v₂, θ₂ L).
 
@@ -78,7 +79,7 @@ def clamped_modes(count: int) -> ClampedModes:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class HeldShapes:
     """Integrals over s from 0 to 1 of shapes χᵢ of stretch or twist that are 0 at both ends.
 

@@ -8,9 +8,10 @@ matrix (Crisfield, Galvanetto & Jelenić 1997).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.matrices import PlaneMass
 from flexctrl.mechanics.rotation import rotation_vector
 
@@ -33,7 +34,7 @@ _UPRIGHT, _TURNED = 1e-3, -0.84
 over at half a turn."""
 
 
-@dataclass(frozen=True)
+@frozen
 class NodeMotion:
     """Symbols of a node: position x, rotation R since rest, velocity v, spin w, and their rates a, b.
 
@@ -79,7 +80,7 @@ class OwnMotion(NamedTuple):
     along: int = 0
 
 
-@dataclass(frozen=True)
+@frozen
 class BeamMotion:
     """What the effects may use of a moving beam element; vectors in the element frame unless said.
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.corotation import NodeMotion, reach
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ DRIVE_PARAMETERS = (
 )
 
 
-@dataclass(frozen=True)
+@frozen
 class LineMotion:
     """A straight line between two nodes: its length, how fast that grows, and its direction in space."""
 
@@ -38,7 +38,7 @@ class LineMotion:
     direction: ca.SX
 
 
-@dataclass(frozen=True)
+@frozen
 class DriveMotion:
     """A drive: the driven coordinate s (angle or travel), the source angle and their rates.
 

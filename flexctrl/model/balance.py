@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.errors import SingularMatrixError
+from flexctrl.frozen import frozen
 from flexctrl.model.mixed import Excess
 from flexctrl.model.model import Model
 from flexctrl.model.paths.pivots import holds, negative_pivots
@@ -41,7 +42,7 @@ _LASTING = (
 _STILL, _UNFELT, _CARRIED = 4.0 * float(np.finfo(float).eps), 1e-7, 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Balance:
     """The conditions of one equilibrium.
 

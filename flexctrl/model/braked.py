@@ -9,7 +9,7 @@ follows: with steps δq = B δy, where δy has G δq / G_p in place of δq_p, th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from flexctrl.errors import EquilibriumError, StructureError
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.balance import Balance
 from flexctrl.model.eased import told
@@ -35,7 +36,7 @@ __all__ = ["balance_of", "bearing", "borne", "rest_held"]
 _INDEPENDENT, _CLOSE, _LEANING = 1e-9, 1e-9, 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Braked(Balance):
     """A balance in which freedoms that follow from others are held too.
 

@@ -7,12 +7,13 @@ drives' source angles. Inner freedoms of effects (a bristle, a motor's torque) c
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
 from flexctrl.effects.effect import Inner
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Backend
 from flexctrl.model.linkages.levers import Levers
 from flexctrl.model.linkages.linkage import Linkage
@@ -24,7 +25,7 @@ from flexctrl.structure.relations import Track
 __all__ = ["Coordinates"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Coordinates:
     """The degrees of freedom of a machine, and what of it each of them moves.
 

@@ -12,10 +12,11 @@ each round leaves the share of 2⁻²³ of what was wrong, or more where stiffne
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
 from flexctrl.model.model import Model
 from flexctrl.model.rounding import DIGITS
@@ -29,7 +30,7 @@ _ALIKE, _BESIDE = 1e-12, 2.0**-10
 _SOFT, _DUST, _LAST_DIGITS = 2.0**-100, 2.0**-90, 2.0**-44
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Eased:
     """A balance behind shafts that are eased.
 

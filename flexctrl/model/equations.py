@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.mixed import Excess
 from flexctrl.model.motion import DENSE_UP_TO
@@ -56,7 +56,7 @@ class Equations(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class LargeMotion:
     """Equations about the place where the machine is: Tᵀ (f(x, v, a) + loads) − viscous v = 0.
 
@@ -121,7 +121,7 @@ class LargeMotion:
         return kinetic, stored, power + float(state.v @ (self.model.viscous @ state.v))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Small:
     """Constant matrices of a model that moves little: load − K (q − q₀) − C v − M a, q₀ being those at rest.
 
@@ -135,7 +135,7 @@ class Small:
     inputs: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class SmallMotion:
     """Linear equations about the drawn shape or another place q₀: load + loads − K (q − q₀) − C v − M a = 0.
 

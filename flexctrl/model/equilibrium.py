@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import EquilibriumError, StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import check_state, off_rails
 from flexctrl.model.eased import Eased, eased
@@ -28,7 +29,7 @@ _SOFT_REACH, _NEAR = 0.3, 0.1
 _IN_PLACE, _ASTRAY = 1e-15, 1e-12
 
 
-@dataclass(frozen=True)
+@frozen
 class Rest:
     """A machine in equilibrium.
 

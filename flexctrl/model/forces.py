@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.extended import EXTENDED, evaluate
 from flexctrl.kernels.kernel import Backend, Run
 from flexctrl.linear.parts import Parts, parts_of
@@ -24,7 +24,7 @@ from flexctrl.model.unfolded import LEVELS, Unfolded
 _ROUND_OFF = 1e-14
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Terms:
     """Sizes of what is added up over the pieces.
 
@@ -40,7 +40,7 @@ class Terms:
     slopes: sp.csr_matrix
 
 
-@dataclass(frozen=True)
+@frozen
 class Forces:
     """The sum of all families.
 

@@ -9,13 +9,13 @@ Newton method (Magisano, Leonetti & Garcea 2017). The equations and their soluti
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.effects.effect import Effect
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Backend, CasadiVM, Kernel, Run
 from flexctrl.mechanics import beam, corotation, pieces, strains, winch
 from flexctrl.mechanics.beam_tangent import beam_slope
@@ -33,7 +33,7 @@ _FEW = 64
 """Pieces up to which the virtual machine runs a kernel sooner than it could be compiled."""
 
 
-@dataclass(frozen=True)
+@frozen
 class _Elastic:
     """How a kind of piece strains: how many stresses it has, and its two kernels' outputs.
 
@@ -157,7 +157,7 @@ def _still(kind: Kind, symbols: ca.SX, increment: ca.SX) -> list:
     return moved(kind, still, increment, ca.SX([1.0, 0.0, 0.0]))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Excess:
     """Stresses borne beside those of a state, and what they do there.
 
@@ -175,7 +175,7 @@ class Excess:
     raw: np.ndarray
 
 
-@dataclass(frozen=True)
+@frozen
 class Mixed:
     """The stresses of all pieces of a model that strain.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, check_kind, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Backend
 from flexctrl.model.assembly import assembled, mass_blocks, modal_blocks, stiffness_blocks
 from flexctrl.model.equations import Equations, LargeMotion, Small, SmallMotion
@@ -47,7 +48,7 @@ _LASTING = ("inputs", "outputs", "large", "signals", "gusts", "forces", "dust", 
 """What does not depend on the forces that a model carries."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Model:
     """The equations of motion of a structure under some effects: Tᵀ (f(x, v, a) + loads) = 0.
 

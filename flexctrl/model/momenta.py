@@ -7,7 +7,7 @@ d/dt (M v) = force − c + Ṁ v: nothing but v and the place is needed, and whe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.mechanics.corotation import PARAMETERS, NodeMotion, reach
 from flexctrl.mechanics.pieces import named
@@ -34,7 +35,7 @@ __all__ = ["LinearMomenta", "Momenta", "momenta_of"]
 _LINES = (SPRING, ROPE, HEAVY_ROPE)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Momenta:
     """Momenta of the degrees of freedom of a model that may move far, and the forces that change them.
 
@@ -132,7 +133,7 @@ class Momenta:
         return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class LinearMomenta:
     """Momenta where masses are constant: M v; `Momenta` says what each method gives.
 

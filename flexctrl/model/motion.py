@@ -6,12 +6,13 @@ freedoms out to raw ones (see `Coordinates`), master to follower, and forces bac
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Run
 from flexctrl.mechanics.rotation import orthonormal, turn_kernel
 from flexctrl.model.coordinates import Coordinates
@@ -36,7 +37,7 @@ FAST = 0.5
 """Steps of freedoms above which driven angles may turn by more than half a turn [rad]."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Motion(Coordinates):
     """How the nodes and source angles move with the degrees of freedom; see `Coordinates`."""
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexctrl.errors import MechanismError, SingularMatrixError, StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.model.audit import Freedom, audit
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.linkages.chart import Chart
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["Equations", "to_nlsys"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Equations:
     """ξ̇ = X(ξ) v,  M(ξ) v̇ = f(ξ, v, u): what python-control integrates.
 

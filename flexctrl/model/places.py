@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import logarithm
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _TURN = 2.0 * np.pi
 _STILL, _WANDERED, _SMALL = 1e-9, 0.02, 1e-5
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Places:
     """Coordinates that are places, as `Model.displace` and the chart of `to_nlsys` have them.
 

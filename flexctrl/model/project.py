@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import StructureError, check_kind
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.consistent import extent
 from flexctrl.model.state import State
@@ -27,7 +28,7 @@ _TURN = 0.5
 _SHORTEST = 1e-3
 
 
-@dataclass(frozen=True)
+@frozen
 class Projection:
     """The state nearest to what was wished, and by how much it differs.
 
@@ -64,7 +65,7 @@ class Projection:
         return f"{what} by at most {sizes[worst]:.3g} {unit}" + (f" ({self.nodes[worst]})" if sizes[worst] else "")
 
 
-@dataclass(frozen=True)
+@frozen
 class _Wish:
     """Where some nodes shall be, and values of degrees of freedom that no node shows.
 

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import SingularMatrixError
+from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
 from flexctrl.model.solve import Plan, factorise, plan
@@ -22,7 +23,7 @@ _FREE_MOTIONS, _DUST, _TOO_FAR, _DUST_OF = 6, 8.0, 0.1, 1e-12
 _SPREAD, _FASTEST = 100.0, 1e12
 
 
-@dataclass(frozen=True)
+@frozen
 class Found:
     """Where a search ended.
 

@@ -19,11 +19,12 @@ second still holds all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import with_springs
 from flexctrl.linear.pattern import symmetric
@@ -41,7 +42,7 @@ _DROWNED = 2.0**-20
 _DUST, _ALIKE = 1e-12, 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Shafts:
     """Shafts of drives, by how they twist with the free coordinates.
 
@@ -117,7 +118,7 @@ class _Shafts:
         return ~np.isin(np.arange(self.rows.shape[1]), self.motors)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Bare:
     """A machine whose shafts are next to nothing.
 

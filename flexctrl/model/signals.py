@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ import scipy.sparse as sp
 from flexctrl.effects.backlash import gaps_of
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.motor_lag import MotorLag
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.mechanics.pieces import line_motion
 from flexctrl.mechanics.winch import WINCH_PARAMETERS, paid_out
@@ -44,7 +44,7 @@ Gauge = Callable[[State, np.ndarray], float]
 Slope = Callable[[State, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
 
 
-@dataclass(frozen=True)
+@frozen
 class Measure:
     """One output: its value, and its slope as (cells, on raw motion, cells, on raw rates)."""
 
@@ -52,7 +52,7 @@ class Measure:
     slope: Slope
 
 
-@dataclass(frozen=True)
+@frozen
 class Following:
     """An input that turns with a node: number of input and node, first raw cell it pushes, direction at rest."""
 
@@ -62,7 +62,7 @@ class Following:
     direction: np.ndarray
 
 
-@dataclass(frozen=True)
+@frozen
 class Signals:
     """What acts on a model and what is measured of it.
 

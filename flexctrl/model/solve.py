@@ -6,12 +6,12 @@ What solves is imported where it is needed: it takes longer than a short march, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import SingularMatrixError
+from flexctrl.frozen import frozen
 
 Solve = Callable[[np.ndarray], np.ndarray]
 
@@ -20,7 +20,7 @@ _FULL = 0.3
 """Share of entries from which on a matrix is dealt with as a full one."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Plan:
     """How matrices of one pattern are factorised: worked out once, used for every new set of values.
 

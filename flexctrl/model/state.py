@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
+
+from flexctrl.frozen import frozen
 
 __all__ = ["Dry", "State"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Dry:
     """What the dry contacts of a machine do.
 
@@ -30,7 +32,7 @@ class Dry:
         return cls(np.zeros(count), np.zeros(count))
 
 
-@dataclass(frozen=True)
+@frozen
 class State:
     """Where the machine is and how fast it moves.
 

@@ -9,13 +9,13 @@ bodies (Featherstone 1983) as an order of elimination.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.linkages.levers import Group, Levers, Places, at_once
@@ -32,7 +32,7 @@ LEVELS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _BLOCK = 256
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Share:
     """What levers of one kind add to the slope.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
 
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.plots.pose import Drawn, Pose, axis_curve, posed, seen
 from flexctrl.plots.style import DRIVE, GROUND, INK, PALE, ROPE
@@ -108,7 +108,7 @@ def _space(ax: Any) -> None:
     ax.tick_params(labelsize=8, colors=INK)
 
 
-@dataclass(frozen=True)
+@frozen
 class Pen:
     """Draws points of space on plane or 3-D axes."""
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.clamped_modes import clamped_shapes
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
@@ -28,7 +29,7 @@ class Pose(Protocol):
     def R(self) -> np.ndarray: ...
 
 
-@dataclass(frozen=True)
+@frozen
 class Drawn:
     """The pose of a structure as it is drawn.
 

@@ -6,11 +6,12 @@ import base64
 import html
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import Any
+
+from flexctrl.frozen import frozen
 
 __all__ = ["Section", "page"]
 
@@ -21,7 +22,7 @@ _SWING = (
 )
 
 
-@dataclass(frozen=True)
+@frozen
 class Section:
     """One tab of the page.
 

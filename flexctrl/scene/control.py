@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -17,11 +17,12 @@ from flexctrl.design.shaper import Shaper
 from flexctrl.design.shaping import Shaped
 from flexctrl.design.tracking import Together, Tracking
 from flexctrl.errors import SceneError, StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.scene.scene import Plan, Scene
 from flexctrl.structure.drives import Drive
 
 
-@dataclass(frozen=True)
+@frozen
 class Move:
     """A command by itself: a path in time, shaped or not.
 
@@ -51,7 +52,7 @@ def _scaled(path: Trajectory, factor: float) -> Trajectory:
     return PiecewisePolynomial(pieces.knots, rows, factor * pieces.before)
 
 
-@dataclass(frozen=True)
+@frozen
 class Reference:
     """What a measured signal is to follow.
 
@@ -92,7 +93,7 @@ class Law(ABC):
         """Return the law, continuous, with its references bound."""
 
 
-@dataclass(frozen=True)
+@frozen
 class PID(Law):
     """u = kp (r − y) + ki ∫(r − y) + kd (ṙ − ẏ).
 
@@ -131,7 +132,7 @@ class PID(Law):
         return Tracking(inner, {name: p for name, p in follow.items() if name in as_controller(inner).inputs})
 
 
-@dataclass(frozen=True)
+@frozen
 class StateFeedback(Law):
     """u = −K (x − x_r), K by LQR on the rigid twin about its equilibrium, x read from measured signals.
 
@@ -163,7 +164,7 @@ class StateFeedback(Law):
         return Tracking(law, follow | {name: r.signal(scene) for name, r in self.references.items()})
 
 
-@dataclass(frozen=True)
+@frozen
 class Gains(Law):
     """u = Σ g (y − r), gains as given.
 
@@ -186,7 +187,7 @@ class Gains(Law):
         return Tracking(law, {name: r.signal(scene) for name, r in self.references.items()})
 
 
-@dataclass(frozen=True)
+@frozen
 class Transfer(Law):
     """u = C(s) (r − y), C(s) = num/den in falling powers of s.
 
@@ -212,7 +213,7 @@ class Transfer(Law):
         return Tracking(law, {} if self.reference is None else {self.measured: self.reference.signal(scene)})
 
 
-@dataclass(frozen=True)
+@frozen
 class Hardware:
     """What stands between the laws and the machine, from the inside out in this order.
 
@@ -249,7 +250,7 @@ class Hardware:
         return Delayed(wrapped, self.delay) if self.delay else wrapped
 
 
-@dataclass(frozen=True)
+@frozen
 class Controlled(Plan):
     """Laws side by side in common hardware.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from flexctrl.effects.automatic import Automatic
@@ -23,6 +22,7 @@ from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.viscous_friction import ViscousFriction
 from flexctrl.effects.wind import Wind
 from flexctrl.errors import did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.model.assemble import checked_effects
 from flexctrl.scene.reading import (
     Kind,
@@ -41,7 +41,7 @@ from flexctrl.scene.reading import (
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class Placed(Kind):
     """An effect told by a table of places: the table is its only parameter."""
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeVar
 
 from flexctrl.errors import FlexctrlError, SceneError, did_you_mean, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import LEGAL, check_name
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@frozen
 class Place:
     """Where something stands in a scene file.
 
@@ -210,7 +211,7 @@ def checked(make: Callable[[], T], place: Place) -> T:
         raise place.refuse(str(error)) from error
 
 
-@dataclass(frozen=True)
+@frozen
 class Kind:
     """One kind of thing a table can stand for: how it is made and from which keys.
 

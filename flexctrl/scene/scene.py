@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import Enum
 from functools import cached_property
 from typing import Any
@@ -22,6 +22,7 @@ from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.gravity import Gravity
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import SceneError, StructureError, check_kind, did_you_mean, shortened
+from flexctrl.frozen import frozen
 from flexctrl.linear.matfile import SI, Units
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import assemble, rigid
@@ -45,7 +46,7 @@ class Start(Enum):
     EQUILIBRIUM = "equilibrium"
 
 
-@dataclass(frozen=True)
+@frozen
 class Simulation:
     """How a scene is run through time.
 
@@ -87,7 +88,7 @@ class Simulation:
                 raise SceneError(f"simulation: {name} = {shortened(value)}; expected {expected}")
 
 
-@dataclass(frozen=True)
+@frozen
 class Channel:
     """The loop that ``bode`` and ``rlocus`` look at.
 
@@ -119,7 +120,7 @@ _PHYSICS = ("model", "twin", "rest", "twin_rest", "linear", "twin_linear")
 """What follows from structure, effects and what is held, and is worked out once."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Scene:
     """Everything a command needs to know.
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import Vector, check_name, check_whole, parse_direction
 from flexctrl.structure.nodes import Node, check_length, position_of
 from flexctrl.structure.sections import Section
@@ -16,7 +16,7 @@ from flexctrl.structure.sections import Section
 __all__ = ["Beam"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Beam:
     """A straight elastic beam of one or several elements, with inner nodes shared between them.
 

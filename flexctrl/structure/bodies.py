@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import HUGE, TRANSLATIONS, Vector, check_finite, check_name, numbers, parse_point
 from flexctrl.structure.nodes import Node, position_of
 
 __all__ = ["PointMass", "RigidBody"]
 
 
-@dataclass(frozen=True)
+@frozen
 class PointMass:
     """A mass without size: one node with translations only.
 
@@ -53,7 +54,7 @@ class PointMass:
         return (self.node,)
 
 
-@dataclass(frozen=True)
+@frozen
 class RigidBody:
     """A body that does not bend: its first node is the centre of mass, the others ride on it.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.freedoms import check_finite, check_whole, listed, parse_direction, parse_point
 from flexctrl.structure.joints import Weld
@@ -18,7 +18,7 @@ from flexctrl.structure.sections import Section
 __all__ = ["BeamChain", "arc", "polygon"]
 
 
-@dataclass(frozen=True)
+@frozen
 class BeamChain:
     """A curved or twisted beam: one straight `Beam` between each two points of it, welded.
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Hinge, Slide
@@ -18,7 +18,7 @@ __all__ = ["Contact", "MotorSide", "Sliding", "Spinning", "Turning", "contact_of
 _UNIT: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@dataclass(frozen=True)
+@frozen
 class MotorSide:
     """The motor of a drive against its frame: the speed is that of the source angle [rad/s]."""
 
@@ -30,7 +30,7 @@ class MotorSide:
         return self.drive
 
 
-@dataclass(frozen=True)
+@frozen
 class Turning:
     """``node`` turns about ``axis`` against ``base``, which carries the axis [rad/s]."""
 
@@ -44,7 +44,7 @@ class Turning:
         return self.node.part
 
 
-@dataclass(frozen=True)
+@frozen
 class Sliding:
     """``node`` slides along ``axis`` on ``base``, which carries the axis; on the ground without one [m/s]."""
 
@@ -58,7 +58,7 @@ class Sliding:
         return self.node.part
 
 
-@dataclass(frozen=True)
+@frozen
 class Spinning:
     """``node`` spins about a fixed axis; it may tilt as well [rad/s]."""
 

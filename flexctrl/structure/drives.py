@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import Vector, check_finite, check_name, parse_direction
 from flexctrl.structure.nodes import Node, check_length, check_node
 
 
-@dataclass(frozen=True)
+@frozen
 class RotaryDrive:
     """A motor that turns ``node`` against ``against``, or against the ground.
 
@@ -80,7 +80,7 @@ class RotaryDrive:
         return 3
 
 
-@dataclass(frozen=True)
+@frozen
 class LinearDrive:
     """A motor that moves ``node`` along a direction through a wheel, rack or drum.
 
@@ -152,7 +152,7 @@ class LinearDrive:
         return 0
 
 
-@dataclass(frozen=True)
+@frozen
 class Winch:
     """A motor with a drum on ``against`` that pays out and hauls in the massless rope from which ``node`` hangs.
 

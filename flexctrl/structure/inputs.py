@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.freedoms import Vector, check_signal, parse_direction
 from flexctrl.structure.nodes import Node
@@ -25,7 +25,7 @@ def _nodes(at: Node | Sequence[Node], owner: str, rotations: bool) -> tuple[Node
     return tuple(signal_node(node, owner, rotations) for node in nodes)
 
 
-@dataclass(frozen=True)
+@frozen
 class Force:
     """Input: a force in a fixed direction, in N, on one node or on each of several.
 
@@ -54,7 +54,7 @@ class Force:
         object.__setattr__(self, "direction", parse_direction(direction, owner))
 
 
-@dataclass(frozen=True)
+@frozen
 class Torque:
     """Input: a torque about a fixed global axis, in N m, on one node or on each of several.
 
@@ -83,7 +83,7 @@ class Torque:
         object.__setattr__(self, "direction", parse_direction(axis, owner))
 
 
-@dataclass(frozen=True)
+@frozen
 class FollowerForce:
     """Input: a force that turns with its node, in N, on one node or on each of several.
 
@@ -115,7 +115,7 @@ class FollowerForce:
         object.__setattr__(self, "direction", parse_direction(direction, owner))
 
 
-@dataclass(frozen=True)
+@frozen
 class FollowerTorque:
     """Input: a torque about an axis that turns with its node, in N m, on one node or on each of several.
 
@@ -144,7 +144,7 @@ class FollowerTorque:
         object.__setattr__(self, "direction", parse_direction(axis, owner))
 
 
-@dataclass(frozen=True)
+@frozen
 class MotorTorque:
     """Input: the torque M_d of a drive's motor on its source angle θ_d, in N m.
 
@@ -171,7 +171,7 @@ class MotorTorque:
         object.__setattr__(self, "drive", name_of(drive, DRIVES, f"MotorTorque {name!r}: drive"))
 
 
-@dataclass(frozen=True)
+@frozen
 class WindSpeed:
     """Input: a gust along a fixed direction, in m/s, on top of the mean wind of every `Wind` the model has.
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, Vector, check_whole, listed, numbers
 from flexctrl.structure.joints import Joint, main_axis
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 Row = tuple[int, int, int, int, int, int]
 
 
-@dataclass(frozen=True)
+@frozen
 class JoinTable:
     """(node, freedom) → number of the structure's degree of freedom; 0 is held.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import (
     ALL,
     FREEDOMS,
@@ -26,7 +27,7 @@ def _check_nodes(kind: str, *nodes: Node) -> None:
         raise StructureError(f"{kind}: ties {nodes[0]} to {nodes[1]}; give nodes of two different parts")
 
 
-@dataclass(frozen=True)
+@frozen
 class Support:
     """Fulcrum restraint: freedoms of a node held at zero.
 
@@ -70,7 +71,7 @@ class InPlane(Support):
     """What `planar` holds of a node. On all nodes of a beam it holds what is between them too, on any mesh."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Weld:
     """Rigid bond: all freedoms of both nodes are the same; it bears forces and moments in all directions.
 
@@ -105,7 +106,7 @@ class Weld:
         return f"Weld of {self.first} to {self.second}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Pin:
     """Ball joint: displacements are the same, rotations are each node's own; it bears forces and no moments.
 
@@ -140,7 +141,7 @@ class Pin:
         return f"Pin of {self.first} to {self.second}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Hinge:
     """One rotation is free: about an axis that rides with the first node.
 
@@ -187,7 +188,7 @@ class Hinge:
         return f"Hinge of {self.first} to {self.second}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Slide:
     """One translation is free: along a direction that rides with the first node.
 

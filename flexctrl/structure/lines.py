@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import TRANSLATIONS, check_finite, check_name, check_whole
 from flexctrl.structure.nodes import Node, check_length, position_of
 
 __all__ = ["Rope", "Spring"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Rope:
     """A rope that pulls but does not push: tension (EA/ℓ₀)(ℓ − ℓ₀)₊; massless but for the effect `RopeMass`.
 
@@ -82,7 +82,7 @@ class Rope:
         return (self.start, self.end)
 
 
-@dataclass(frozen=True)
+@frozen
 class Spring:
     """A massless straight spring with damper that pulls and pushes along its line: tension k (ℓ − ℓ₀) + d ℓ̇.
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import ALL, Vector, parse_point
 
 __all__ = ["Node", "check_length", "check_node", "position_of"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Node:
     """A node of one part.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.drives import Drive, Winch
 from flexctrl.structure.freedoms import Vector, check_signal, parse_direction
 from flexctrl.structure.lines import Rope, Spring
@@ -44,7 +44,7 @@ def _set_measure(
     object.__setattr__(signal, "minus", minus)
 
 
-@dataclass(frozen=True)
+@frozen
 class Position:
     """Output: a node's position along a global direction [m], less that of ``minus`` if given.
 
@@ -73,7 +73,7 @@ class Position:
         _set_measure(self, name, at, direction, minus, rotations=False)
 
 
-@dataclass(frozen=True)
+@frozen
 class Velocity:
     """Output: a node's velocity along a global direction [m/s], less that of ``minus`` if given.
 
@@ -102,7 +102,7 @@ class Velocity:
         _set_measure(self, name, at, direction, minus, rotations=False)
 
 
-@dataclass(frozen=True)
+@frozen
 class Rotation:
     """Output: a node's angle about an axis [rad], less that of ``minus`` if given.
 
@@ -136,7 +136,7 @@ class Rotation:
         _set_measure(self, name, at, axis, minus, rotations=True)
 
 
-@dataclass(frozen=True)
+@frozen
 class AngularVelocity:
     """Output: a node's angular velocity about a global axis [rad/s], less that of ``minus`` if given.
 
@@ -165,7 +165,7 @@ class AngularVelocity:
         _set_measure(self, name, at, axis, minus, rotations=True)
 
 
-@dataclass(frozen=True)
+@frozen
 class DriveAngle:
     """Output: a drive's source angle θ_d [rad], as a motor encoder shows it; it does not wrap.
 
@@ -189,7 +189,7 @@ class DriveAngle:
         object.__setattr__(self, "drive", name_of(drive, DRIVES, f"DriveAngle {name!r}: drive"))
 
 
-@dataclass(frozen=True)
+@frozen
 class DriveSpeed:
     """Output: a motor's speed θ̇_d [rad/s].
 
@@ -213,7 +213,7 @@ class DriveSpeed:
         object.__setattr__(self, "drive", name_of(drive, DRIVES, f"DriveSpeed {name!r}: drive"))
 
 
-@dataclass(frozen=True)
+@frozen
 class SwayAngle:
     """Output: the angle of the line from ``top`` to ``load`` against straight down [rad].
 
@@ -262,7 +262,7 @@ class SwayAngle:
             raise StructureError(f"{owner}: direction {direction!r} is not square to down {down!r}; give a level one")
 
 
-@dataclass(frozen=True)
+@frozen
 class Tension:
     """Output: the tensile force in a rope, the rope of a winch, or a spring [N].
 

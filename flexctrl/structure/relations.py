@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import Vector
 from flexctrl.structure.joints import main_axis
 
 
-@dataclass(frozen=True)
+@frozen
 class Group:
     """Nodes of one part that keep their distances; ``line`` if they have no rotations of their own."""
 
@@ -21,7 +21,7 @@ class Group:
     line: bool = False
 
 
-@dataclass(frozen=True)
+@frozen
 class Ride:
     """x_node = x_master + R_master (arm + s·along): a point of a body, or a slide in its axes."""
 
@@ -31,7 +31,7 @@ class Ride:
     own: int = 0
 
 
-@dataclass(frozen=True)
+@frozen
 class Turn:
     """R_node = R_master exp(φ·axis): a hinge whose axis rides with the master; ``own`` numbers ω_node·axis."""
 
@@ -41,7 +41,7 @@ class Turn:
     own: int = 0
 
 
-@dataclass(frozen=True)
+@frozen
 class Copy:
     """Freedom ``freedom`` (0…2; 3 stands for all rotations) of ``node`` is that of ``master``."""
 
@@ -50,7 +50,7 @@ class Copy:
     master: int
 
 
-@dataclass(frozen=True)
+@frozen
 class Track:
     """x_node = r(s): a point of the bent axis of a rail, with s the place x of the node ``gauge``.
 
@@ -74,7 +74,7 @@ class Track:
 Follow: TypeAlias = Ride | Turn | Copy | Track
 
 
-@dataclass(frozen=True)
+@frozen
 class Closure:
     """A freedom that a follower may not have: held (``other`` = -1) or equal to that of ``other``."""
 
@@ -83,7 +83,7 @@ class Closure:
     other: int
 
 
-@dataclass(frozen=True)
+@frozen
 class Fit:
     """A ride or turn of a node whose place is told already: one condition on where it is against the master.
 
@@ -97,7 +97,7 @@ class Fit:
     axis: Vector | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Ties:
     """Where each nodal freedom gets its value.
 

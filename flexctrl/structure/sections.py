@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_finite, check_number
 
 
-@dataclass(frozen=True)
+@frozen
 class Material:
     """A linear elastic, isotropic material.
 
@@ -51,7 +51,7 @@ STEEL = Material(E=210e9, rho=7850.0, nu=0.3)
 """Structural steel (EN 1993-1-1, 3.2.6, with its usual density)."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Section:
     """Stiffness and inertia of a beam's cross-section, per metre of length.
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from flexctrl.errors import StructureError, did_you_mean, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.bodies import PointMass, RigidBody
 from flexctrl.structure.drives import Drive, LinearDrive
 from flexctrl.structure.elements import Part
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
+@frozen
 class Structure:
     """A machine: its parts, how they are tied, driven, pushed and measured.
 

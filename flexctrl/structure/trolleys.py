@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.bodies import PointMass
 from flexctrl.structure.chains import BeamChain
@@ -26,7 +26,7 @@ __all__ = ["Trolley", "check_rails", "check_travels", "tracks_of"]
 _STRAIGHT = 1e-6
 
 
-@dataclass(frozen=True)
+@frozen
 class Trolley(PointMass):
     """A mass that travels along a beam, or several in a row, and stays on the axis as it bends.
 

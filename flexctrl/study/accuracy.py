@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.errors import FlexctrlError
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.study.answers import outputs_apart
 from flexctrl.study.subject import Subject
@@ -25,7 +26,7 @@ SHARE = 1.0 / 3.0
 """Of the largest change that is borne: what runs may be off by to judge changes."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Accuracy:
     """How well the full run is known that others are compared with.
 
@@ -77,7 +78,7 @@ class Accuracy:
         return f"full run: with {self.steps} steps, {known}; the scene's own is {100.0 * self.own:.2g} % off"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Held:
     """A run that is held against a finer one.
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
@@ -19,7 +20,7 @@ __all__ = ["Amplitude", "Case", "ConstantLoad", "InitialDisplacement", "InitialM
 _TURNING = ("_rx", "_ry", "_rz", "_turn", "_source")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Case:
     """A machine at rest and its linear model there.
 
@@ -51,7 +52,7 @@ class Case:
         return float(modes.omega[modes.flexible][0])
 
 
-@dataclass(frozen=True)
+@frozen
 class Unit:
     """In what an amplitude is told, and where a search for it begins and ends.
 
@@ -101,7 +102,7 @@ class Amplitude(ABC):
         """
 
 
-@dataclass(frozen=True)
+@frozen
 class InitialDisplacement(Amplitude):
     """One coordinate displaced from rest, all others in place, and let go.
 
@@ -123,7 +124,7 @@ class InitialDisplacement(Amplitude):
         return step, np.zeros(case.model.n), np.zeros(len(case.inputs))
 
 
-@dataclass(frozen=True)
+@frozen
 class InitialSpeed(Amplitude):
     """One coordinate started at a rate from rest.
 
@@ -147,7 +148,7 @@ class InitialSpeed(Amplitude):
         return np.zeros(case.model.n), v, np.zeros(len(case.inputs))
 
 
-@dataclass(frozen=True)
+@frozen
 class InitialMode(Amplitude):
     """The machine displaced along one of its modes and let go.
 
@@ -185,7 +186,7 @@ class InitialMode(Amplitude):
         return self.measured_by or case.model.coordinates[int(np.argmax(np.abs(self._shape(case))))]
 
 
-@dataclass(frozen=True)
+@frozen
 class ConstantLoad(Amplitude):
     """Inputs that act from the start, all multiplied by the amplitude.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.run import Run
 from flexctrl.errors import ControllerError, FlexctrlError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import modal_first_order
 from flexctrl.study.broken_loop import broken_loop, linear_law
@@ -28,7 +29,7 @@ _TURN = 0.01
 _GROWS = 1e-6  # of a pole's magnitude; of an undamped one rounding leaves less
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Curves:
     """The outputs of a run and nothing else: little to send to another process.
 
@@ -55,7 +56,7 @@ class Curves:
         return self.y[:, self.outputs.index(name)]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Answer:
     """What a scene tells its user.
 
@@ -80,7 +81,7 @@ class Answer:
     finer: Run | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Change:
     """How far an answer is from another.
 

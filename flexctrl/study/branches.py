@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
+from flexctrl.frozen import frozen
 from flexctrl.study.loop import Loop
 
 __all__ = ["TREMBLE", "followed", "in_s", "on_edge", "sided"]
@@ -166,7 +165,7 @@ def _bent(rows: list[np.ndarray], row: np.ndarray, sizes: np.ndarray) -> bool:
     return bool((abs(np.angle(after[long] / before[long])) > TURN).any())
 
 
-@dataclass(frozen=True)
+@frozen
 class _Meeting:
     """A step in which a conjugate pair becomes two real poles, or the other way about."""
 

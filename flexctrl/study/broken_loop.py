@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from flexctrl.design.hardware import Delayed, Noisy, Quantised, RateLimited, Sat
 from flexctrl.design.tracking import Commanded, OpenLoop, Together
 from flexctrl.design.wrapping import Wrapper
 from flexctrl.errors import ControllerError, StructureError, check_kind, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.study.loop import Loop, open_loop
 
@@ -159,7 +159,7 @@ def broken_loop(plant: LinearModel, controller: Any, input: str) -> Loop:
     return open_loop(_cut(system, law, law.outputs.index(input)).named(plant.name))
 
 
-@dataclass(frozen=True)
+@frozen
 class _States:
     A: np.ndarray
     B: np.ndarray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, overload
 
@@ -14,6 +14,7 @@ from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 Progress = Callable[[float], None]
 
 
-@dataclass(frozen=True)
+@frozen
 class Numbers:
     """One signal of a run in three numbers, SI units.
 
@@ -101,7 +102,7 @@ def dominant_frequency(t: np.ndarray, y: np.ndarray) -> float:
     return float((k + shift) / (8 * count) * (count - 1) / span)
 
 
-@dataclass(frozen=True)
+@frozen
 class Difference:
     """One signal, flexible and rigid.
 
@@ -124,7 +125,7 @@ class Difference:
     rigid_frequency_hz: float
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Comparison:
     """Two runs side by side.
 

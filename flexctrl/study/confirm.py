@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from flexctrl.dynamics.methods.checked import Unchecked
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
@@ -32,7 +32,7 @@ _FEWEST, _MOST = 8.0, 24.0
 _SMALL = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Growth:
     """One nonlinear run near the critical gain, started in the critical mode.
 
@@ -54,7 +54,7 @@ class Growth:
     run: Run
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Confirmation:
     """What nonlinear simulation says about a critical gain.
 
@@ -244,7 +244,7 @@ def _amplitudes(run: Run, rest: np.ndarray, seen: np.ndarray, mode: CriticalMode
     return np.array(times), np.array(found)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Scaled:
     """A linear law about an equilibrium, its gain scaled, from a state of its own."""
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from flexctrl.design.controller import LinearController
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import energies_by_part
 from flexctrl.study.gain_family import Crossing, GainFamily
@@ -20,7 +20,7 @@ _EQUAL = 9
 """Digits to which shares must differ to be put in order."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Origin:
     """The undamped mode of the machine that holds most of a closed-loop mode's energy.
 
@@ -41,7 +41,7 @@ class Origin:
     share: float
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class CriticalMode:
     """The closed-loop mode that goes unstable.
 

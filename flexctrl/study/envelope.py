@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import StructureError, check_kind
+from flexctrl.frozen import frozen
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
@@ -63,7 +64,7 @@ _TRIALS = 40
 _TINY = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Envelope:
     """Up to which amplitude a linear model predicts a quantity within an error.
 

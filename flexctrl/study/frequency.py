@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction import Reduced
@@ -30,7 +31,7 @@ PAST = 30.0
 FAINT = 1e-12
 
 
-@dataclass(frozen=True)
+@frozen
 class Peak:
     """A largest value and where it is.
 
@@ -46,7 +47,7 @@ class Peak:
     omega: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Crossing:
     """Where the loop crosses the unit circle or the negative real axis.
 
@@ -62,7 +63,7 @@ class Crossing:
     margin: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Margins:
     """How far a closed loop is from instability.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
@@ -11,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from flexctrl.design.controller import LinearController
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import modal_first_order
 
@@ -23,7 +23,7 @@ _NOISE = 1e-12
 _UNTOUCHED = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Spectrum:
     """Eigenvalues of the loop at one gain.
 
@@ -65,7 +65,7 @@ class Spectrum:
         return int(np.argmax(self.depth - self.noise))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class GainFamily:
     """ẋ = (start + k slope) x (or the next sample's x): plant and controller, the loop's gain times k.
 
@@ -141,7 +141,7 @@ class GainFamily:
         return complex(np.log(pole) / self.dt) if self.dt else complex(pole)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Crossing:
     """Where a pole leaves the stable region.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from flexctrl.design.piecewise import Trajectory
 from flexctrl.design.tracking import Commanded, OpenLoop, Together, Tracking
 from flexctrl.design.wrapping import Wrapper, breaks_of
+from flexctrl.frozen import frozen
 from flexctrl.study.subject import Subject
 
 __all__ = ["FACTORS", "load_cases"]
@@ -18,7 +19,7 @@ __all__ = ["FACTORS", "load_cases"]
 FACTORS = (0.6, 1.2)
 
 
-@dataclass(frozen=True)
+@frozen
 class Times(Trajectory):
     """A signal times a number."""
 

@@ -15,6 +15,7 @@ from flexctrl.dynamics.methods.checked import bare
 from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import FlexctrlError, StructureError
+from flexctrl.frozen import frozen
 from flexctrl.study.reference import Reference, certified, error_of, finished
 from flexctrl.study.settings import Fidelity, Setting, spacing_of, sweep
 from flexctrl.study.subject import Subject, prepared
@@ -33,7 +34,7 @@ _NIMBLE = (Fidelity.RIGID, Fidelity.RIGID_WITH_SHAFTS, Fidelity.COMPONENT_MODES)
 """Rungs that leave out what moves fast."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Rung:
     """A scene at one fidelity.
 
@@ -61,7 +62,7 @@ class Rung:
     failure: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Ladder:
     """A scene from rigid to refined.
 

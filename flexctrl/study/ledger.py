@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.effects.automatic import Within
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.study.accuracy import SHARE, Accuracy
 from flexctrl.study.answers import Answer, Change
 from flexctrl.study.subject import Subject
@@ -22,7 +23,7 @@ __all__ = ["Entry", "Ledger", "Size"]
 _SAME = "≈ 1"
 
 
-@dataclass(frozen=True)
+@frozen
 class Size:
     """What a model is made of and what running it took.
 
@@ -51,7 +52,7 @@ class Size:
         return float(self.newton_iterations or self.steps) * (self.instructions + self.nonzeros)
 
 
-@dataclass(frozen=True)
+@frozen
 class Entry:
     """One effect.
 
@@ -84,7 +85,7 @@ class Entry:
     stays: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Ledger:
     """Every effect of a scene, and the smallest set that keeps the answer.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import eigvals, matrix_balance
 
 from flexctrl.errors import StructureError, did_you_mean, shortened
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction import Reduced, ReducedModel, ReducedStates
 from flexctrl.linear.reduction.states import states_transfer
@@ -30,7 +31,7 @@ BOUNDARY = 1e-10
 Curve = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Loop:
     """One open loop, closed by negative feedback u = −k y.
 
@@ -238,7 +239,7 @@ def open_loop(
     return _series(body, side, getattr(plant, "name", "") or "loop")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Path:
     """A single channel; ``rate`` and ``jump`` give the derivative of its output, where that is proper."""
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from flexctrl.errors import FlexctrlError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
 from flexctrl.structure.refine import refine
@@ -20,7 +19,7 @@ _LEFT = 0.5
 """Of ω² with twice as many elements: below, what went was more than what a finer mesh can show to be the machine's."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Vanishing:
     """A mode most of whose stiffness is the mesh's.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -19,6 +19,7 @@ from flexctrl.effects.flexibility import BeamFlexibility, Deforming
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import ControllerError, FlexctrlError, StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive, LinearDrive, RotaryDrive, Winch
 from flexctrl.structure.elements import Part
@@ -38,7 +39,7 @@ _DASHPOTS: dict[str, tuple[type, ...]] = {
 P = TypeVar("P", bound=Part | Drive)
 
 
-@dataclass(frozen=True)
+@frozen
 class Omission:
     """One thing that may be left out of a scene.
 

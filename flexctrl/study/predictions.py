@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import scipy.linalg as la
@@ -15,6 +15,7 @@ from flexctrl.dynamics.run import Status
 from flexctrl.dynamics.simulate import simulate
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.errors import EquilibriumError, LinearizationError, StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.statespace import modal_first_order
 from flexctrl.model.linearize import linearize
 from flexctrl.study.amplitudes import Amplitude, Case, ConstantLoad
@@ -38,7 +39,7 @@ _POINTS = 800
 _NONE = np.zeros(0)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Trial:
     """Prediction and truth at one amplitude.
 
@@ -66,7 +67,7 @@ class Trial:
     gave_way: bool = False
 
 
-@dataclass(frozen=True)
+@frozen
 class CurveValue(ABC):
     """A number read off the curve of an output.
 
@@ -95,7 +96,7 @@ class CurveValue(ABC):
         """
 
 
-@dataclass(frozen=True)
+@frozen
 class Period(CurveValue):
     """Mean period of an output: between its crossings, in one direction, of the level midway of its extremes [s].
 
@@ -116,7 +117,7 @@ class Period(CurveValue):
         return f"period of {self.output}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Peak(CurveValue):
     """Largest deviation of an output from rest.
 
@@ -132,7 +133,7 @@ class Peak(CurveValue):
         return f"peak of {self.output}"
 
 
-@dataclass(frozen=True)
+@frozen
 class FinalValue(CurveValue):
     """Deviation of an output from rest at the end.
 
@@ -148,7 +149,7 @@ class FinalValue(CurveValue):
         return f"final value of {self.output}"
 
 
-@dataclass(frozen=True)
+@frozen
 class CurveDifference:
     """RMS difference of an output's curves over the RMS of the linear one.
 
@@ -163,7 +164,7 @@ class CurveDifference:
         return f"curve of {self.output}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Deflection:
     """Static deviation of an output under a load, in equilibrium.
 
@@ -178,7 +179,7 @@ class Deflection:
         return f"deflection of {self.output}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Frequency:
     """Frequency of small vibrations about the loaded shape, against that about the shape without the load [Hz].
 

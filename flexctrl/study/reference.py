@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from flexctrl.dynamics.alpha.method import AdaptiveAlpha, GeneralizedAlpha
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.errors import FlexctrlError
+from flexctrl.frozen import frozen
 from flexctrl.study.answers import Curves, outputs_apart
 from flexctrl.study.settings import Fidelity, Setting
 from flexctrl.study.subject import Subject
@@ -22,7 +23,7 @@ _REFINEMENTS = 4
 _MESH = "a coarser mesh"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Reference:
     """A run that others are measured against.
 

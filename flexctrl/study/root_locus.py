@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from flexctrl.errors import LinearizationError, StructureError
+from flexctrl.frozen import frozen
 from flexctrl.study.branches import TREMBLE, followed, in_s, sided
 from flexctrl.study.frequency import NOISE, Crossing, loop_grid, phase_crossings
 from flexctrl.study.loop import Loop, check_loop
@@ -26,7 +27,7 @@ START = 50
 SAME = 1e-6
 
 
-@dataclass(frozen=True)
+@frozen
 class CriticalGain:
     """A gain at which a closed-loop pole crosses the stability boundary.
 
@@ -45,7 +46,7 @@ class CriticalGain:
     unstable_above: bool
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class RootLocus:
     """Closed-loop poles over the gain.
 

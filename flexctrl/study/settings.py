@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from typing import Any
 
@@ -19,6 +19,7 @@ from flexctrl.effects.flexibility import BeamFlexibility, Deforming, ShaftElasti
 from flexctrl.effects.geometric_stiffness import GeometricStiffness
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, did_you_mean, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.beams import Beam
 from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
@@ -120,7 +121,7 @@ class Fidelity(Enum):
         return coarsen(given) if self is Fidelity.COMPONENT_MODES else given
 
 
-@dataclass(frozen=True)
+@frozen
 class Setting:
     """One way to compute a scene.
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexctrl.design.controller import LinearController
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
@@ -32,7 +33,7 @@ _RATIO = np.log(1.4)
 _BRANCH = 60
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Spillover:
     """How much of its gain a controller may have on a machine, and what goes unstable beyond.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.study.answers import Curves
 from flexctrl.study.fingerprint import digest_of
 from flexctrl.study.reference import Traced
@@ -23,7 +24,7 @@ __all__ = ["Point", "Store", "fingerprint"]
 _TELLS_NOTHING = ("name", "notes", "channel")
 
 
-@dataclass(frozen=True)
+@frozen
 class Point:
     """One setting that was tried.
 

@@ -13,6 +13,7 @@ from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.effects.automatic import Within
 from flexctrl.errors import FlexctrlError
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.study.accuracy import SHARE, accurate, refined, worst
 from flexctrl.study.answers import Answer, answer_of, change_between, changes_known, outputs_apart
@@ -112,7 +113,7 @@ class Trial:
         return self.times[-1]
 
 
-@dataclass(frozen=True)
+@frozen
 class Refused:
     """A scene that cannot be run, and why."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.errors import StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_path
 from flexctrl.study.fingerprint import Untold
 from flexctrl.study.on_held_out import HeldOut
@@ -29,7 +30,7 @@ _SCATTER = 1.2
 _ROUNDS = 2
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class WorkPrecision:
     """Error and time of the settings that were tried on a scene.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import eig, eigvals, qr, svd
 
 from flexctrl.errors import LinearizationError, StructureError, check_kind, shortened
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import unsymmetric
 from flexctrl.study.channel import Quadruple, channel_states
@@ -22,7 +22,7 @@ __all__ = ["SensorChoice", "Zeros", "deflated_zeros", "sensor_choices", "zeros"]
 EPS = float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
+@frozen
 class Zeros:
     """Transmission zeros.
 
@@ -196,7 +196,7 @@ def _rosenbrock(channel: LinearModel, s: complex) -> tuple[np.ndarray, np.ndarra
     return full / rows[:, None] / cols, slope / rows[:, None] / cols
 
 
-@dataclass(frozen=True)
+@frozen
 class SensorChoice:
     """How one output sees one input, mode by mode.
 

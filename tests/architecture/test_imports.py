@@ -13,6 +13,7 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "flexctrl"
 HOUSE = (
     "errors",
+    "frozen",
     "structure",
     "kernels",
     "mechanics",

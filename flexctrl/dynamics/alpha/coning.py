@@ -8,10 +8,9 @@ of the accelerations shows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
@@ -27,7 +26,7 @@ def eta(square: float) -> float:
     return 1 / 12 + square * (1 / 720 + square * (1 / 30240 + square * (1 / 1209600 + square * (1 / 47900160))))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Coning:
     """The rotations of a model that turn all ways.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Fixed, check_step
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.structure.freedoms import check_number, check_seconds
 
@@ -57,7 +58,7 @@ class _Damped:
         return told_damping(self.rho)
 
 
-@dataclass(frozen=True)
+@frozen
 class GeneralizedAlpha(_Damped):
     """Generalised alpha with a fixed step; second order.
 
@@ -90,7 +91,7 @@ class GeneralizedAlpha(_Damped):
         return _quickest(Stepper(model, feed, Coefficients.of(self.rho), newton))
 
 
-@dataclass(frozen=True)
+@frozen
 class AdaptiveAlpha(_Damped):
     """Generalised alpha with steps chosen from the estimated error, tried again where it is too large.
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from flexctrl.dynamics.steps import Point
+from flexctrl.frozen import frozen
 
 __all__ = ["AlphaPoint", "Coefficients"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Coefficients:
     """Constants of the method for a spectral radius at infinity."""
 
@@ -37,7 +36,7 @@ class Coefficients:
         return ((1.0 - self.alpha_f) * rate + self.alpha_f * before - self.alpha_m * algorithmic) / (1.0 - self.alpha_m)
 
 
-@dataclass(frozen=True)
+@frozen
 class AlphaPoint(Point):
     """A point of the method: its own accelerations beside the true ones, and how these grow.
 

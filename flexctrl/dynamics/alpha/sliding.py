@@ -10,7 +10,7 @@ chattering-free implementation of sliding mode systems).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.steps import StepError
+from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _JUMPS, _NOTICED = 1e-6, 1e-2
 _SWEEPS, _SETTLED = 8, 1e-3
 
 
-@dataclass(frozen=True)
+@frozen
 class _Held:
     """A feed whose inputs are held; the controller's state goes on."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
@@ -17,6 +16,7 @@ from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.records.dense import Curve, Hermite
 from flexctrl.dynamics.scales import once, turning, yardsticks
 from flexctrl.dynamics.steps import Point
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
@@ -140,7 +140,7 @@ def _through(watch: Watch, gauge: int, corners: Sequence[tuple[float, float]], v
     return found
 
 
-@dataclass(frozen=True)
+@frozen
 class _Along:
     """The gauges over a step."""
 

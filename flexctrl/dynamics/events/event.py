@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import Enum
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_finite
 
 __all__ = ["Direction", "Event", "EventError", "Occurrence"]
@@ -25,7 +25,7 @@ class Direction(Enum):
     EITHER = 0
 
 
-@dataclass(frozen=True)
+@frozen
 class Event:
     """Something to look for during a run: a signal, or a function of signals, reaches a value.
 
@@ -106,7 +106,7 @@ class Event:
         return found - self.at
 
 
-@dataclass(frozen=True)
+@frozen
 class Occurrence:
     """An event that happened.
 

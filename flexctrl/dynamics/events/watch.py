@@ -15,6 +15,7 @@ from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.records.tensions import Tensions
 from flexctrl.dynamics.steps import Point
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 
 __all__ = ["Crossing", "Watch"]
@@ -23,7 +24,7 @@ _DUST = 1e-13
 _Size = TypeVar("_Size", float, np.ndarray)
 
 
-@dataclass(frozen=True)
+@frozen
 class Crossing:
     """A gauge goes through zero; nothing else does so with it between ``low`` and ``high`` [s]."""
 

@@ -27,6 +27,7 @@ from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, Stepper, check_step
 from flexctrl.dynamics.swift.at_once import Instant, holding
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
@@ -45,7 +46,7 @@ _INTEGRALS = np.array([[s ** (k + 1) / (k + 1) for k in range(4)] for s in NODES
 """Integrals from the start to each node, from values at the nodes (Lobatto IIIA)."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Exact:
     """The exact motion of linear equations: a `LinearModel`, or a model without `LargeRotation`.
 
@@ -114,7 +115,7 @@ def _modal(model: Plant, modes: int | None) -> tuple[ModalEquations, Propagator]
     return kept[modes]
 
 
-@dataclass(frozen=True)
+@frozen
 class ModalPoint(Point):
     """A point with its modal state, and the inputs over the step that led to it: powers of the share done."""
 
@@ -321,7 +322,7 @@ def _slide(course: np.ndarray, share: float, h: float) -> np.ndarray | None:
     return np.arange(1, 4) * share ** np.arange(3) @ course[1:] / h
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Curve:
     """The motion from a point."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from flexctrl.design.controller import LinearController
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
+from flexctrl.frozen import frozen
 from flexctrl.linear.modal import ModalSystem, modal_system
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.statespace import FirstOrder, first_order
@@ -21,7 +22,7 @@ __all__ = ["ModalEquations", "closed", "feels_at_once", "opened"]
 _DUST = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class ModalEquations:
     """ẋ = A x + B w, (q, v) = C x + D w with w = (inputs, 1); commands u = gain x + direct w.
 

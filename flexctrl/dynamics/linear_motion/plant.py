@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.mixed import Excess
 from flexctrl.model.state import State
@@ -20,7 +21,7 @@ from flexctrl.structure.freedoms import check_finite
 __all__ = ["LinearPlant"]
 
 
-@dataclass(frozen=True)
+@frozen
 class _Machine:
     """What a run asks of a structure."""
 
@@ -30,7 +31,7 @@ class _Machine:
     drives: tuple[Any, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class _Flat:
     """What a run asks of a motion: coordinates are places."""
 
@@ -97,7 +98,7 @@ class _Flat:
         return 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Signals:
     """What a run asks of signals: they are linear."""
 
@@ -109,7 +110,7 @@ class _Signals:
         return self.places, self.rates
 
 
-@dataclass(frozen=True)
+@frozen
 class _Smooth:
     """What a run asks of laws that switch: there are none."""
 
@@ -164,7 +165,7 @@ class _Smooth:
         return state
 
 
-@dataclass(frozen=True)
+@frozen
 class _Straight:
     """What a run asks of corners in laws of force: there are none."""
 
@@ -190,7 +191,7 @@ class _Straight:
         return np.zeros(0)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class LinearPlant:
     """M q̈ + C q̇ + K q = B u as a machine to be run: a state's ``q`` are the coordinates, it has no nodes.
 

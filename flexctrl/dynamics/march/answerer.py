@@ -19,6 +19,7 @@ from flexctrl.dynamics.march.marching import Marcher, Pacing, can_march
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.swift.settling import weightless
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
 from flexctrl.model.model import Model
@@ -223,7 +224,7 @@ def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Follow:
     """The inputs on the way of some steps.
 

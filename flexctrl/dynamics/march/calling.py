@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -26,6 +25,7 @@ from flexctrl.dynamics.march.record import (
     WEIGHED,
 )
 from flexctrl.errors import KernelError
+from flexctrl.frozen import frozen
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import flatten
 from flexctrl.model.laws.kinds import NODE_SLOT
@@ -38,7 +38,7 @@ _PACED = (CONTROLLED, SAMPLED)
 _NOTHING: tuple[tuple[int, int], np.ndarray, np.ndarray] = ((-1, -1), np.zeros(0), np.zeros(0))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Remembered:
     """What later steps of a march depend on beside the point they start from.
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.dynamics.march.pairs import pairs_of
 from flexctrl.dynamics.march.record import Leap
+from flexctrl.frozen import frozen
 from flexctrl.model.flat.flattened import Flattened
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ __all__ = ["Leaps", "Tables"]
 _DUST = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Tables:
     """What steps of one length need.
 

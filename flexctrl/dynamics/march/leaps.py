@@ -20,6 +20,7 @@ from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.records.dense import Curve
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Point
+from flexctrl.frozen import frozen
 from flexctrl.kernels.native import Packed
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
@@ -29,7 +30,7 @@ __all__ = ["Leaper", "LeapingStepper"]
 _MEMORY = Memory(None, Remembered(np.zeros(0), np.zeros(0), -1.0, ()))
 
 
-@dataclass(frozen=True)
+@frozen
 class LeapPoint(ModalPoint):
     """A point with the modal state as loops have it, and the inputs over the step that led to it."""
 

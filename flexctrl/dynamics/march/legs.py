@@ -16,6 +16,7 @@ from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.records.books import Sums
 from flexctrl.dynamics.steps import Mark, Point
+from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 
 __all__ = ["Leg", "Legs", "Span", "Told", "same"]
@@ -216,7 +217,7 @@ class Legs:
         return found
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Span:
     """One leg of a ride, as the track knows stretches of steps."""
 

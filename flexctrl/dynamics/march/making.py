@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from flexctrl.dynamics.march.shelf import width_of
 from flexctrl.dynamics.scales import components
 from flexctrl.dynamics.swift.stiff_lines import firmest
 from flexctrl.dynamics.swift.thrown import holding_inputs, may_throw
+from flexctrl.frozen import frozen
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import Flattened
 
@@ -43,7 +44,7 @@ _ADRIFT = 3e-13
 """Where nothing holds a part: under a tangent that is kept what is left has one sign in all steps, and is momentum."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Method:
     """What a march needs to know of the method.
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from flexctrl.frozen import frozen
 
 if TYPE_CHECKING:
     from flexctrl.linear.statespace import FirstOrder
@@ -16,7 +17,7 @@ _WORST = 1e5
 _STILL = 1e-11
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Pairs:
     """x = basis z, where z moves pair by pair.
 

@@ -17,12 +17,13 @@ from flexctrl.dynamics.march.marching import Marcher, can_march
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts
+from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 
 __all__ = ["MarchingStepper", "Memory", "plain_of"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Memory:
     """The tangents in use: of the plain steps and of the march."""
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import is_dataclass, replace
 from typing import Any
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Controlled, Fixed, Integrator, Pace, Stepper
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 
 __all__ = ["Beside", "Checked", "Unchecked", "bare", "checked"]
@@ -19,7 +20,7 @@ _LOOSER = 27.0
 """Under such a tolerance steps of a method of second order are three times as long, and errors nine times as large."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Beside:
     """How a run beside another one is made.
 
@@ -39,7 +40,7 @@ class Beside:
     said: str
 
 
-@dataclass(frozen=True)
+@frozen
 class _Wrapped:
     """A method by another name: its steps are those of the one inside."""
 
@@ -71,7 +72,7 @@ class _Wrapped:
         return self.method.stepper(model, feed, tolerance)
 
 
-@dataclass(frozen=True)
+@frozen
 class Unchecked(_Wrapped):
     """A method without the coarser run that tells how far it is off: see `Checked`.
 
@@ -89,7 +90,7 @@ class Unchecked(_Wrapped):
     """
 
 
-@dataclass(frozen=True)
+@frozen
 class Checked(_Wrapped):
     """A method whose runs are laid beside coarser ones, which tell how far they are off.
 

@@ -20,6 +20,7 @@ from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import MOST_STEPS, Controlled, Counts, Fixed, Pace, Point, StepError, check_step
 from flexctrl.errors import MechanismError, SingularMatrixError
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_number, check_seconds
@@ -29,7 +30,7 @@ __all__ = ["ExplicitRungeKutta"]
 _STEEPNESS = 8
 
 
-@dataclass(frozen=True)
+@frozen
 class ExplicitRungeKutta:
     """An explicit method of order 8 (DOP853) on the rotation group.
 
@@ -89,7 +90,7 @@ class ExplicitRungeKutta:
         return _Stepper(model, feed)
 
 
-@dataclass(frozen=True)
+@frozen
 class _Point(Point):
     """A point with the slopes of all stages of the step that led to it."""
 
@@ -232,7 +233,7 @@ class _Stepper:
         return _Curve(self, before, after)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Curve:
     """The dense output of the table: a polynomial of degree 7 in the coordinates from the start."""
 

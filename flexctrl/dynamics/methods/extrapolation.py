@@ -23,6 +23,7 @@ from flexctrl.dynamics.steps import Counts, Integrator, Joining, Judging, Pace, 
 from flexctrl.dynamics.swift.lengths import lengths_of, long_as, stiff_in
 from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.linkages.chart import LeaningRope
 from flexctrl.model.linkages.charting import chart_of
@@ -37,7 +38,7 @@ _TIGHT = 1e-12
 """What Newton's method leaves open must not show in the difference of two runs: undamped, it adds up."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Richardson:
     """A method of lower order run with steps h and h/2, and extrapolated.
 
@@ -87,7 +88,7 @@ class Richardson:
         return _Stepper(model, feed, coarse, fine, 1.0 / 3.0)
 
 
-@dataclass(frozen=True)
+@frozen
 class _Point(Point):
     """A point with those of both runs."""
 
@@ -243,7 +244,7 @@ def _longer(stepper: Stepper[Any], run: Any, step: float) -> Any:
     return plain.lengthen(run, step) if isinstance(plain, Joining) else run
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Difference:
     """How two neighbouring shapes differ, in the degrees of freedom; right to first order in the difference.
 
@@ -273,7 +274,7 @@ _MEASURED = 2
 """Each time the coordinates of the end are measured, what they are off by is less by the angle turned."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Seen:
     """Rates of one shape in the axes of a neighbouring one, where these depend on the steps that led there.
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.linkages.chart import Chart
 from flexctrl.model.linkages.charting import chart_of
@@ -17,7 +18,7 @@ from flexctrl.model.state import State
 __all__ = ["Local"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Local:
     """Displacements, rotation vectors and turns since a start, and their rates from quasi-velocities.
 

@@ -28,6 +28,7 @@ from flexctrl.dynamics.swift.reflected import Motors
 from flexctrl.dynamics.swift.settling import settled, steadied
 from flexctrl.dynamics.swift.stiff_lines import STIFF, Caution, firmest, firmest_freedom, firmest_shaft
 from flexctrl.errors import SingularMatrixError, StructureError
+from flexctrl.frozen import frozen
 from flexctrl.model.momenta import momenta_of
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import Plan, Solve, factorise, plan
@@ -42,7 +43,7 @@ _BLURRED = 1e3
 """Radians of a single freedom in a step from where on the last digits of places make more of momenta than steps do."""
 
 
-@dataclass(frozen=True)
+@frozen
 class ConservingMidpoint:
     """The implicit midpoint rule in momenta: second order, no damping, for long runs without losses of its own.
 
@@ -93,7 +94,7 @@ class ConservingMidpoint:
         return _Stepper(model, feed)
 
 
-@dataclass(frozen=True)
+@frozen
 class _Point(Point):
     """A point with its momenta, and those of its motors behind rigid shafts and ropes."""
 
@@ -101,7 +102,7 @@ class _Point(Point):
     motors: np.ndarray
 
 
-@dataclass(frozen=True)
+@frozen
 class _Tangent:
     """What the factors in use were made from: a middle with its accelerations, inputs there, and the step."""
 
@@ -111,7 +112,7 @@ class _Tangent:
     h: float
 
 
-@dataclass(frozen=True)
+@frozen
 class _Memory:
     """What the next steps go on from."""
 

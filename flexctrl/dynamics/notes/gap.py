@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from flexctrl.dynamics.notes.outputs import placed
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import farthest, output_yardsticks, yardsticks
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import bent
 from flexctrl.model.state import State
@@ -23,7 +23,7 @@ _POINTS, _FEW = 4, 1500
 _INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
 
 
-@dataclass(frozen=True)
+@frozen
 class Gap:
     """How far two runs are apart.
 

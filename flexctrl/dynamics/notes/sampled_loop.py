@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ import scipy.linalg as la
 
 from flexctrl.dynamics.alpha.point import Coefficients
 from flexctrl.dynamics.notes.heavy import without_light
+from flexctrl.frozen import frozen
 
 __all__ = ["Answers", "SampledLoop"]
 
@@ -26,7 +26,7 @@ class Answers(NamedTuple):
     x_x: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class SampledLoop:
     """A machine, linear about a state, under a sampled law.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,6 +13,7 @@ import scipy.sparse as sp
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.swift.lengths import lengthening
 from flexctrl.errors import ControllerError, SingularMatrixError
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
@@ -62,7 +62,7 @@ class _Vibration(NamedTuple):
 _NONE = Swing(0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Shock:
     """Forces put on at once.
 

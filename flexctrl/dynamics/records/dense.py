@@ -14,6 +14,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.tensions import Tensions
 from flexctrl.dynamics.steps import Point, Stepper
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
@@ -35,7 +36,7 @@ class Dense(Protocol):
         """Return the motion over a step it has taken."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Hermite:
     """The cubic through places and rates at both ends, in the coordinates from the start of the step.
 
@@ -133,7 +134,7 @@ class Repeatable(Parted, Protocol):
     def start(self) -> Point: ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Stretch:
     """Steps between two points; ``states`` has those after each of them."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -12,6 +11,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_number, check_path, check_seconds
 
 __all__ = ["CsvStream", "InMemory", "Record", "Recorder", "Unwritten", "writing"]
@@ -65,7 +65,7 @@ class Record(Protocol):
         """Return a recorder of time and some signals; ``after`` rows were written before the run was stopped."""
 
 
-@dataclass(frozen=True)
+@frozen
 class InMemory:
     """Curves are kept by the run: the default.
 
@@ -93,7 +93,7 @@ class InMemory:
         return _Table(1 + len(signals))
 
 
-@dataclass(frozen=True)
+@frozen
 class CsvStream:
     """Curves are written to a file as they come; the run itself holds their first and last rows.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from flexctrl.dynamics.swift.stiff_lines import frequency_of
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
@@ -19,7 +19,7 @@ _STIFF = 1.0
 """Radians of a line's vibration in a step from which on interpolated places tell nothing of its length."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Tensions:
     """The tensions among the outputs of a machine whose lines turn: straight between the ends of long steps.
 

@@ -8,12 +8,13 @@ Where it feels u̇ it damps them: they keep their place, and with it u stays wha
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexctrl.errors import ControllerError
+from flexctrl.frozen import frozen
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.feed import Feed, Supply
@@ -34,7 +35,7 @@ Ask = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """What is commanded under inputs u that change by u̇."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Commands:
     """Commands at an instant.
 
@@ -52,7 +53,7 @@ class Commands:
     free: np.ndarray
 
 
-@dataclass(frozen=True)
+@frozen
 class Instant:
     """What a continuous controller commands at an instant.
 

@@ -13,7 +13,6 @@ a step, is of fourth order in steps that see it: methods keep theirs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Fixed, Pace
 from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.effects.wind import Wind
+from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 
@@ -85,7 +85,7 @@ def _told(names: list[str]) -> str:
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class _Layers:
     """The layers under a feed."""
 

@@ -12,7 +12,6 @@ they would swing about their motion by all that the step's own formulas do not d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +20,7 @@ import scipy.sparse as sp
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.swift.settling import dragged, quasistatic
 from flexctrl.errors import SingularMatrixError
+from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
@@ -39,7 +39,7 @@ def massless(feed: Feed, steady: np.ndarray | None = None) -> Massless:
     return Massless(feed, np.setdiff1d(quasistatic(feed.model), steady), np.union1d(dragged(feed.model), steady))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Massless:
     """The freedoms of a model that move no mass.
 

@@ -10,12 +10,13 @@ pushes nothing across the rope.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.pieces import DRIVE_PARAMETERS
 from flexctrl.mechanics.winch import WINCH_PARAMETERS
 from flexctrl.model.forces import Forces
@@ -34,7 +35,7 @@ _INERTIA = {
 }
 
 
-@dataclass(frozen=True)
+@frozen
 class Motors:
     """Motors behind rigid shafts and ropes, where these may turn.
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import block_diag, eig, eigvals, schur, solve_sylvester
 
 from flexctrl.errors import ReductionError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
 from flexctrl.linear.reduction.gramian import Balanced, balance
@@ -26,7 +27,7 @@ UNTOUCHED = 1e-10
 WORST_BASIS = 1e6
 
 
-@dataclass(frozen=True)
+@frozen
 class BalancedTruncation:
     """Keep the states that are easiest to reach and to observe (B. C. Moore, IEEE TAC 26 (1981) 17–32).
 
@@ -161,7 +162,7 @@ def _split(full: LinearModel, pool: int) -> tuple[Triple, Triple, np.ndarray]:
     return _joined(free, integrators, _touched(marginal, first)), stable, first.D + missing
 
 
-@dataclass(frozen=True)
+@frozen
 class _Coupled:
     """Damped rigid positions η driven by the states z: η̇ = E z, ż = A z + B u, y = H η + C z."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from flexctrl.errors import LinearizationError, ReductionError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.eigen import Eigenpairs, complete_pairs, coordinate_scales, lowest_pairs
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.pattern import congruent
@@ -22,7 +23,7 @@ __all__ = ["CraigBampton"]
 DENSE = 300
 
 
-@dataclass(frozen=True)
+@frozen
 class CraigBampton:
     """Component mode synthesis (R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313–1319).
 

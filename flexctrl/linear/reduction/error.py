@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from flexctrl.errors import ReductionError, StructureError, shortened
+from flexctrl.frozen import frozen
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
@@ -32,7 +32,7 @@ MOST_POINTS = 6000
 SILENT = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class ErrorReport:
     """Largest distance between two frequency responses, channel by channel.
 
@@ -75,7 +75,7 @@ class ErrorReport:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True)
+@frozen
 class RelativeError:
     """Ask a reduction for an error instead of an order.
 

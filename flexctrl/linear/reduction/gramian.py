@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg import qr, schur, solve_triangular, svd
+
+from flexctrl.frozen import frozen
 
 __all__ = ["Balanced", "balance", "gramian_factor"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Balanced:
     """Left and right bases of a balanced realisation, ordered by Hankel singular value.
 

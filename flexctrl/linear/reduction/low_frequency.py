@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
 from flexctrl.linear.undamped import ROUND_OFF
@@ -26,7 +26,7 @@ __all__ = [
 ROUNDING = 1e-12
 
 
-@dataclass(frozen=True)
+@frozen
 class LowFrequency:
     """Coefficients of G(s) = double/s² + single/s + constant + O(s).
 

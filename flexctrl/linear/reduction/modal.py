@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import ReductionError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.modes import Modes
 from flexctrl.linear.reduction.low_frequency import undamped, unsymmetric
@@ -21,7 +22,7 @@ GAP = 1e-5
 POOL = 8
 
 
-@dataclass(frozen=True)
+@frozen
 class ModalTruncation:
     """Keep some undamped modes: q = Φ η, η̈ + ΦᵀCΦ η̇ + Ω² η = Φᵀ B u.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from flexctrl.errors import ReductionError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import flexibility, rigid_basis, unsymmetric
 from flexctrl.linear.reduction.result import ReducedModel, galerkin
@@ -21,7 +21,7 @@ NOTHING_NEW = 1e-11
 Solver = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
+@frozen
 class MomentMatching:
     """Galerkin projection on second-order Krylov spaces of inputs and outputs.
 

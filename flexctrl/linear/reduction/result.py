@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import ReductionError
+from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.reduction.low_frequency import low_frequency, undamped
 from flexctrl.linear.transfer import Transfer, transfer
@@ -36,7 +37,7 @@ class Method(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Reduced(ABC):
     """A reduced model with its origin.
 
@@ -137,7 +138,7 @@ class Reduced(ABC):
         return error_report(self, 2 * np.pi * hz)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class ReducedModel(Reduced):
     """A reduced model that is still second order, with the signal names of the full one.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from flexctrl.errors import ReductionError, did_you_mean
+from flexctrl.frozen import frozen
 from flexctrl.linear.modes import Modes
 
 __all__ = ["BelowFrequency", "DCGain", "Lowest", "Participation", "Selection", "dc_gains", "peak_gains"]
@@ -34,7 +34,7 @@ class Selection(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@frozen
 class Lowest:
     """The lowest modes.
 
@@ -51,7 +51,7 @@ class Lowest:
         return np.arange(min(room, len(modes.omega)))
 
 
-@dataclass(frozen=True)
+@frozen
 class BelowFrequency:
     """All modes below a frequency.
 
@@ -67,7 +67,7 @@ class BelowFrequency:
         return np.flatnonzero(modes.omega < 2 * np.pi * self.hz)
 
 
-@dataclass(frozen=True)
+@frozen
 class Participation:
     """The modes with the highest resonance peaks between the chosen inputs and outputs.
 
@@ -90,7 +90,7 @@ class Participation:
         return _largest(peak_gains(modes), modes, self.inputs, self.outputs, room)
 
 
-@dataclass(frozen=True)
+@frozen
 class DCGain:
     """The modes with the largest share in the static response of the chosen inputs and outputs.
 

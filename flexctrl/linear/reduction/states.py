@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigvals, schur, solve_triangular
 
+from flexctrl.frozen import frozen
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.reduction.result import Reduced
 from flexctrl.linear.response import MOST_POINTS, FrequencyResponse, response_span
@@ -77,7 +77,7 @@ def states_transfer(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) 
     return evaluate
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class ReducedStates(Reduced):
     """A reduced model in first-order form, with the signal names of the full one.
 

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.model.flat.flat import HIDDEN, Flat, clear, drive, energy, load, place, pull, push
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
@@ -41,7 +42,7 @@ _SOUND = 1e-9
 """Least pivot of the mass matrix over the diagonal."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Entire:
     """The kernels of a machine.
 
@@ -97,7 +98,7 @@ def entire_of(layout: Layout) -> Entire:
     return drawing.made(modal) if modal or drawing.sound() else _NONE
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class _Piece:
     """A kernel that writes down what it computes."""
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.entire import Entire
 from flexctrl.model.flat.flat import Flat
@@ -19,7 +20,7 @@ __all__ = ["Flattened"]
 _ROUND_OFF = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Flattened:
     """A model on flat vectors, and how to bring states there and back.
 

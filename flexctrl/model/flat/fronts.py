@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import KernelError
+from flexctrl.frozen import frozen
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 
@@ -27,7 +28,7 @@ _VANISHING = 1e-13
 _MERGED = 12
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Plan:
     """How matrices of a pattern are eliminated.
 

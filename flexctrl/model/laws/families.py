@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.matrices import beam_mass, bending, coupling, plane_masses
 from flexctrl.model.laws import part_kinds
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
@@ -20,7 +20,7 @@ from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.structure import Structure
 
 
-@dataclass(frozen=True)
+@frozen
 class Family:
     """Pieces of one kind.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
+from flexctrl.frozen import frozen
 from flexctrl.mechanics import friction
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.model.laws.kinds import DRIVE_SLOT, Kind, Shares
@@ -25,7 +25,7 @@ STUCK = 2.0
 _AXIS = 3
 
 
-@dataclass(frozen=True)
+@frozen
 class Slipping:
     """How the sides of a contact move against each other.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from flexctrl.effects.effect import Effect
 from flexctrl.effects.rotating_frame import RotatingFrame
 from flexctrl.effects.wind import Wind
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel
 from flexctrl.model.laws.families import Family
 from flexctrl.model.laws.kinds import NODE_SLOT, moved
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["GustKernels", "Gusts", "check_gusts", "gusts_of"]
 
 
-@dataclass(frozen=True)
+@frozen
 class GustKernels:
     """Kernels of what some gusts add to the drag of a node: they read its slot, then the gusts' speeds.
 
@@ -81,7 +81,7 @@ class GustKernels:
 _kernels = cache(GustKernels)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Gusts:
     """The gusts of a model, none if it has no wind.
 

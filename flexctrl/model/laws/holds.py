@@ -7,11 +7,12 @@ contacts hold the same motion: these share what holds it, so that Σ (d λ)² is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
+
+from flexctrl.frozen import frozen
 
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
@@ -24,7 +25,7 @@ _WELL = 1e4
 _SAME = 1e-13
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Hold:
     """The contacts that stick.
 

@@ -9,11 +9,11 @@ three seeds more.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 from flexctrl.effects.effect import Effect
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.model.laws.inertial import turning
@@ -25,7 +25,7 @@ NODE_SLOT = 24
 DRIVE_SLOT = 4
 
 
-@dataclass(frozen=True)
+@frozen
 class Shares:
     """What acts on a piece: forces of inertia, all other forces, kinetic and stored energy.
 
@@ -53,7 +53,7 @@ Slope = Callable[[tuple[Effect, ...], Sequence[NodeMotion], "ca.SX", "ca.SX", "c
 """(effects, node motions, slots of inner freedoms, parameters, seeds) → ∂force/∂(raw motion)."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Kind:
     """A kind of piece.
 
@@ -86,7 +86,7 @@ class Kind:
         return self.nodes * self.freedoms + self.drives
 
 
-@dataclass(frozen=True)
+@frozen
 class Kernels:
     """The kernels of one kind under some effects; made when first used, once a process (`kernels_of`)."""
 

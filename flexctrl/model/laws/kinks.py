@@ -5,7 +5,7 @@ Steps end there, or the corner would cost accuracy however small the step: the v
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.effects.backlash import gaps_of
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.pieces import SLIGHT
 from flexctrl.model.laws.loose_kinds import loose_names
 from flexctrl.model.state import State
@@ -36,7 +37,7 @@ _TINY = 1e-300
 _Size = TypeVar("_Size", float, np.ndarray)
 
 
-@dataclass(frozen=True)
+@frozen
 class Turn:
     """A corner of a drive: where a sum of its driven coordinate and its source angle has a value.
 
@@ -62,7 +63,7 @@ class Turn:
     jumps: bool = False
 
 
-@dataclass(frozen=True)
+@frozen
 class Line:
     """A line between two nodes with a corner at a length; what to say if a run cannot go on beyond it.
 
@@ -79,7 +80,7 @@ class Line:
     share: float = 0.0
 
 
-@dataclass(frozen=True)
+@frozen
 class RailEnd:
     """An end of a trolley's rail: where sign·s + offset, positive on the rail, is zero."""
 
@@ -89,7 +90,7 @@ class RailEnd:
     end: str
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Kinks:
     """The corners of a model's laws of force: lengths of lines, those of winches last, turns of drives, ends of rails.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.model.solve import factorise
 from flexctrl.model.units import units
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["SlipScales", "mobilities", "slip_scales"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class SlipScales:
     """What the force F that a contact bears makes of the mass m that it moves, within a radian or a machine's size L.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel, Run
 from flexctrl.model.forces import Forces
 from flexctrl.model.laws.families import Family
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["Slips"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Slips:
     """Slip speeds of some families of dry contacts.
 

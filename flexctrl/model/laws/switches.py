@@ -10,7 +10,7 @@ what the contacts themselves do (`slip_scales`), so that nothing hangs on the un
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,6 +19,7 @@ import scipy.sparse as sp
 
 from flexctrl.effects.coulomb_friction import CoulombFriction
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.model.flows import flowing
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.laws.holds import Hold, easiness, hold
@@ -42,7 +43,7 @@ _STILL = 1e-10
 _MOST, _ALIKE, _OVERCOME = 1.0 + 1e-10, 1e-9, 0.5
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Switches:
     """The dry contacts of a model.
 

@@ -14,12 +14,12 @@ and is left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from flexctrl.errors import ChartError
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import cross, logarithm
 from flexctrl.model.model import Model
 from flexctrl.model.motion import Motion
@@ -32,7 +32,7 @@ _SMALL = 1e-6
 _FULL_TURN, _HALF_TURN = 6.1, 3.05
 
 
-@dataclass(frozen=True)
+@frozen
 class TurningNode:
     """A node that turns about several axes; its coordinates (-1: computed by a loop)."""
 
@@ -40,7 +40,7 @@ class TurningNode:
     coordinates: tuple[int, int, int]
 
 
-@dataclass(frozen=True)
+@frozen
 class LeaningRope:
     """A rigid rope that leans two ways: its node, body axes (columns), main one, its two freedoms."""
 
@@ -64,7 +64,7 @@ class LeaningRope:
         return found
 
 
-@dataclass(frozen=True)
+@frozen
 class Follower:
     """A turn about a master's axis, or a slide along it, and its freedom."""
 
@@ -74,7 +74,7 @@ class Follower:
     freedom: int
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Chart:
     """Coordinates of a model's shapes about a reference.
 

@@ -7,12 +7,12 @@ differentiation, as for whole linkages (`flexctrl.model.linkages.linkage`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
@@ -31,7 +31,7 @@ Place = Callable[[_Nodes, _Nodes, "ca.SX", "ca.SX"], "ca.SX"]
 """(places before, places now, own steps, parameters) → where the follower is now."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Work:
     """A kernel that reads and writes only what it must.
 
@@ -47,7 +47,7 @@ class Work:
     writes: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class LeverKind:
     """A kind of lever.
 

@@ -6,13 +6,14 @@ What a linkage of few freedoms has in one expression would grow with their numbe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Backend, Compiled, Run, best_backend
 from flexctrl.mechanics.rotation import exponential
 from flexctrl.model.linkages.lever_kinds import (
@@ -40,7 +41,7 @@ LONG = 40
 _SLOT = 24
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Group:
     """Levers of one kind, to be worked off in this order.
 
@@ -72,7 +73,7 @@ class _One(NamedTuple):
     first: int
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Places:
     """Where a workspace holds what levers read and write.
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
+from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Backend
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.linkages.levers import long_or_short
@@ -82,7 +83,7 @@ def _ties(structure: Structure, rigid: tuple[Group, ...]) -> Ties:
     return tie(structure.nodes, structure.joints, rigid, structure.tracks)
 
 
-@dataclass(frozen=True)
+@frozen
 class _Loops:
     """Independent closures, the degrees of freedom that depend on others through them, closures left out, and notes."""
 

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, hoist_motion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
@@ -42,7 +43,7 @@ def span_of(places: np.ndarray) -> float:
     return 2.0 ** round(math.log2(reach)) if reach else 1.0
 
 
-@dataclass(frozen=True)
+@frozen
 class Link:
     """A drive between two nodes of a linkage; ``rigid`` if its shaft ties the source angle to the joint."""
 
@@ -53,7 +54,7 @@ class Link:
     rigid: bool
 
 
-@dataclass(frozen=True)
+@frozen
 class Loop:
     """A condition that closes a loop of rigid parts: a freedom of ``node`` is that of ``other``, or held (−1)."""
 
@@ -62,7 +63,7 @@ class Loop:
     other: int
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class OpenLinkage:
     """The nodes that follow, lead or are driven, in numbers of their own, and how they move with loops left open.
 

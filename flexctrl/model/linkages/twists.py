@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from flexctrl.frozen import frozen
 from flexctrl.structure.outputs import Rotation
 from flexctrl.structure.structure import Structure
 
 __all__ = ["Twists"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Twists:
     """Which angles are shown.
 

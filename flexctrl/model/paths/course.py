@@ -7,13 +7,13 @@ back are points as any other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import SingularMatrixError
+from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
 from flexctrl.model.mixed import Excess
 from flexctrl.model.paths.pivots import turned
@@ -25,7 +25,7 @@ __all__ = ["Course", "Direction", "Station"]
 _SETTLED, _CONTRACTION = 1e-10, 0.7
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Direction:
     """A direction in displacements of the free coordinates and the load factor."""
 
@@ -36,7 +36,7 @@ class Direction:
         return Direction(by * self.place, by * self.factor)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Station:
     """An equilibrium on a path.
 
@@ -60,7 +60,7 @@ class Station:
     iterations: int
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Course:
     """The equations of a path: constant inputs and λ times a load.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import NoneType
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from flexctrl.errors import (
     did_you_mean,
     shortened,
 )
+from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
 from flexctrl.model.eased import Eased, eased
 from flexctrl.model.equilibrium import Rest, equilibrium
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["BranchPoint", "EquilibriumPath", "LimitPoint", "PathEnd", "PathPoint", "equilibrium_path"]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class PathPoint:
     """An equilibrium on a path.
 
@@ -60,7 +61,7 @@ class PathPoint:
         return self.rest.unstable
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class LimitPoint(PathPoint):
     """Where the load turns back: under load control the machine snaps through.
 
@@ -76,7 +77,7 @@ class LimitPoint(PathPoint):
     mode: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class BranchPoint(PathPoint):
     """Where another path crosses: the machine buckles.
 
@@ -92,7 +93,7 @@ class BranchPoint(PathPoint):
     mode: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class EquilibriumPath:
     """Equilibria under constant inputs and λ times a load, in order along their path.
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
 
+from flexctrl.frozen import frozen
 from flexctrl.model.paths.course import Course, Station
 from flexctrl.model.paths.critical import Gauge, branching_between, limit_between, reached
 from flexctrl.model.places import wandered
@@ -25,7 +25,7 @@ class PathEnd(Enum):
     WANDERED = "a rotation that a Support holds alone has wandered about its axis: further states hang on the way there"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Walked:
     """What a walk has met.
 
@@ -46,7 +46,7 @@ class Walked:
     iterations: int
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False)
 class Walk:
     """A walk along a course.
 

@@ -1,0 +1,87 @@
+"""Frozen dataclasses that are quick to define: but for the constructor, all share their methods.
+
+`dataclasses` compiles five or six functions for each class that is frozen and compared. A first run needs nearly 300
+classes: half of what it takes to import the package (docs/design.md). What is shared here does the same.
+"""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Callable
+from dataclasses import FrozenInstanceError, dataclass, field, fields
+from operator import attrgetter
+from typing import Any, TypeVar, dataclass_transform, overload
+
+__all__ = ["frozen"]
+
+_T = TypeVar("_T")
+
+
+@overload
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def frozen(cls: type[_T], /) -> type[_T]: ...
+@overload
+def frozen(*, eq: bool = True) -> Callable[[type[_T]], type[_T]]: ...
+def frozen(cls: type | None = None, /, *, eq: bool = True) -> Any:
+    """Make a class a frozen dataclass, as ``dataclass(frozen=True)`` does; those that inherit from one are made by it.
+
+    Parameters
+    ----------
+    cls : type
+    eq : bool
+        Whether objects are compared, and hashed, by their fields.
+
+    Returns
+    -------
+    type
+        The same.
+    """
+    return (lambda given: _made(given, eq)) if cls is None else _made(cls, eq)
+
+
+def _made(cls: Any, eq: bool) -> Any:
+    if any("__dataclass_fields__" in vars(base) for base in cls.__mro__[1:]):
+        return dataclass(frozen=True, eq=eq)(cls)
+    own = {name for name, value in vars(cls).items() if value is not None}
+    made: Any = dataclass(eq=False, repr=False)(cls)
+    made.__dataclass_params__.frozen = True  # for what inherits from it
+    shared = {"__setattr__": _set, "__delattr__": _delete, "__repr__": _told}
+    if eq:
+        made._contents = staticmethod(_contents(made))
+        shared.update(__eq__=_equal, __hash__=_hashed)
+    for name in shared.keys() - own:
+        setattr(made, name, shared[name])
+    return made
+
+
+def _contents(cls: Any) -> Callable[[Any], Any]:
+    """What objects of a class are compared by."""
+    names = [f.name for f in fields(cls) if f.compare]
+    return attrgetter(*names) if names else lambda _: ()
+
+
+def _equal(self: Any, other: Any) -> bool:
+    same = type(other) is type(self)
+    return bool(self._contents(self) == self._contents(other)) if same else NotImplemented
+
+
+def _hashed(self: Any) -> int:
+    return hash(self._contents(self))
+
+
+def _set(self: Any, name: str, value: Any) -> None:
+    """Set a field for the first time, as the constructor does."""
+    own = self.__dict__
+    if name in own or name not in self.__dataclass_fields__:
+        raise FrozenInstanceError(f"cannot assign to field {name!r}")
+    own[name] = value
+
+
+def _delete(self: Any, name: str) -> None:
+    raise FrozenInstanceError(f"cannot delete field {name!r}")
+
+
+@reprlib.recursive_repr()
+def _told(self: Any) -> str:
+    told = ", ".join(f"{f.name}={getattr(self, f.name)!r}" for f in fields(self) if f.repr)
+    return f"{type(self).__qualname__}({told})"
