@@ -101,7 +101,7 @@ def renew(stepper: Stepper, point: AlphaPoint, supply: Supply, step: float) -> A
     if stepper.inputs_may_throw(step):
         fresh = _tempered(stepper, fresh, point.rate, step, _held_at_hand)
     lead = stepper.model.switches.still(point.state, point.algorithmic - point.rate)
-    return _eased(stepper, replace(fresh, algorithmic=fresh.rate + lead), step)
+    return _eased(stepper, replace(fresh, algorithmic=fresh.rate + lead, came=point.came), step)
 
 
 def join(stepper: Stepper, point: AlphaPoint, supply: Supply, step: float) -> AlphaPoint:

@@ -41,9 +41,11 @@ class AlphaPoint(Point):
     """A point of the method: its own accelerations beside the true ones, and how these grow.
 
     ``trend`` is the change of the true accelerations over the last step, ``lean`` the share of the one before that
-    best foretold it: the next one is expected to be that share of it.
+    best foretold it: the next one is expected to be that share of it. ``came`` is the length of the last step [s]; 0 at
+    the start and beyond corners.
     """
 
     algorithmic: np.ndarray
     trend: np.ndarray
     lean: float = 1.0
+    came: float = 0.0

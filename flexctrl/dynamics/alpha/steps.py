@@ -8,7 +8,7 @@ stable, with the high frequencies damped down to the spectral radius ρ.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
 from flexctrl.dynamics.alpha.sliding import jumps, slide
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.march.clock import later
+from flexctrl.dynamics.march.lagging import CHANGED, lag_share, lagged, lags_of
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
 from flexctrl.dynamics.steps import Counts, StepError, singular_tangent
@@ -92,6 +93,7 @@ class Stepper:
         self.firmest = firmest(self.model)
         self.throws = may_throw(self.model)
         self.kinks = self.model.kinks.met
+        self.lags = lags_of(self.model, np.arange(self.model.n), self.model.n)
 
     def recall(self, memory: Tangent | None) -> None:
         """Make the tangent of another stepper's memory again."""
@@ -173,6 +175,7 @@ class Stepper:
             self._exact = False
 
     def _attempt(self, point: AlphaPoint, h: float, fresh: bool) -> AlphaPoint:
+        point = self._hastened(point, h)
         c, now = self.coefficients, point.state
         to_v = c.gamma / (h * c.beta)
         to_rate = (1.0 - c.alpha_m) / (h * h * c.beta * (1.0 - c.alpha_f))
@@ -204,6 +207,18 @@ class Stepper:
             last = size
         raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
 
+    def _hastened(self, point: AlphaPoint, h: float) -> AlphaPoint:
+        """A point that a step of another length than the last one sets out from along stiff lines."""
+        before, state, c = point.came, point.state, self.coefficients
+        if not (self.lags.count and before > 0.0 and abs(h - before) > CHANGED * before):
+            return point
+        pose = np.pad(state.x, ((0, 0), (0, 9))).ravel()
+        if not lagged(self.lags, pose, state.driven, state.v, point.rate, min(h, before)):
+            return point
+        v = state.v + lag_share(c.beta, c.gamma) * (h * h - before * before) * self.lags.change
+        own = point.algorithmic + (c.alpha_m - c.alpha_f) * (h - before) * self.lags.change
+        return replace(point, state=state.with_(v=v), algorithmic=own)
+
     def _foreseen(self, point: AlphaPoint, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The end of a step whose accelerations change as those of the last one did."""
         c, before, own = self.coefficients, point.state.v, point.algorithmic
@@ -230,7 +245,7 @@ class Stepper:
         supply = self.feed.at(state, point.supply, h)
         if self.feed.reacting and jumps(point.supply.u, used, supply.u, self._gains @ correction):
             raise StepError(worst, f"the law jumps at t = {state.t:.6g} s")
-        return AlphaPoint(state, rate, supply, algorithmic, change, lean)
+        return AlphaPoint(state, rate, supply, algorithmic, change, lean, h)
 
     def _solved(self, size: float, contraction: float) -> bool:
         """Tell whether a correction was the last that is needed, or the next is foretold to be none."""

@@ -62,6 +62,8 @@ def accept(m: March) -> None:
     tighten(m, total(onward) / max(total(still), _TINY), 0.5 * largest(steady), largest(pull))
     m.turned = max(m.turned, m.h * largest(spun))
     m.t = later(m.t, m.h)
+    m.came = m.h
+    m.lagging = 0
     enter(m)
     note(m)
     m.done += 1

@@ -27,6 +27,7 @@ def start_anew(m: March) -> int:
     f = m.flat
     m.made_for = -1.0
     m.lean = 1.0
+    m.came = 0.0
     clear(f.padded, m.trend)
     clear(f.padded, f.step)
     copy(f.padded, m.v, f.v)

@@ -36,7 +36,7 @@ from flexctrl.dynamics.march.record import (
     March,
 )
 from flexctrl.dynamics.march.siding import decided
-from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
+from flexctrl.dynamics.march.step import refactored, restore, sloped, step, to_rate, to_v
 from flexctrl.dynamics.march.turning import start_anew, turn_corner
 from flexctrl.dynamics.swift.thrown import AT_HAND
 from flexctrl.kernels.native import seldom
@@ -49,6 +49,8 @@ __all__ = ["run"]
 def run(m: March) -> int:
     """Do the task that is set."""
     status = task(m)
+    if m.lags.count > 0 and m.phase == FRESH:
+        restore(m)
     if m.leaping == 1 and m.leap.aloft == 1:
         land(m)
     return status

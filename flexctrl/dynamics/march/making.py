@@ -14,6 +14,7 @@ from flexctrl.dynamics.march.answer import no_answer
 from flexctrl.dynamics.march.closing import closing_of
 from flexctrl.dynamics.march.corners import corners_of
 from flexctrl.dynamics.march.flowing import flows_of
+from flexctrl.dynamics.march.lagging import lags_of
 from flexctrl.dynamics.march.law import no_law
 from flexctrl.dynamics.march.probing import probes_of
 from flexctrl.dynamics.march.record import (
@@ -81,6 +82,7 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
     corners: Any = Packed(corners_of(F))
     closing: Any = Packed(closing_of(F))
     probes = probes_of(F, method.weight)
+    lags: Any = Packed(lags_of(F.model, F.plan.position, F.flat.padded))
     return March(
         flat=F.flat,
         gauges=F.gauges,
@@ -96,6 +98,7 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
         tangent=_factors(F),
         mass=_factors(F),
         probes=probes,
+        lags=lags,
         entries=np.zeros(F.plan.length + 1),
         leaping=leaping,
         answering=answering,
@@ -109,7 +112,7 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
 
 def _motion(F: Flattened) -> dict[str, Any]:
     """Where the motion stands, and what turns in it."""
-    names = ["v", "rate", "algorithmic", "trend", "pulled", "fresh", "before", "asked", "reach", "first"]
+    names = ["v", "left", "own", "rate", "algorithmic", "trend", "pulled", "fresh", "before", "asked", "reach", "first"]
     names += ["ahead", "swept", "bent", "path"]
     cones = F.plan.position[coning_of(F.model).triples]
     vectors = dict(zip(names, np.zeros((len(names), F.flat.padded)), strict=True))

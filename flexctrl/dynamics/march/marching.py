@@ -143,7 +143,8 @@ class Marcher(Loops):
         enter_contacts(self.contacts, F, point.state)
         m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
         m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
-        m.lean, m.phase, m.attempt, m.t = point.lean, FRESH, 0, point.state.t
+        m.lean, m.came, m.phase, m.attempt, m.t = point.lean, point.came, FRESH, 0, point.state.t
+        m.lagging = 0
         if (m.swift or m.whole) and not F.keeps_shape:
             m.swift = m.whole = 0
         self.supply(point.supply.u)
@@ -191,9 +192,9 @@ class Marcher(Loops):
     def point(self, supply: Supply) -> AlphaPoint:
         """Return where the march stands."""
         m, F = self.march, self.flattened
-        return AlphaPoint(
-            F.state(m.v, m.t, self.dry), F.own(m.rate), supply, F.own(m.algorithmic), F.own(m.trend), m.lean
-        )
+        v, own = (m.left, m.own) if m.lagging else (m.v, m.algorithmic)
+        state = F.state(v, m.t, self.dry)
+        return AlphaPoint(state, F.own(m.rate), supply, F.own(own), F.own(m.trend), m.lean, m.came)
 
     def fixed(self, h: float, count: int) -> int:
         """Take up to ``count`` steps of one length; return how it ended."""

@@ -12,6 +12,7 @@ from flexctrl.dynamics.march.closing import Closing
 from flexctrl.dynamics.march.contacts import Contacts
 from flexctrl.dynamics.march.corners import Corners
 from flexctrl.dynamics.march.flowing import Flows
+from flexctrl.dynamics.march.lagging import Lags
 from flexctrl.dynamics.march.law import Law
 from flexctrl.dynamics.march.probing import Probes
 from flexctrl.kernels.native import Reals, Wholes
@@ -145,6 +146,7 @@ class March:
     axes : Axes
     tangent, mass : Factors
     probes : Probes
+    lags : Lags
     entries : Reals
         Fronts of the matrix that is being made.
     alpha_m, alpha_f, beta, gamma : float
@@ -195,6 +197,8 @@ class March:
         took, and how many steps there were.
     lean : float
         What share of their last change accelerations are expected to change by; see `AlphaPoint`.
+    came, lagging : float, int
+        Length of the last step; whether the step under way sets out with other rates than that one left.
     made_for, mass_for : float
         Step for which the tangent was made; 1 once the mass has been.
     missed, believed : float, int
@@ -217,6 +221,9 @@ class March:
         Dissipated power; work of the inputs, energy dissipated, and that by rates that are over within a step.
     v, rate, algorithmic, trend : Reals
         At the start of the step; see `AlphaPoint`.
+    left, own : Reals
+        Rates and the method's own accelerations there as the last step left them, where those along stiff lines are
+        others now, for the step to come (``lagging``).
     pulled : Reals
         The inputs' forces at its start.
     fresh, before, asked : Reals
@@ -255,8 +262,11 @@ class March:
     tangent: Factors
     mass: Factors
     probes: Probes
+    lags: Lags
     entries: Reals
     v: Reals
+    left: Reals
+    own: Reals
     rate: Reals
     algorithmic: Reals
     trend: Reals
@@ -336,6 +346,8 @@ class March:
     lately: float = 0.0
     served: int = 0
     lean: float = 1.0
+    came: float = 0.0
+    lagging: int = 0
     made_for: float = -1.0
     mass_for: float = 0.0
     missed: float = -1.0

@@ -14,6 +14,7 @@ from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
 from flexctrl.dynamics.march.contacts import feel, firmness
 from flexctrl.dynamics.march.corners import tell_sides
 from flexctrl.dynamics.march.holding import held
+from flexctrl.dynamics.march.lagging import CHANGED, lag_share, lagged
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.dynamics.swift.stiff_lines import SHORT, STIFF, SURE, TURNING
@@ -22,7 +23,7 @@ from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
 from flexctrl.model.flat.fronts import factor, whose
 
-__all__ = ["blended", "newton", "press_all", "refactored", "sloped", "step", "to_rate", "to_v"]
+__all__ = ["blended", "newton", "press_all", "refactored", "restore", "sloped", "step", "to_rate", "to_v"]
 
 _TURNED = 0.1
 _TRUSTED = 8
@@ -58,6 +59,8 @@ def predict(m: March) -> None:
     """Guess the end of the step: accelerations change as in the last one, by the share that told that one best."""
     f = m.flat
     h = m.h
+    if m.lags.count > 0:
+        hasten(m)
     for i in range(0, f.padded, 8):
         rate = eight(m.rate[i:]) + m.lean * eight(m.trend[i:])
         own = eight(m.algorithmic[i:])
@@ -74,6 +77,35 @@ def predict(m: March) -> None:
     m.contraction = 0.0
     m.strayed = 0.0
     m.short = 0.0
+
+
+@seldom
+def hasten(m: March) -> None:
+    """Give motion along stiff lines what the step to come would have; see `lagging`."""
+    f = m.flat
+    restore(m)
+    if not (m.came > 0.0 and abs(m.h - m.came) > CHANGED * m.came):
+        return
+    if lagged(m.lags, f.pose, f.driven, m.v, m.rate, min(m.h, m.came)):
+        m.lagging = 1
+        speeds = lag_share(m.beta, m.gamma) * (m.h * m.h - m.came * m.came)
+        own = (m.alpha_m - m.alpha_f) * (m.h - m.came)
+        for i in range(0, f.padded, 8):
+            change = eight(m.lags.change[i:])
+            put(m.left[i:], eight(m.v[i:]))
+            put(m.own[i:], eight(m.algorithmic[i:]))
+            put(m.v[i:], eight(m.v[i:]) + speeds * change)
+            put(m.algorithmic[i:], eight(m.algorithmic[i:]) + own * change)
+
+
+@seldom
+def restore(m: March) -> None:
+    """Set the start of the step back to what the last one left."""
+    if m.lagging == 1:
+        for i in range(0, m.flat.padded, 8):
+            put(m.v[i:], eight(m.left[i:]))
+            put(m.algorithmic[i:], eight(m.own[i:]))
+    m.lagging = 0
 
 
 def fastest(m: March) -> float:
