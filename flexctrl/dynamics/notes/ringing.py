@@ -73,14 +73,18 @@ def ringing(run: Run, journey: Journey) -> Run:
 def _notes(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iterator[str]:
     told, found = max(run.report.error, *run.report.output_errors.values(), 0.0), list(shocks(run, journey, model))
     for output in asked:
-        swing, shock = max(((shock.swing(output), shock) for shock in found), key=lambda each: each[0].size)
         values = run[output.name]
         way, most = float(np.ptp(values)), float(np.abs(values).max())
-        if swing.size > max(_LITTLE * way, _STEADY * most):
+        swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
+        for swing, shock in sorted(swings, key=lambda each: -each[0].size):
+            if not swing.size > max(_LITTLE * way, _STEADY * most):
+                break
             lasts = _lasting(swing, journey.point.state.t - shock.state.t)
             step = _step(run, journey, shock.state.t, lasts)
             said = _note(journey.plan.method, swing, _Ringing(output.name, shock.since, lasts, step, way, told))
-            yield from said
+            if said:
+                yield said
+                break
 
 
 def _lasting(swing: Swing, left: float) -> float:
@@ -119,18 +123,18 @@ class _Ringing(NamedTuple):
     told: float
 
 
-def _note(method: Integrator, swing: Swing, of: _Ringing) -> Iterator[str]:
+def _note(method: Integrator, swing: Swing, of: _Ringing) -> str:
+    """What is to be said of a vibration; empty if nothing is."""
     turned, angle = of.step * swing.frequency, of.lasts * swing.frequency
     said = {"name": of.name, "swing": swing.size, "since": of.since}
     if turned > _SEEN:
-        yield _SAID.format(**said, turned=turned, finer=_RESOLVED / swing.frequency)
-        return
+        return _SAID.format(**said, turned=turned, finer=_RESOLVED / swing.frequency)
     if isinstance(method, Richardson):
         lag = 0.75 * angle * turned**2 / 12.0
-        if lag > _LAG:
-            yield _PARTED.format(**said, lag=lag, finer=of.step * np.sqrt(0.1 * _LAG / lag))
-        return
+        return _PARTED.format(**said, lag=lag, finer=of.step * np.sqrt(0.1 * _LAG / lag)) if lag > _LAG else ""
     faded, lag = fading(method, turned, angle)
-    if min(-np.expm1(-faded) + lag, 1.0) * swing.size > max(_FADED, _MORE * of.told) * of.way:
+    missed = abs(1.0 - np.exp(complex(-faded, min(lag, np.pi))))
+    if missed * swing.size > max(_FADED, _MORE * of.told) * of.way:
         finer = of.step * np.sqrt(_AIM / (faded + lag))
-        yield _FADING.format(**said, step=of.step, lost=-np.expm1(-faded), lag=lag, finer=finer)
+        return _FADING.format(**said, step=of.step, lost=-np.expm1(-faded), lag=lag, finer=finer)
+    return ""

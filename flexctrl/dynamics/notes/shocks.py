@@ -1,14 +1,15 @@
-"""What sets lines and motors vibrating: forces out of balance at the start, and inputs that jump."""
+"""What sets lines, motors and all that bends vibrating: forces out of balance at the start, and inputs that jump."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import eigh
 
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.swift.lengths import lengthening
@@ -21,14 +22,19 @@ from flexctrl.structure.drives import Winch
 from flexctrl.structure.outputs import AngularVelocity, DriveSpeed, Tension, Velocity
 
 if TYPE_CHECKING:
+    from flexctrl.dynamics.feed import Feed
     from flexctrl.dynamics.journey import Journey
 
 __all__ = ["Fast", "Shock", "Swing", "shocks"]
 
 _SEEDS = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
+_FEW = 200
+"""Degrees of freedom of a machine whose modes are looked at."""
+_ROUND_OFF, _LITTLE = 1e-12, 1e-6
 _MOST, _BESIDE = 16, 1e-9
 """Breaks of a law that are looked at, and how far on either side, in parts of the run."""
 
+Answer = Callable[[State, np.ndarray], np.ndarray]
 Fast = Tension | DriveSpeed | Velocity | AngularVelocity
 
 
@@ -59,6 +65,15 @@ class _Vibration(NamedTuple):
     decay: float
 
 
+class _At(NamedTuple):
+    """A machine in a state under inputs, and its law."""
+
+    model: Model
+    state: State
+    u: np.ndarray
+    law: Answer
+
+
 _NONE = Swing(0.0, 0.0, 0.0)
 
 
@@ -72,7 +87,11 @@ class Shock:
     state : State
     moves, rates : numpy.ndarray, shape (n,)
         Rates that it begins with, and accelerations by them; 0 of what has no mass.
-    mass, damping, stiffness : numpy.ndarray, shape (n,), or scipy.sparse.csr_matrix, shape (n, n)
+    mass : numpy.ndarray, shape (n,)
+        Of each degree of freedom alone; infinite where there is none.
+    inertia, damping, stiffness : scipy.sparse.csr_matrix, shape (n, n)
+    law : Answer
+        Force by which a continuous law answers rates.
     since : str
         When, in words.
     """
@@ -82,28 +101,34 @@ class Shock:
     moves: np.ndarray
     rates: np.ndarray
     mass: np.ndarray
+    inertia: sp.csr_matrix
     damping: sp.csr_matrix
     stiffness: sp.csr_matrix
+    law: Answer
     since: str
 
     @classmethod
-    def of(cls, model: Model, state: State, u: np.ndarray, force: np.ndarray, moves: np.ndarray, since: str) -> Shock:
+    def of(cls, at: _At, force: np.ndarray, moves: np.ndarray, since: str) -> Shock:
+        (model, state, u), law = at[:3], at.law
         still, rates = np.zeros((2, model.n))
         M, C, K = (sp.csr_matrix(-model.slope(state, state.v, still, seeds, u)) for seeds in _SEEDS)
         heavy = np.flatnonzero(M.diagonal() > model.dust)
         with suppress(SingularMatrixError):
             rates[heavy] = factorise(M[heavy][:, heavy])(force[heavy])
-        return cls(model, state, moves, rates, np.where(M.diagonal() > model.dust, M.diagonal(), np.inf), C, K, since)
+        mass = np.where(M.diagonal() > model.dust, M.diagonal(), np.inf)
+        return cls(model, state, moves, rates, mass, M, C, K, law, since)
 
-    def swing(self, output: Fast) -> Swing:
-        """What becomes of an output: the most that one line or motor makes of it."""
+    def swings(self, output: Fast) -> list[Swing]:
+        """What becomes of an output: the most that one line or motor makes of it, and what modes make of a speed."""
         by_place, by_rate = (part[self.model.outputs.index(output.name)].toarray().ravel() for part in self._sights)
-        found = [_NONE]
-        for part in self._vibrations:
-            if isinstance(output, Velocity | AngularVelocity) or part.part == _source(output):
-                size = np.hypot(by_place @ part.rates / part.frequency, by_rate @ part.rates)
-                found.append(Swing(float(size), part.frequency, part.decay))
-        return max(found)
+
+        def seen(part: _Vibration) -> Swing:
+            size = np.hypot(by_place @ part.rates / part.frequency, by_rate @ part.rates)
+            return Swing(float(size), part.frequency, part.decay)
+
+        speed = isinstance(output, Velocity | AngularVelocity)
+        alone = [seen(part) for part in self._vibrations if speed or part.part == _source(output)]
+        return [max(alone, default=_NONE), *map(seen, self._modes if speed else ())]
 
     @cached_property
     def _sights(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
@@ -119,6 +144,26 @@ class Shock:
     @cached_property
     def _vibrations(self) -> tuple[_Vibration, ...]:
         return (*self._lines(), *self._motors())
+
+    @cached_property
+    def _modes(self) -> tuple[_Vibration, ...]:
+        """Modes of the machine as it stands, with what the shock makes of each; none of a machine of many freedoms."""
+        heavy = np.isfinite(self.mass)
+        if not 0 < np.count_nonzero(heavy) <= _FEW:
+            return ()
+        M, K = self.inertia[heavy][:, heavy].toarray(), _condensed(self.stiffness.toarray(), heavy)
+        with suppress(np.linalg.LinAlgError):
+            squares, shapes = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
+            fast = np.flatnonzero(squares > _ROUND_OFF * squares[-1])
+            return tuple(self._mode(heavy, shapes[:, i], np.sqrt(squares[i])) for i in fast)
+        return ()
+
+    def _mode(self, heavy: np.ndarray, shape: np.ndarray, frequency: float) -> _Vibration:
+        share = self.inertia[heavy][:, heavy] @ shape
+        speed = np.hypot(share @ self.rates[heavy] / frequency, share @ self.moves[heavy])
+        along = np.zeros(self.model.n)
+        along[heavy] = shape
+        return _Vibration("", speed * along, float(frequency), self._slowed(along))
 
     def _lines(self) -> Iterator[_Vibration]:
         """About where forces balance: they part by s̈/ω² and by ṡ/ω."""
@@ -143,7 +188,20 @@ class Shock:
         """The rate at which a vibration along some freedoms rings out, masses beside the diagonal left out [1/s]."""
         heavy = np.isfinite(self.mass)
         moved = float(along[heavy] ** 2 @ self.mass[heavy])
-        return max(0.5 * float(along @ (self.damping @ along)) / moved, 0.0) if moved > 0.0 else 0.0
+        return self._slowed(along) / moved if moved > 0.0 else 0.0
+
+    def _slowed(self, along: np.ndarray) -> float:
+        """Half the power that damping and a continuous law take at some rates; 0 where they give any."""
+        return max(0.5 * float(along @ (self.damping @ along - self.law(self.state, along))), 0.0)
+
+
+def _condensed(K: np.ndarray, heavy: np.ndarray) -> np.ndarray:
+    """Return a stiffness of what has mass, all else where it balances, shape (heavy, heavy)."""
+    light = ~heavy
+    if not light.any():
+        return K
+    follows = np.linalg.lstsq(K[np.ix_(light, light)], K[np.ix_(light, heavy)], rcond=None)[0]
+    return np.asarray(K[np.ix_(heavy, heavy)] - K[np.ix_(heavy, light)] @ follows)
 
 
 def _source(output: Fast) -> str:
@@ -167,7 +225,8 @@ def shocks(run: Run, journey: Journey, model: Model) -> Iterator[Shock]:
     """
     state, u = journey.origin.state, journey.origin.u
     force = model.balance(state, state.v, np.zeros(model.n)) + model.loads(state, u)
-    yield Shock.of(model, state, u, force, state.v, "the start")
+    law = partial(_answered, model, journey.plan.feed)
+    yield Shock.of(_At(model, state, u, law), force, state.v, "the start")
     largest: dict[int, _Jump] = {}
     for jump in _jumps(run, journey):
         for i, leap in enumerate(np.abs(jump.after - jump.before).tolist()):
@@ -175,7 +234,19 @@ def shocks(run: Run, journey: Journey, model: Model) -> Iterator[Shock]:
                 largest[i] = jump
     for jump in {id(found): found for found in largest.values()}.values():
         force = model.loads(jump.state, jump.after) - model.loads(jump.state, jump.before)
-        yield Shock.of(model, jump.state, jump.after, force, np.zeros(model.n), f"t = {jump.state.t:.3g} s")
+        at = _At(model, jump.state, jump.after, law)
+        yield Shock.of(at, force, np.zeros(model.n), f"t = {jump.state.t:.3g} s")
+
+
+def _answered(model: Model, feed: Feed, state: State, rates: np.ndarray) -> np.ndarray:
+    """By how much the forces of a continuous law without states of its own change with rates; elsewhere nothing."""
+    if feed.controller is None or not feed.continuous or (x := feed.controller.initial()).size:
+        return np.zeros(model.n)
+    little = _LITTLE / max(float(np.abs(rates).max()), _LITTLE)
+    with suppress(ControllerError, ArithmeticError, ValueError):
+        before, after = (feed.evaluate(s, x).u for s in (state, state.with_(v=state.v + little * rates)))
+        return (model.loads(state, after) - model.loads(state, before)) / little
+    return np.zeros(model.n)
 
 
 class _Jump(NamedTuple):
