@@ -41,7 +41,7 @@ def test_steps_that_make_energy_from_nothing_end_the_run():
     assert len(run.t) > 10
 
 
-@pytest.mark.parametrize(("stiffness", "step", "rho"), [(1e4, 0.15, 0.9), (1e4, 0.2, 0.9), (1e5, 0.2, 0.5)])
+@pytest.mark.parametrize(("stiffness", "step", "rho"), [(1e4, 0.15, 0.9), (1e4, 0.2, 0.9), (1e5, 0.2, 0.6)])
 def test_energy_that_was_made_and_lost_again_on_the_way_is_not_forgotten(stiffness, step, rho):
     """Three springs in steps in which they turn by a radian: a spike of energy, most of which is damped again."""
     run = fc.simulate(chain(3, stiffness), until=5.0, method=fc.GeneralizedAlpha(step, rho))
@@ -54,7 +54,7 @@ def test_energy_that_was_made_and_lost_again_on_the_way_is_not_forgotten(stiffne
 def test_an_event_that_ends_a_run_vouches_for_nothing():
     """A chain in steps that make energy in it, ended by an event on its way."""
     event = fc.Event("through", "z", at=0.5, direction=fc.Direction.RISING, terminal=True)
-    run = fc.simulate(chain(3, 1e4), until=5.0, method=fc.GeneralizedAlpha(0.15), events=[event])
+    run = fc.simulate(chain(3, 1e4), until=5.0, method=fc.GeneralizedAlpha(0.2), events=[event])
     assert run.report.energy_residual > 0.5
     assert run.status is Status.FAILED
     assert "the motion is not resolved" in run.report.message
@@ -65,7 +65,7 @@ def test_an_interrupted_run_says_what_its_books_miss():
     calls = iter(range(10**6))
 
     def interrupting(seen):
-        if next(calls) > 100:
+        if next(calls) > 80:
             raise KeyboardInterrupt
         return 1.0
 
