@@ -45,40 +45,39 @@ def _made(cls: Any, eq: bool) -> Any:
     own = {name for name, value in vars(cls).items() if value is not None}
     made: Any = dataclass(eq=False, repr=False)(cls)
     made.__dataclass_params__.frozen = True  # for what inherits from it
-    shared = {"__setattr__": _set, "__delattr__": _delete, "__repr__": _told}
-    if eq:
-        made._contents = staticmethod(_contents(made))
-        shared.update(__eq__=_equal, __hash__=_hashed)
+    shared = {"__repr__": _told, **_guards(made), **(_comparisons(made) if eq else {})}
     for name in shared.keys() - own:
         setattr(made, name, shared[name])
     return made
 
 
-def _contents(cls: Any) -> Callable[[Any], Any]:
-    """What objects of a class are compared by."""
+def _guards(cls: Any) -> dict[str, Callable[..., Any]]:
+    """What sets a field for the first time, as the constructor does, and nothing else but what subclasses add."""
+    names = frozenset(f.name for f in fields(cls))
+
+    def assign(self: Any, name: str, value: Any) -> None:
+        own = self.__dict__
+        if name in own if name in names else type(self) is cls:
+            raise FrozenInstanceError(f"cannot assign to field {name!r}")
+        own[name] = value
+
+    def delete(self: Any, name: str) -> None:
+        if name in names or type(self) is cls:
+            raise FrozenInstanceError(f"cannot delete field {name!r}")
+        object.__delattr__(self, name)
+
+    return {"__setattr__": assign, "__delattr__": delete}
+
+
+def _comparisons(cls: Any) -> dict[str, Callable[..., Any]]:
+    """Comparison and hash by the fields."""
     names = [f.name for f in fields(cls) if f.compare]
-    return attrgetter(*names) if names else lambda _: ()
+    contents: Callable[[Any], Any] = attrgetter(*names) if names else lambda _: ()
 
+    def equal(self: Any, other: Any) -> Any:
+        return contents(self) == contents(other) if type(other) is type(self) else NotImplemented
 
-def _equal(self: Any, other: Any) -> bool:
-    same = type(other) is type(self)
-    return bool(self._contents(self) == self._contents(other)) if same else NotImplemented
-
-
-def _hashed(self: Any) -> int:
-    return hash(self._contents(self))
-
-
-def _set(self: Any, name: str, value: Any) -> None:
-    """Set a field for the first time, as the constructor does."""
-    own = self.__dict__
-    if name in own or name not in self.__dataclass_fields__:
-        raise FrozenInstanceError(f"cannot assign to field {name!r}")
-    own[name] = value
-
-
-def _delete(self: Any, name: str) -> None:
-    raise FrozenInstanceError(f"cannot delete field {name!r}")
+    return {"__eq__": equal, "__hash__": lambda self: hash(contents(self))}
 
 
 @reprlib.recursive_repr()

@@ -63,7 +63,7 @@ def accept(m: March) -> None:
     m.turned = max(m.turned, m.h * largest(spun))
     m.t = later(m.t, m.h)
     m.came = m.h
-    m.lagging = 0
+    m.lagging = 0.0
     enter(m)
     note(m)
     m.done += 1

@@ -15,20 +15,19 @@ look at accelerations along the line, which go to and fro themselves.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from flexctrl.dynamics.scales import once
-from flexctrl.dynamics.swift.stiff_lines import ends_of, giving_way, mobility, own_frequencies
+from flexctrl.dynamics.swift.stiff_lines import ends_of, frequencies, giving_way, mobility
 from flexctrl.kernels.native import Reals, Wholes, seldom
 from flexctrl.model.flat.flat import clear
+from flexctrl.model.model import Model
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope
-
-if TYPE_CHECKING:
-    from flexctrl.model.model import Model
 
 __all__ = ["CHANGED", "Lags", "lag_share", "lagged", "lags_of"]
 
@@ -101,9 +100,9 @@ def lags_of(model: Any, place: np.ndarray, padded: int) -> Lags:
     place : numpy.ndarray of int, shape (n,)
         Where each degree of freedom stands in the vectors.
     padded : int
-        Length of these, > n.
+        Length of these, ≥ n.
     """
-    lines = _lines(model)
+    lines = list(_lines(model))
     k = [line for line, _ in lines]
     winches = [line if isinstance(line, Winch) else None for line in k]
     light = np.zeros(padded)
@@ -126,18 +125,15 @@ def lags_of(model: Any, place: np.ndarray, padded: int) -> Lags:
     )
 
 
-def _lines(model: Any) -> list[tuple[Any, float]]:
+def _lines(model: Any) -> Iterator[tuple[Any, float]]:
     """Lines that turn between nodes with freedoms of their own or none, and their frequencies [rad/s]."""
-    from flexctrl.model.model import Model
-
-    if not (isinstance(model, Model) and model.large):
-        return []
-    lines = giving_way(model)
-    motion = model.motion
-    following = set(motion.nodes[(motion.place[motion.nodes, :3] >= motion.n).any(axis=1)].tolist())
-    free = [not following & set(ends_of(model, line)) for line in lines]
-    each = zip(lines, once(model, own_frequencies).tolist(), free, strict=True)
-    return [(line, frequency) for line, frequency, apart in each if apart and frequency > 0.0]
+    found = once(model, frequencies).tolist()
+    if found:
+        motion = model.motion
+        following = set(motion.nodes[(motion.place[motion.nodes, :3] >= motion.n).any(axis=1)].tolist())
+        for line, frequency in zip(giving_way(model), found, strict=True):
+            if frequency > 0.0 and not following & set(ends_of(model, line)):
+                yield line, frequency
 
 
 def _cells(model: Model, line: Any, place: np.ndarray) -> list[int]:

@@ -144,7 +144,7 @@ class Marcher(Loops):
         m.v[:], m.rate[:] = F.ordered(point.state.v), F.ordered(point.rate)
         m.algorithmic[:], m.trend[:] = F.ordered(point.algorithmic), F.ordered(point.trend)
         m.lean, m.came, m.phase, m.attempt, m.t = point.lean, point.came, FRESH, 0, point.state.t
-        m.lagging = 0
+        m.lagging = 0.0
         if (m.swift or m.whole) and not F.keeps_shape:
             m.swift = m.whole = 0
         self.supply(point.supply.u)

@@ -197,8 +197,8 @@ class March:
         took, and how many steps there were.
     lean : float
         What share of their last change accelerations are expected to change by; see `AlphaPoint`.
-    came, lagging : float, int
-        Length of the last step; whether the step under way sets out with other rates than that one left.
+    came, lagging : float
+        Length of the last step; that of the one for which the start has other rates than the last one left, 0: of none.
     made_for, mass_for : float
         Step for which the tangent was made; 1 once the mass has been.
     missed, believed : float, int
@@ -347,7 +347,7 @@ class March:
     served: int = 0
     lean: float = 1.0
     came: float = 0.0
-    lagging: int = 0
+    lagging: float = 0.0
     made_for: float = -1.0
     mass_for: float = 0.0
     missed: float = -1.0

@@ -83,11 +83,13 @@ def predict(m: March) -> None:
 def hasten(m: March) -> None:
     """Give motion along stiff lines what the step to come would have; see `lagging`."""
     f = m.flat
+    if m.lagging == m.h:
+        return
     restore(m)
     if not (m.came > 0.0 and abs(m.h - m.came) > CHANGED * m.came):
         return
     if lagged(m.lags, f.pose, f.driven, m.v, m.rate, min(m.h, m.came)):
-        m.lagging = 1
+        m.lagging = m.h
         speeds = lag_share(m.beta, m.gamma) * (m.h * m.h - m.came * m.came)
         own = (m.alpha_m - m.alpha_f) * (m.h - m.came)
         for i in range(0, f.padded, 8):
@@ -101,11 +103,11 @@ def hasten(m: March) -> None:
 @seldom
 def restore(m: March) -> None:
     """Set the start of the step back to what the last one left."""
-    if m.lagging == 1:
+    if m.lagging > 0.0:
         for i in range(0, m.flat.padded, 8):
             put(m.v[i:], eight(m.left[i:]))
             put(m.algorithmic[i:], eight(m.own[i:]))
-    m.lagging = 0
+    m.lagging = 0.0
 
 
 def fastest(m: March) -> float:

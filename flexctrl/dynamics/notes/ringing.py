@@ -79,7 +79,7 @@ def _notes(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Itera
         for swing, shock in sorted(swings, key=lambda each: -each[0].size):
             if not swing.size > max(_LITTLE * way, _STEADY * most):
                 break
-            lasts = _lasting(swing, journey.point.state.t - shock.state.t)
+            lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
             step = _step(run, journey, shock.state.t, lasts)
             said = _note(journey.plan.method, swing, _Ringing(output.name, shock.since, lasts, step, way, told))
             if said:
@@ -87,9 +87,9 @@ def _notes(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Itera
                 break
 
 
-def _lasting(swing: Swing, left: float) -> float:
+def _lasting(decay: float, left: float) -> float:
     """How long it rings, if damping of its own does not end it before [s]."""
-    return left if left * swing.decay < 1.0 else 1.0 / swing.decay
+    return left if left * decay < 1.0 else 1.0 / decay
 
 
 def _step(run: Run, journey: Journey, since: float, lasts: float) -> float:

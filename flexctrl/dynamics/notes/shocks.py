@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
 
+from flexctrl.dynamics.notes.heavy import without_light
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.swift.lengths import lengthening
 from flexctrl.errors import ControllerError, SingularMatrixError
@@ -34,47 +35,42 @@ _ROUND_OFF, _LITTLE = 1e-12, 1e-6
 _MOST, _BESIDE = 16, 1e-9
 """Breaks of a law that are looked at, and how far on either side, in parts of the run."""
 
-Answer = Callable[[State, np.ndarray], np.ndarray]
 Fast = Tension | DriveSpeed | Velocity | AngularVelocity
 
 
 class Swing(NamedTuple):
-    """By how much an output rings, how fast [rad/s], and at what rate it rings out by itself [1/s]."""
+    """A line, a motor or a mode that swings by itself, and by how much an output rings with it.
+
+    Attributes
+    ----------
+    size : float
+    frequency : float
+        [rad/s]
+    rates : numpy.ndarray, shape (n,)
+        Amplitudes of the rates of degrees of freedom.
+    """
 
     size: float
     frequency: float
-    decay: float
+    rates: np.ndarray
 
 
 class _Vibration(NamedTuple):
-    """A line or a motor that swings as if all else let go.
+    """A line, a motor or a mode that swings as if all else let go.
 
     Attributes
     ----------
     part : str
-        Its name.
+        The name of a line or a motor.
     rates : numpy.ndarray, shape (n,)
         Amplitudes of the rates of degrees of freedom.
-    frequency, decay : float
-        [rad/s, 1/s]
+    frequency : float
+        [rad/s]
     """
 
     part: str
     rates: np.ndarray
     frequency: float
-    decay: float
-
-
-class _At(NamedTuple):
-    """A machine in a state under inputs, and its law."""
-
-    model: Model
-    state: State
-    u: np.ndarray
-    law: Answer
-
-
-_NONE = Swing(0.0, 0.0, 0.0)
 
 
 @frozen(eq=False)
@@ -84,19 +80,19 @@ class Shock:
     Attributes
     ----------
     model : Model
+    feed : Feed
     state : State
     moves, rates : numpy.ndarray, shape (n,)
         Rates that it begins with, and accelerations by them; 0 of what has no mass.
     mass : numpy.ndarray, shape (n,)
         Of each degree of freedom alone; infinite where there is none.
     inertia, damping, stiffness : scipy.sparse.csr_matrix, shape (n, n)
-    law : Answer
-        Force by which a continuous law answers rates.
     since : str
         When, in words.
     """
 
     model: Model
+    feed: Feed
     state: State
     moves: np.ndarray
     rates: np.ndarray
@@ -104,19 +100,21 @@ class Shock:
     inertia: sp.csr_matrix
     damping: sp.csr_matrix
     stiffness: sp.csr_matrix
-    law: Answer
     since: str
 
     @classmethod
-    def of(cls, at: _At, force: np.ndarray, moves: np.ndarray, since: str) -> Shock:
-        (model, state, u), law = at[:3], at.law
+    def of(
+        cls, journey: Journey, at: tuple[State, np.ndarray], force: np.ndarray, moves: np.ndarray, since: str
+    ) -> Shock:
+        """Return what forces do that are put on at once in a state under inputs, of a machine that rates move, too."""
+        model, (state, u) = cast(Model, journey.plan.model), at
         still, rates = np.zeros((2, model.n))
         M, C, K = (sp.csr_matrix(-model.slope(state, state.v, still, seeds, u)) for seeds in _SEEDS)
         heavy = np.flatnonzero(M.diagonal() > model.dust)
         with suppress(SingularMatrixError):
             rates[heavy] = factorise(M[heavy][:, heavy])(force[heavy])
         mass = np.where(M.diagonal() > model.dust, M.diagonal(), np.inf)
-        return cls(model, state, moves, rates, mass, M, C, K, law, since)
+        return cls(model, journey.plan.feed, state, moves, rates, mass, M, C, K, since)
 
     def swings(self, output: Fast) -> list[Swing]:
         """What becomes of an output: the most that one line or motor makes of it, and what modes make of a speed."""
@@ -124,11 +122,28 @@ class Shock:
 
         def seen(part: _Vibration) -> Swing:
             size = np.hypot(by_place @ part.rates / part.frequency, by_rate @ part.rates)
-            return Swing(float(size), part.frequency, part.decay)
+            return Swing(float(size), part.frequency, part.rates)
 
         speed = isinstance(output, Velocity | AngularVelocity)
         alone = [seen(part) for part in self._vibrations if speed or part.part == _source(output)]
-        return [max(alone, default=_NONE), *map(seen, self._modes if speed else ())]
+        return [*sorted(alone, key=lambda swing: swing.size)[-1:], *map(seen, self._modes if speed else ())]
+
+    def decay(self, swing: Swing) -> float:
+        """Return the rate at which damping, and a continuous law, have it ring out [1/s]; 0 where they drive it."""
+        rates = swing.rates
+        moved = 2.0 * float(rates @ (self.inertia @ rates))
+        return max(float(rates @ (self.damping @ rates - self._answer(rates))) / moved, 0.0) if moved > 0.0 else 0.0
+
+    def _answer(self, rates: np.ndarray) -> np.ndarray:
+        """By how much the forces of a continuous law without states of its own change with rates; elsewhere nothing."""
+        model, feed, state, still = self.model, self.feed, self.state, np.zeros(self.model.n)
+        if feed.controller is None or not feed.continuous or (x := feed.controller.initial()).size:
+            return still
+        little = _LITTLE / max(float(np.abs(rates).max()), _LITTLE)
+        with suppress(ControllerError, ArithmeticError, ValueError):
+            before, after = (feed.evaluate(s, x).u for s in (state, state.with_(v=state.v + little * rates)))
+            return (model.loads(state, after) - model.loads(state, before)) / little
+        return still
 
     @cached_property
     def _sights(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
@@ -148,12 +163,13 @@ class Shock:
     @cached_property
     def _modes(self) -> tuple[_Vibration, ...]:
         """Modes of the machine as it stands, with what the shock makes of each; none of a machine of many freedoms."""
-        heavy = np.isfinite(self.mass)
-        if not 0 < np.count_nonzero(heavy) <= _FEW:
+        heavy, n = np.isfinite(self.mass), self.model.n
+        if not (0 < np.count_nonzero(heavy) <= _FEW and (self.rates.any() or self.moves.any())):
             return ()
-        M, K = self.inertia[heavy][:, heavy].toarray(), _condensed(self.stiffness.toarray(), heavy)
-        with suppress(np.linalg.LinAlgError):
-            squares, shapes = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
+        M, K, none = self.inertia.toarray(), self.stiffness.toarray(), np.zeros((0, n))
+        with suppress(np.linalg.LinAlgError, ValueError):
+            own = without_light(M, np.zeros((n, n)), K, none.T, (none, none), heavy, 1.0)
+            squares, shapes = eigh(0.5 * (own.K + own.K.T), 0.5 * (own.M + own.M.T))
             fast = np.flatnonzero(squares > _ROUND_OFF * squares[-1])
             return tuple(self._mode(heavy, shapes[:, i], np.sqrt(squares[i])) for i in fast)
         return ()
@@ -163,7 +179,7 @@ class Shock:
         speed = np.hypot(share @ self.rates[heavy] / frequency, share @ self.moves[heavy])
         along = np.zeros(self.model.n)
         along[heavy] = shape
-        return _Vibration("", speed * along, float(frequency), self._slowed(along))
+        return _Vibration("", speed * along, float(frequency))
 
     def _lines(self) -> Iterator[_Vibration]:
         """About where forces balance: they part by s̈/ω² and by ṡ/ω."""
@@ -172,7 +188,7 @@ class Shock:
             parted = float(arm @ along)
             if frequency and parted and along @ (self.stiffness @ along) > 0.0:  # it is taut
                 speed = np.hypot(arm @ self.rates / frequency, arm @ self.moves)
-                yield _Vibration(name, speed / parted * along, frequency, self._decay(along))
+                yield _Vibration(name, speed / parted * along, frequency)
 
     def _motors(self) -> Iterator[_Vibration]:
         motion, square = self.model.motion, np.maximum(self.stiffness.diagonal(), 0.0) / self.mass
@@ -182,26 +198,7 @@ class Shock:
             along = np.zeros(self.model.n)
             along[own] = 1.0
             frequency = float(np.sqrt(square[own]))
-            yield _Vibration(drive.name, abs(float(self.rates[own])) / frequency * along, frequency, self._decay(along))
-
-    def _decay(self, along: np.ndarray) -> float:
-        """The rate at which a vibration along some freedoms rings out, masses beside the diagonal left out [1/s]."""
-        heavy = np.isfinite(self.mass)
-        moved = float(along[heavy] ** 2 @ self.mass[heavy])
-        return self._slowed(along) / moved if moved > 0.0 else 0.0
-
-    def _slowed(self, along: np.ndarray) -> float:
-        """Half the power that damping and a continuous law take at some rates; 0 where they give any."""
-        return max(0.5 * float(along @ (self.damping @ along - self.law(self.state, along))), 0.0)
-
-
-def _condensed(K: np.ndarray, heavy: np.ndarray) -> np.ndarray:
-    """Return a stiffness of what has mass, all else where it balances, shape (heavy, heavy)."""
-    light = ~heavy
-    if not light.any():
-        return K
-    follows = np.linalg.lstsq(K[np.ix_(light, light)], K[np.ix_(light, heavy)], rcond=None)[0]
-    return np.asarray(K[np.ix_(heavy, heavy)] - K[np.ix_(heavy, light)] @ follows)
+            yield _Vibration(drive.name, abs(float(self.rates[own])) / frequency * along, frequency)
 
 
 def _source(output: Fast) -> str:
@@ -225,8 +222,7 @@ def shocks(run: Run, journey: Journey, model: Model) -> Iterator[Shock]:
     """
     state, u = journey.origin.state, journey.origin.u
     force = model.balance(state, state.v, np.zeros(model.n)) + model.loads(state, u)
-    law = partial(_answered, model, journey.plan.feed)
-    yield Shock.of(_At(model, state, u, law), force, state.v, "the start")
+    yield Shock.of(journey, (state, u), force, state.v, "the start")
     largest: dict[int, _Jump] = {}
     for jump in _jumps(run, journey):
         for i, leap in enumerate(np.abs(jump.after - jump.before).tolist()):
@@ -234,19 +230,8 @@ def shocks(run: Run, journey: Journey, model: Model) -> Iterator[Shock]:
                 largest[i] = jump
     for jump in {id(found): found for found in largest.values()}.values():
         force = model.loads(jump.state, jump.after) - model.loads(jump.state, jump.before)
-        at = _At(model, jump.state, jump.after, law)
-        yield Shock.of(at, force, np.zeros(model.n), f"t = {jump.state.t:.3g} s")
-
-
-def _answered(model: Model, feed: Feed, state: State, rates: np.ndarray) -> np.ndarray:
-    """By how much the forces of a continuous law without states of its own change with rates; elsewhere nothing."""
-    if feed.controller is None or not feed.continuous or (x := feed.controller.initial()).size:
-        return np.zeros(model.n)
-    little = _LITTLE / max(float(np.abs(rates).max()), _LITTLE)
-    with suppress(ControllerError, ArithmeticError, ValueError):
-        before, after = (feed.evaluate(s, x).u for s in (state, state.with_(v=state.v + little * rates)))
-        return (model.loads(state, after) - model.loads(state, before)) / little
-    return np.zeros(model.n)
+        still = np.zeros(model.n)
+        yield Shock.of(journey, (jump.state, jump.after), force, still, f"t = {jump.state.t:.3g} s")
 
 
 class _Jump(NamedTuple):
