@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.model.laws.sheaves import closest
 
 METHODS = (
     fc.AdaptiveAlpha(),
@@ -80,3 +81,26 @@ def test_nothing_is_hauled_through_the_sheave(EA, torque, method):
     assert run["speed"][-1] == pytest.approx((100.0 * torque - 9.81) ** 0.5 * (2.0 - shortest) ** 0.5, rel=0.02)
     assert run["pull"].max() < 1e3
     assert run.report.energy_residual < 1e-3
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-3, 0.02])
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
+def test_what_flies_by_on_a_slack_rope_goes_on(method, beside):
+    """z = z₀ + v t − ½ g t² until the rope is taut again: it stops only where it meets the sheave."""
+    model = hoist(stretches=True)
+    rest = model.rest
+    start = model.advance(rest, np.array([beside, 0.0, 4.0, 0.0]), np.array([0.0, 0.0, 20.0, 0.0]), rest.t)
+    run = fc.simulate(model, until=0.1, start=start, method=method)
+    assert (run.status is fc.Status.STOPPED) == (beside == 0.0), run.report.message
+    np.testing.assert_allclose(run["z"], 4.0 + 20.0 * run.t - 0.5 * 9.81 * run.t**2, atol=1e-4)
+
+
+def test_the_nearest_point_of_a_way_is_that_of_its_samples():
+    rng, s = np.random.default_rng(1), np.linspace(0.0, 1.0, 20001)[:, None]
+    for _ in range(50):
+        was, leaving, now, arriving = rng.normal(size=(4, 3))
+        way = (1 + 2 * s) * (1 - s) ** 2 * was + s * (1 - s) ** 2 * leaving
+        way = way + s**2 * (3 - 2 * s) * now + s**2 * (s - 1) * arriving
+        least = np.linalg.norm(way, axis=1).min()
+        assert closest(was, leaving, now, arriving) == pytest.approx(least, rel=1e-6, abs=1e-7)
+    assert closest(-was, 2 * was, was, 2 * was) <= 1e-12

@@ -16,6 +16,7 @@ from flexctrl.effects.backlash import gaps_of
 from flexctrl.frozen import frozen
 from flexctrl.mechanics.pieces import SLIGHT
 from flexctrl.model.laws.loose_kinds import loose_names
+from flexctrl.model.laws.sheaves import closest
 from flexctrl.model.state import State
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope, Spring
@@ -279,7 +280,7 @@ class Kinks:
         """
         motion, (ends, lengths), (drives, rows) = self.model.motion, self.lines, self.shafts
         arms, angles = state.x[ends[:, 1]] - state.x[ends[:, 0]], np.append(state.q, 0.0)[motion.sources]
-        strains = self._through(self._distances(arms), arms, before) - lengths
+        strains = self._through(self._distances(arms), arms, state, before) - lengths
         if self.wound[1].any():
             strains -= self.wound[1] * angles[self.wound[0]]
         own = angles[drives]
@@ -298,17 +299,35 @@ class Kinks:
         ends = self.lines[0][len(self._lines) - self.sheaves :]
         return state.x[ends[:, 1]] - state.x[ends[:, 0]]
 
-    def _through(self, distances: np.ndarray, arms: np.ndarray, before: State) -> np.ndarray:
-        """Turn the sign of distances to sheaves where the straight way from before leads right through them."""
+    def _through(self, distances: np.ndarray, arms: np.ndarray, state: State, before: State) -> np.ndarray:
+        """Turn the sign of distances to sheaves where the way from before leads right through them.
+
+        A rope that stretches and is slack lets what hangs on it pass beside the sheave, however near.
+        """
         first = len(arms) - self.sheaves
         now, was = arms[first:], self.sheaved(before)
-        away = np.einsum("ij,ij->i", now, was) < 0.0
-        if not away.any():
+        away = np.flatnonzero(np.einsum("ij,ij->i", now, was) < 0.0)
+        if not away.size:
             return distances
-        apart = np.linalg.norm(np.cross(was, now), axis=1) / np.maximum(np.linalg.norm(now - was, axis=1), _TINY)
-        nearest = np.minimum(np.linalg.norm(was, axis=1), distances[first:])
-        signs = np.where(away & (apart < _BESIDE * nearest + self.lines[1][first:]), -1.0, 1.0)
+        leaving, arriving = ((state.t - before.t) * self._parting(s) for s in (before, state))
+        signs = np.ones(len(now))
+        for i in away.tolist():
+            rigid = 0.0 if self._stretching[i] else min(np.linalg.norm(was[i]), distances[first + i])
+            near = closest(was[i], leaving[i], now[i], arriving[i])
+            signs[i] = -1.0 if near < _BESIDE * rigid + self.lines[1][first + i] else 1.0
         return np.append(distances[:first], signs * distances[first:])
+
+    def _parting(self, state: State) -> np.ndarray:
+        """Return the rates of the arms from sheaves to what hangs on them, shape (sheaves, 3) [m/s]."""
+        count = len(self.model.structure.nodes)
+        speeds = self.model.rates(state)[: 6 * count].reshape(count, 6)[:, :3]
+        ends = self.lines[0][len(self._lines) - self.sheaves :]
+        return np.asarray(speeds[ends[:, 1]] - speeds[ends[:, 0]])
+
+    @cached_property
+    def _stretching(self) -> tuple[bool, ...]:
+        """Whether the rope of each winch stretches."""
+        return tuple(self.model.bends(d) for d in self.model.structure.drives if isinstance(d, Winch))
 
     def standing(self, state: State, free: np.ndarray) -> tuple[str, ...]:
         """Say in words which parts stand exactly on a corner that a motion of the free coordinates would leave.
