@@ -49,7 +49,7 @@ def ringing(run: Run, journey: Journey) -> Run:
     5 % of what the output gets to, and steps turn it by more than a radian while it rings, its peaks are a matter of
     chance, but for the first, which short first steps may see; where the two runs of `Richardson` part by a third of a
     radian in it, they are too large. What turns by less than a radian, steps may damp away or have lag, if nothing else
-    ends it before. Where dry contacts may hold, this tells nothing.
+    ends it before. What sticks is held, and rubs where it slides to and fro.
 
     Parameters
     ----------
@@ -62,16 +62,16 @@ def ringing(run: Run, journey: Journey) -> Run:
     Run
     """
     model = journey.plan.model
-    if not (isinstance(model, Model) and len(run.y)) or model.switches.names:
+    if not (isinstance(model, Model) and len(run.y)):
         return run
     asked = [o for o in model.structure.outputs if isinstance(o, Fast)]
     asked = [o for o in asked if o.name not in run.report.output_errors]
-    notes = tuple(_notes(run, journey, model, asked)) if asked else ()
+    notes = tuple(_notes(run, journey, asked)) if asked else ()
     return replace(run, report=replace(run.report, notes=(*run.report.notes, *notes))) if notes else run
 
 
-def _notes(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iterator[str]:
-    told, found = max(run.report.error, *run.report.output_errors.values(), 0.0), list(shocks(run, journey, model))
+def _notes(run: Run, journey: Journey, asked: list[Fast]) -> Iterator[str]:
+    told, found = max(run.report.error, *run.report.output_errors.values(), 0.0), list(shocks(run, journey))
     for output in asked:
         values = run[output.name]
         way, most = float(np.ptp(values)), float(np.abs(values).max())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, cast
 
@@ -11,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
 
+from flexctrl.dynamics.notes.contacts import Contacts
 from flexctrl.dynamics.notes.heavy import without_light
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.swift.lengths import lengthening
@@ -32,6 +34,7 @@ _SEEDS = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
 _ROUND_OFF, _LITTLE = 1e-12, 1e-6
+_LOOKED_AT = 0.1, 0.3, 0.6, 0.9
 _MOST, _BESIDE = 16, 1e-9
 """Breaks of a law that are looked at, and how far on either side, in parts of the run."""
 
@@ -79,9 +82,8 @@ class Shock:
 
     Attributes
     ----------
-    model : Model
     feed : Feed
-    state : State
+    contacts : Contacts
     moves, rates : numpy.ndarray, shape (n,)
         Rates that it begins with, and accelerations by them; 0 of what has no mass.
     mass : numpy.ndarray, shape (n,)
@@ -91,9 +93,8 @@ class Shock:
         When, in words.
     """
 
-    model: Model
     feed: Feed
-    state: State
+    contacts: Contacts
     moves: np.ndarray
     rates: np.ndarray
     mass: np.ndarray
@@ -103,18 +104,31 @@ class Shock:
     since: str
 
     @classmethod
-    def of(
-        cls, journey: Journey, at: tuple[State, np.ndarray], force: np.ndarray, moves: np.ndarray, since: str
-    ) -> Shock:
-        """Return what forces do that are put on at once in a state under inputs, of a machine that rates move, too."""
-        model, (state, u) = cast(Model, journey.plan.model), at
+    def of(cls, run: Run, journey: Journey, at: State, inputs: Sequence[np.ndarray], since: str) -> Shock:
+        """Return what inputs do to a machine, or what they do once they are others."""
+        model, feed, u, jumps = cast(Model, journey.plan.model), journey.plan.feed, inputs[-1], len(inputs) > 1
+        state = model.switches.under(at, u) if jumps else model.switches.begin(at, u)
+        contacts = Contacts.of(model, state, _later(run, state.t))
         still, rates = np.zeros((2, model.n))
-        M, C, K = (sp.csr_matrix(-model.slope(state, state.v, still, seeds, u)) for seeds in _SEEDS)
+        M, C, K = (sp.csr_matrix(-model.slope(contacts.loose, state.v, still, seeds, u)) for seeds in _SEEDS)
         heavy = np.flatnonzero(M.diagonal() > model.dust)
         with suppress(SingularMatrixError):
-            rates[heavy] = factorise(M[heavy][:, heavy])(force[heavy])
+            if model.switches.names:
+                held = replace(contacts, state=at)
+                rates = contacts.accelerations(u) - (held.accelerations(inputs[0]) if jumps else 0.0)
+            else:
+                before = -model.loads(state, inputs[0]) if jumps else model.balance(state, state.v, still)
+                rates[heavy] = factorise(M[heavy][:, heavy])((before + model.loads(state, u))[heavy])
         mass = np.where(M.diagonal() > model.dust, M.diagonal(), np.inf)
-        return cls(model, journey.plan.feed, state, moves, rates, mass, M, C, K, since)
+        return cls(feed, contacts, still if jumps else state.v, rates, mass, M, C, K, since)
+
+    @property
+    def model(self) -> Model:
+        return self.contacts.model
+
+    @property
+    def state(self) -> State:
+        return self.contacts.state
 
     def swings(self, output: Fast) -> list[Swing]:
         """What becomes of an output: the most that one line or motor makes of it, and what modes make of a speed."""
@@ -129,10 +143,11 @@ class Shock:
         return [*sorted(alone, key=lambda swing: swing.size)[-1:], *map(seen, self._modes if speed else ())]
 
     def decay(self, swing: Swing) -> float:
-        """Return the rate at which damping, and a continuous law, have it ring out [1/s]; 0 where they drive it."""
+        """Return the rate at which damping, friction, a law in time have it ring out [1/s]; 0 where they drive it."""
         rates = swing.rates
-        moved = 2.0 * float(rates @ (self.inertia @ rates))
-        return max(float(rates @ (self.damping @ rates - self._answer(rates))) / moved, 0.0) if moved > 0.0 else 0.0
+        moved = float(rates @ (self.inertia @ rates))
+        lost = 0.5 * float(rates @ (self.damping @ rates - self._answer(rates))) + self.contacts.rubbed(rates)
+        return max(lost / moved, 0.0) if moved > 0.0 else 0.0
 
     def _answer(self, rates: np.ndarray) -> np.ndarray:
         """By how much the forces of a continuous law without states of its own change with rates; elsewhere nothing."""
@@ -169,7 +184,9 @@ class Shock:
         M, K, none = self.inertia.toarray(), self.stiffness.toarray(), np.zeros((0, n))
         with suppress(np.linalg.LinAlgError, ValueError):
             own = without_light(M, np.zeros((n, n)), K, none.T, (none, none), heavy, 1.0)
-            squares, shapes = eigh(0.5 * (own.K + own.K.T), 0.5 * (own.M + own.M.T))
+            free = self.contacts.free(heavy)
+            squares, shapes = eigh(*(0.5 * free.T @ (A + A.T) @ free for A in (own.K, own.M)))
+            shapes = free @ shapes
             fast = np.flatnonzero(squares > _ROUND_OFF * squares[-1])
             return tuple(self._mode(heavy, shapes[:, i], np.sqrt(squares[i])) for i in fast)
         return ()
@@ -184,9 +201,11 @@ class Shock:
     def _lines(self) -> Iterator[_Vibration]:
         """About where forces balance: they part by s̈/ω² and by ṡ/ω."""
         for name, arm, frequency in lengthening(self.model, self.state):
-            along = arm / self.mass
+            free = arm / self.mass
+            along = self.contacts.still(free)
             parted = float(arm @ along)
-            if frequency and parted and along @ (self.stiffness @ along) > 0.0:  # it is taut
+            if frequency and parted > 0.0 and along @ (self.stiffness @ along) > 0.0:  # it is taut
+                frequency *= np.sqrt(parted / (arm @ free))
                 speed = np.hypot(arm @ self.rates / frequency, arm @ self.moves)
                 yield _Vibration(name, speed / parted * along, frequency)
 
@@ -197,7 +216,7 @@ class Shock:
                 continue
             along = np.zeros(self.model.n)
             along[own] = 1.0
-            frequency = float(np.sqrt(square[own]))
+            along, frequency = self.contacts.still(along), float(np.sqrt(square[own]))
             yield _Vibration(drive.name, abs(float(self.rates[own])) / frequency * along, frequency)
 
 
@@ -206,7 +225,7 @@ def _source(output: Fast) -> str:
     return output.line if isinstance(output, Tension) else output.drive if isinstance(output, DriveSpeed) else ""
 
 
-def shocks(run: Run, journey: Journey, model: Model) -> Iterator[Shock]:
+def shocks(run: Run, journey: Journey) -> Iterator[Shock]:
     """Return what sets a machine vibrating: what is out of balance where it begins, and the largest jump of each input.
 
     Parameters
@@ -214,24 +233,26 @@ def shocks(run: Run, journey: Journey, model: Model) -> Iterator[Shock]:
     run : Run
     journey : Journey
         How it went.
-    model : Model
 
     Returns
     -------
     iterator of Shock
     """
-    state, u = journey.origin.state, journey.origin.u
-    force = model.balance(state, state.v, np.zeros(model.n)) + model.loads(state, u)
-    yield Shock.of(journey, (state, u), force, state.v, "the start")
+    yield Shock.of(run, journey, journey.origin.state, [journey.origin.u], "the start")
     largest: dict[int, _Jump] = {}
     for jump in _jumps(run, journey):
         for i, leap in enumerate(np.abs(jump.after - jump.before).tolist()):
             if leap > (largest[i].size(i) if i in largest else 0.0):
                 largest[i] = jump
     for jump in {id(found): found for found in largest.values()}.values():
-        force = model.loads(jump.state, jump.after) - model.loads(jump.state, jump.before)
-        still = np.zeros(model.n)
-        yield Shock.of(journey, (jump.state, jump.after), force, still, f"t = {jump.state.t:.3g} s")
+        yield Shock.of(run, journey, jump.state, [jump.before, jump.after], f"t = {jump.state.t:.3g} s")
+
+
+def _later(run: Run, since: float) -> Iterator[State]:
+    """Return states of a run later than a time, as far as there is a track."""
+    track, left = run.track, run.final.t - since
+    if track.stretches and track.starts[0] <= since and left > 0.0:
+        yield from (track.state(since + share * left)[0] for share in _LOOKED_AT)
 
 
 class _Jump(NamedTuple):

@@ -228,6 +228,20 @@ class Switches:
         """Return the forces that hold what sticks, and the accelerations of what has mass."""
         return self._once("holding", state, u.tobytes(), lambda: self._held_by(state, u))
 
+    def accelerations(self, state: State, u: np.ndarray) -> np.ndarray:
+        """Return the accelerations of what has mass, with what sticks held.
+
+        Parameters
+        ----------
+        state : State
+        u : numpy.ndarray, shape (inputs,)
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        return self._holding(state, u)[1]
+
     def _held_by(self, state: State, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         model, a = self.model, np.zeros(self.model.n)
         stuck = self.phases(state) == STUCK
