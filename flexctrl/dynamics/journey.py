@@ -114,7 +114,7 @@ class Journey:
     balked : bool
         Whether many steps at once have just ended before one that is to be taken by itself.
     crumbled : int
-        How many steps of one length in a row have fallen apart into many pieces.
+        Into how many pieces steps of one length have fallen apart, one after the other.
     horizon : float
         Until when the law is known to follow a line, with what it reads held [s]; infinity if nothing is in sight.
     seen : tuple of int and float

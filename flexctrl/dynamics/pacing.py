@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["controlled", "fixed"]
 
 _NEAR = 1e-9
-_HALVED, _CRUMBLED = 128, 2
-"""Where steps under a continuous law fall apart into more pieces, after so many in a row, it chatters."""
+_HALVED, _PIECES, _CRUMBLED = 32, 64, 256
+"""Where a step under a continuous law falls apart into more pieces, and those before it, which did too, have into so
+many in all, it chatters; of each no more count than can be of a layer at a start.
+"""
 _CAPS, _SHORTER = 2.0, 0.25
 """Steps in which a law is hit are no longer than that many that follow the impact; longer ones are cut to a share."""
 
@@ -34,7 +36,7 @@ def fixed(journey: Journey, stop: float, until: float) -> None:
         count = max(1, math.ceil((stop - t) / length - 1e-6)) if math.isfinite(stop) else 0
         mark.size, mark.left = (stop - t) / count if count else length, count or -1
     before = mark.rejected
-    most = before + _HALVED if journey.plan.feed.reacting and journey.crumbled >= _CRUMBLED else math.inf
+    most = before + _HALVED if journey.plan.feed.reacting and journey.crumbled > _CRUMBLED else math.inf
     room = math.floor((until - t) / mark.size + _NEAR)
     if not room:
         if not ends_before(journey, stop):
@@ -42,7 +44,8 @@ def fixed(journey: Journey, stop: float, until: float) -> None:
         return
     lengthen(journey, mark.size)
     _take(journey, mark.size, stop, most)
-    journey.crumbled = journey.crumbled + 1 if mark.rejected - before > _HALVED else 0
+    pieces = mark.rejected - before
+    journey.crumbled = journey.crumbled + min(pieces, _PIECES) if pieces > _HALVED else 0
     if mark.left > 0:
         mark.left -= 1
 
