@@ -11,11 +11,12 @@ from dataclasses import replace
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from flexctrl.dynamics.checking import Beginning, Other, made, news
+from flexctrl.dynamics.checking import news
 from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.beside import PARTED, agreeing
 from flexctrl.dynamics.notes.outputs import seen
+from flexctrl.dynamics.others import Beginning, Other, made
 from flexctrl.dynamics.run import Run
 from flexctrl.effects.coulomb_friction import Coulomb, CoulombFriction
 from flexctrl.effects.effect import Effect

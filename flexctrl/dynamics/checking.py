@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import time
 from dataclasses import replace
 
-import numpy as np
-
-from flexctrl.design.controller import Controller
-from flexctrl.dynamics.checkpoint import Checkpoint, machine_of
-from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
-from flexctrl.dynamics.notes.gap import Gap, between
 from flexctrl.dynamics.notes.peaks import peaked
-from flexctrl.dynamics.records.record import InMemory
-from flexctrl.dynamics.run import Run, Status, Tolerance
-from flexctrl.dynamics.setting_out import travelled
+from flexctrl.dynamics.notes.rates import rated
+from flexctrl.dynamics.others import UNCHECKED, Beginning, Other, made, noted, standing
+from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Fixed
-from flexctrl.errors import FlexctrlError
-from flexctrl.frozen import frozen
-from flexctrl.model.equilibrium import Rest
-from flexctrl.model.state import State
 
-__all__ = ["Beginning", "Other", "laid_beside", "made", "news"]
+__all__ = ["laid_beside", "news"]
 
-_LONGER, _SECONDS = 2.0, 0.2
 _NEARER, _LITTLE = 0.5, 0.01
 _FARTHER = 5.0 / 3.0
 """How far the last one is, in powers: 243 times the tolerance."""
@@ -36,85 +23,6 @@ _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
 _NEARLY = 0.001
 """A thirtieth of what is noted: coarser runs have told of rattling too little by seven times."""
-_UNCHECKED = "how far small differences have grown is not told by another run"
-
-
-@frozen
-class Beginning:
-    """Where a run begins, for others to begin there too.
-
-    Attributes
-    ----------
-    start : State, Rest, Checkpoint or None
-    spacing : float or None
-        Of rows [s].
-    feed : Feed
-    spare : Controller or None
-        As it was before the run, as a law in Python may remember what it is asked; None where it cannot be copied.
-    """
-
-    start: State | Rest | Checkpoint | None
-    spacing: float | None
-    feed: Feed
-    spare: Controller | None
-
-    @staticmethod
-    def of(start: State | Rest | Checkpoint | None, spacing: float | None, feed: Feed) -> Beginning:
-        """Return where a run is about to begin.
-
-        Parameters
-        ----------
-        start : State, Rest, Checkpoint or None
-        spacing : float or None
-        feed : Feed
-
-        Returns
-        -------
-        Beginning
-        """
-        return Beginning(start, spacing, feed, None if feed.continuous else _copied(feed.controller))
-
-    @property
-    def again(self) -> Feed | None:
-        """What feeds another run; None where a law's memory is not what it was."""
-        if self.feed.controller is None or self.feed.continuous or self.feed.lowered is not None:
-            return replace(self.feed, met=[])
-        law = _copied(self.spare)
-        return None if law is None else replace(self.feed, controller=law, met=[])
-
-    def beside(self, other: Beside) -> State | Rest | Checkpoint | None:
-        """Return where another run is to begin: where it stood when the run was cut, or where the whole began."""
-        if not isinstance(self.start, Checkpoint):
-            return self.start
-        kind = repr(other.method), other.tolerance, machine_of(self.feed.model)
-        stood = (saved for saved in self.start.origin.others if _kind(saved) == kind)
-        return next(stood, self.start.origin.state)
-
-    @property
-    def t(self) -> float:
-        """When the run goes on [s]."""
-        return _time(self.start)
-
-    @property
-    def steps(self) -> int:
-        """Taken before."""
-        return self.start.mark.steps if isinstance(self.start, Checkpoint) else 0
-
-
-def _time(start: State | Rest | Checkpoint | None) -> float:
-    return start.t if isinstance(start, Checkpoint) else 0.0
-
-
-def _kind(saved: Checkpoint) -> tuple[str, Tolerance, str]:
-    """What run stands there: how it is made, and of which machine."""
-    return saved.method, saved.tolerance, saved.machine
-
-
-def _copied(law: Controller | None) -> Controller | None:
-    try:
-        return copy.deepcopy(law)
-    except Exception:  # whatever a law of one's own is made of
-        return None
 
 
 def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> Run:
@@ -137,71 +45,68 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     -------
     Run
     """
+    told, others = _by_all(run, journey, method, beginning, shorter)
+    return rated(told, [(other.run, other.beside.longer) for other in others], journey)
+
+
+_Known = tuple[Run, tuple[Other, ...]]
+"""A run with what is told of it, and by which others."""
+
+
+def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> _Known:
     tolerance = journey.plan.tolerance
     if shorter < 1.0:
-        return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)[0]
+        return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)
     coarser = method.coarser(tolerance)
-    told, other = _told(run, journey, coarser, beginning)
-    if other is None or other.run.status is Status.INTERRUPTED:
-        return told
+    told, first = _told(run, journey, coarser, beginning)
+    if not first or first[0].run.status is Status.INTERRUPTED:
+        return told, ()
+    other, nearer = first[0], first[1:]
     nearby = method.coarser(tolerance, _NEARER)
     quiet = told.report.error < _LITTLE and not news(told, run)
     parted = not quiet and told.report.error > PARTED
     if not quiet:
-        told = _nearer(run, told, other, journey, nearby, beginning)
+        told, nearer = _nearer(run, told, other, journey, nearby, beginning)
     if told.report.error > TOLD:
-        return told
+        return told, (other, *nearer)
     if parted:
-        return elsewhere(told, other.gap, journey, coarser.said)
+        return elsewhere(told, other.gap, journey, coarser.said), (other, *nearer)
     if isinstance(method.pace, Fixed):
-        return told
+        return told, (other, *nearer)
     farther = method.coarser(tolerance, _FARTHER)
-    standing, third = made(told, journey, farther, beginning)
+    kept, third = made(told, journey, farther, beginning)
     if third is None:
-        return told
+        return told, (other, *nearer)
     if quiet:
-        standing = _grown(run, standing, other, third, journey, nearby, beginning)
-    if standing.report.error > TOLD:
-        return standing
+        kept, nearer = _grown(run, kept, other, third, journey, nearby, beginning)
+    others = (other, third, *nearer)
+    if kept.report.error > TOLD:
+        return kept, others
     grown = (farther.longer**run.report.order - 1.0) / (coarser.longer**run.report.order - 1.0)
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
     if astray:
-        return elsewhere(standing, third.gap, journey, farther.said)
-    return _confirmed(run, standing, journey, method, beginning) if rattles(journey) else standing
+        return elsewhere(kept, third.gap, journey, farther.said), others
+    if not rattles(journey):
+        return kept, others
+    confirmed, finer = _confirmed(run, kept, journey, method, beginning)
+    return confirmed, (*others, *finer)
 
 
-def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning) -> Run:
+def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
     """The run with what a finer one tells of it, if that is more.
 
     Where corners come one after another errors go by no power of the steps: what coarser runs make of them may well be
     too little, if it is not far less than what would be noted.
     """
     if news(told, run) or max(told.report.error, *told.report.output_errors.values(), 0.0) < _NEARLY:
-        return told
+        return told, ()
     again = replace(run, checkpoint=told.checkpoint)
-    finer = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, 0.5), beginning)[0]
+    finer, others = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, 0.5), beginning)
     if finer.report.error > told.report.error:
-        return _as_much(finer, told)
+        return _as_much(finer, told), others
     notes = (*told.report.notes, *(note for note in finer.report.notes if note not in run.report.notes))
-    return _as_much(replace(told, checkpoint=finer.checkpoint, report=replace(told.report, notes=notes)), finer)
-
-
-@frozen
-class Other:
-    """A run beside another one.
-
-    Attributes
-    ----------
-    run : Run
-    gap : Gap
-        How far it is from the first: nothing where it has ended at once.
-    beside : Beside
-        How it was made.
-    """
-
-    run: Run
-    gap: Gap
-    beside: Beside
+    known = replace(told, checkpoint=finer.checkpoint, report=replace(told.report, notes=notes))
+    return _as_much(known, finer), others
 
 
 def _order(near: Other, far: Other, most: float) -> float:
@@ -227,14 +132,14 @@ def _order(near: Other, far: Other, most: float) -> float:
 
 def _grown(
     run: Run, told: Run, other: Other, far: Other, journey: Journey, nearby: Beside, beginning: Beginning
-) -> Run:
+) -> _Known:
     """The run with what is told of it where errors grow as they do from the one to the other run beside."""
     order = _order(other, far, run.report.order)
     if order == run.report.order:
-        return told
+        return told, ()
     known = _said(replace(run, checkpoint=told.checkpoint), other, journey, beginning, order)
     much = known.report.error > TOLD or news(known, run)
-    return _nearer(run, known, other, journey, nearby, beginning) if much else known
+    return _nearer(run, known, other, journey, nearby, beginning) if much else (known, ())
 
 
 def news(told: Run, run: Run) -> bool:
@@ -254,18 +159,19 @@ def news(told: Run, run: Run) -> bool:
     return not set(told.report.notes) <= set(run.report.notes)
 
 
-def _nearer(run: Run, told: Run, other: Other, journey: Journey, nearby: Beside, beginning: Beginning) -> Run:
+def _nearer(run: Run, told: Run, other: Other, journey: Journey, nearby: Beside, beginning: Beginning) -> _Known:
     """What a second one tells, unless it ended before the first."""
-    standing, second = made(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning)
+    kept, second = made(replace(run, checkpoint=told.checkpoint), journey, nearby, beginning)
     if second is None:
-        return told
+        return told, ()
     if _reached(second.run) < _reached(other.run):
-        return _standing(told, second.run.checkpoint)
+        return standing(told, second.run.checkpoint), ()
     order, parted = run.report.order, told.report.error > PARTED
     feared = told.report.error / (other.beside.longer**order - 1.0) if parted else 0.0
     seen = order if parted else _order(second, other, order)
-    nearer = _said(standing, second, journey, beginning, seen, feared)
-    return _as_much(nearer, told) if nearer.report.error == told.report.error == run.report.drift else nearer
+    nearer = _said(kept, second, journey, beginning, seen, feared)
+    alike = nearer.report.error == told.report.error == run.report.drift
+    return _as_much(nearer, told) if alike else nearer, (second,)
 
 
 def _as_much(run: Run, other: Run) -> Run:
@@ -280,80 +186,17 @@ def _reached(other: Run) -> float:
     return math.inf if other.status is Status.STOPPED else other.final.t
 
 
-def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Other | None]:
-    """The run with what one other tells, and that one; None if there is none."""
-    standing, other = made(run, journey, beside, beginning)
-    return (standing, None) if other is None else (_said(standing, other, journey, beginning, run.report.order), other)
+def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> _Known:
+    """The run with what one other tells, if there is one."""
+    kept, other = made(run, journey, beside, beginning)
+    if other is None:
+        return kept, ()
+    return _said(kept, other, journey, beginning, run.report.order), (other,)
 
 
 def _said(run: Run, other: Other, journey: Journey, beginning: Beginning, order: float, feared: float = 0.0) -> Run:
     """The run with what one other tells, if errors are of an order."""
     if other.run.final.t <= beginning.t:
-        return _noted(run, f"{_UNCHECKED}, which ended at t = {other.run.final.t:.3g} s")
+        return noted(run, f"{UNCHECKED}, which ended at t = {other.run.final.t:.3g} s")
     told = told_beside(run, other.run, other.gap, journey, other.beside.longer, order, feared)
     return peaked(told, other.run, journey, other.beside.longer) if other.beside.longer < 1.0 else told
-
-
-def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Other | None]:
-    """Return the run with where one other stands, and that one, ended where it takes far longer.
-
-    Parameters
-    ----------
-    run : Run
-    journey : Journey
-        How it went.
-    beside : Beside
-        How the other is made.
-    beginning : Beginning
-        Where it begins, and of which machine it is.
-
-    Returns
-    -------
-    Run, Other or None
-        None if the other tells nothing; a note says why.
-    """
-    if run.final.t <= beginning.t:
-        return run, None
-    end, feed, start = run.final.t, beginning.again, beginning.beside(beside)
-    if feed is None:
-        return _noted(run, f"{_UNCHECKED}: the controller cannot be copied"), None
-    changed = replace(journey.plan, model=feed.model, feed=feed, method=beside.method, tolerance=beside.tolerance)
-    work = (end - _time(start)) / (end - beginning.t)
-    if not isinstance(start, Checkpoint):  # the whole way, of which this run has gone the last part
-        work = max(work, run.report.steps / max(run.report.steps - beginning.steps, 1))
-    work /= min(beside.longer, 1.0)
-    latest = time.perf_counter() + _LONGER * work * run.report.wall_s + _SECONDS
-
-    def ended(share: float) -> None:
-        if time.perf_counter() > latest:
-            raise KeyboardInterrupt
-
-    spacing = beginning.spacing if len(run.t) > 1 else end  # a run that keeps no rows is compared where it ends
-    if isinstance(start, Checkpoint):
-        spacing = start.every
-    try:
-        unwatched = replace(changed, until=end, tell=ended, autosave=None)
-        _, other = travelled(unwatched, start, (), InMemory(), spacing)
-    except (FlexctrlError, KeyboardInterrupt) as fault:
-        return _noted(run, f"{_UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), None
-    first = journey.origin.u
-    if len(first) and len(other.u) and other.t[0] == 0.0 and not np.array_equal(first, other.u[0]):
-        return _noted(run, f"{_UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
-    standing = _standing(run, other.checkpoint)
-    if other.final.t <= beginning.t:
-        return standing, Other(other, Gap.unseen(run), beside)
-    try:
-        return standing, Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside)
-    except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
-        return _noted(standing, f"{_UNCHECKED}, whose numbers fail ({fault})"), None
-
-
-def _standing(run: Run, other: Checkpoint) -> Run:
-    """The run, with where the other one stands for what goes on from there."""
-    origin = run.checkpoint.origin
-    others = (*(saved for saved in origin.others if _kind(saved) != _kind(other)), other)
-    return replace(run, checkpoint=replace(run.checkpoint, origin=replace(origin, others=others)))
-
-
-def _noted(run: Run, note: str) -> Run:
-    return replace(run, report=replace(run.report, notes=(*run.report.notes, note)))

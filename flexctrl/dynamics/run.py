@@ -135,13 +135,15 @@ class Report:
     drifted : str
         The degree of freedom in which that is most.
     error : float
-        By how much the run is off, over the largest motion, growth of small differences included: by another run laid
-        beside it (`Checked`); ``drift`` where there is none.
+        By how much places and angles of the run are off, over the largest motion, growth of small differences
+        included: by another run laid beside it (`Checked`), which sees what errors of steps add up to, so that it may
+        be less than ``drift``; ``drift`` where there is none.
     output_errors : mapping of str to float
-        By how much places and angles among the outputs may be off, each over the range of its own values (1: all of
-        it): a deflection of millimetres beside a travel of metres. Empty for linear models and streamed rows; those
-        that move by no more than absolute tolerances are left out. Of forces and rates those that get more than 5 %
-        larger or less so in a finer run, where one is made: over their largest value.
+        By how much outputs may be off at an instant, each over the range of its own values (1: all of it): a
+        deflection of millimetres beside a travel of metres. Forces and rates by other runs laid beside, by how they
+        ring after loads that are put on at once, or by how large they get in a finer run (over their largest value),
+        whichever tells more; where none of these is there, nothing is told of them. Empty for linear models and
+        streamed rows; those that move by no more than absolute tolerances are left out.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str

@@ -11,7 +11,7 @@ import numpy as np
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha
 from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
 from flexctrl.dynamics.breakaway import loosened
-from flexctrl.dynamics.checking import Beginning, laid_beside
+from flexctrl.dynamics.checking import laid_beside
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same
 from flexctrl.dynamics.events.event import Event
 from flexctrl.dynamics.feed import feed_of
@@ -21,7 +21,9 @@ from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.notes.answers import answers
 from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
 from flexctrl.dynamics.notes.leaving import leaves
+from flexctrl.dynamics.notes.rates import said_of_rates
 from flexctrl.dynamics.notes.ringing import ringing
+from flexctrl.dynamics.others import Beginning
 from flexctrl.dynamics.records.record import InMemory, Record
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
@@ -150,7 +152,7 @@ def simulate(
             if isinstance(method, Checked) or may_grow(journey, law) or leaves(run, journey, beginning.again):
                 told = laid_beside(run, journey, check, beginning, shorter(journey, law))
                 run = loosened(told, run, journey, beginning)
-        return ringing(run, journey) if check else run
+        return said_of_rates(ringing(run, journey), journey) if check else run
 
 
 def _default(model: Model | LinearModel, step: float) -> Integrator:

@@ -10,7 +10,7 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.design import pd
-from flexctrl.dynamics import checking
+from flexctrl.dynamics import others
 from flexctrl.dynamics import simulate as running
 from flexctrl.errors import SingularMatrixError
 
@@ -144,13 +144,13 @@ def test_a_run_in_many_parts_is_told_as_the_whole(monkeypatch):
     """And the runs beside go on, too: none begins anew."""
     model, start = chain(3, 5.0, 7)
     whole = fc.simulate(model, until=5.0, start=start)
-    travelled, begun = checking.travelled, []
+    travelled, begun = others.travelled, []
 
     def counted(plan, begin, *given):
         begun.append(getattr(begin, "t", 0.0))
         return travelled(plan, begin, *given)
 
-    monkeypatch.setattr(checking, "travelled", counted)
+    monkeypatch.setattr(others, "travelled", counted)
     parts = [fc.simulate(model, until=0.5, start=start)]
     for t in np.arange(1.0, 5.1, 0.5):
         parts.append(fc.simulate(model, until=t, start=parts[-1].checkpoint))
@@ -372,7 +372,7 @@ def test_another_run_whose_numbers_fail_is_told(monkeypatch):
     def fails(*given):
         raise SingularMatrixError(0)
 
-    monkeypatch.setattr(checking, "between", fails)
+    monkeypatch.setattr(others, "between", fails)
     model, start = chain(2, 8.0, 1)
     run = fc.simulate(model, until=2.0, start=start)
     assert run.status is fc.Status.FINISHED
@@ -381,14 +381,14 @@ def test_another_run_whose_numbers_fail_is_told(monkeypatch):
 
 def test_who_ends_the_run_beside_waits_for_no_second(monkeypatch):
     model, start = chain(3, 8.0, 2)
-    travelled, calls = checking.travelled, []
+    travelled, calls = others.travelled, []
 
     def ended(*given):
         journey, run = travelled(*given)
         calls.append(run)
         return journey, replace(run, status=fc.Status.INTERRUPTED)
 
-    monkeypatch.setattr(checking, "travelled", ended)
+    monkeypatch.setattr(others, "travelled", ended)
     run = fc.simulate(model, until=3.0, start=start)
     assert len(calls) == 1
     assert run.report.error != run.report.drift
@@ -408,14 +408,14 @@ def test_a_second_run_has_the_last_word():
     model, start = chain(2, 8.0, 1)
     how = {"until": 5.0, "start": start, "method": fc.GeneralizedAlpha(4e-3)}
     calls: list[float] = []
-    travelled = checking.travelled
+    travelled = others.travelled
 
     def counted(plan, *given):
         calls.append(plan.method.step)
         return travelled(plan, *given)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(checking, "travelled", counted)
+        patch.setattr(others, "travelled", counted)
         run = fc.simulate(model, **how)
     assert calls == pytest.approx([8e-3, 4e-3 * np.sqrt(2.0)])
     assert run.report.error > 0.03
@@ -428,7 +428,7 @@ def test_a_run_is_kept_where_the_one_beside_it_is_ended(monkeypatch):
     def interrupted(*given):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(checking, "travelled", interrupted)
+    monkeypatch.setattr(others, "travelled", interrupted)
     run = fc.simulate(model, until=3.0, start=start)
     assert run.status is fc.Status.FINISHED
     assert np.array_equal(run.y, before.y)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.checking import Other, _order
+from flexctrl.dynamics.checking import _order
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.gap import Gap
+from flexctrl.dynamics.others import Other
 
 
 def section(EI: float, EA: float) -> fc.Section:

@@ -52,7 +52,7 @@ def test_what_they_see_is_right_and_not_told(method):
     run = fc.simulate(model, until=1.0, start=start, method=METHODS[method](1e-4))
     assert run["tension"].max() == pytest.approx(caught(1e6, 0.5), rel=1e-3)
     assert not named(run)
-    assert "tension" not in run.report.output_errors
+    assert run.report.output_errors["tension"] < 5e-3
 
 
 def test_chosen_steps_see_it():

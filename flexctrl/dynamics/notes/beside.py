@@ -292,4 +292,4 @@ def _note(journey: Journey, gap: Gap, error: float, right: float, kind: str) -> 
         remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
         remedy = f"take steps of {finer * pace.step:.1g} s"
-    return f"{said}; right to {TOLD:.0%} until t = {right:.3g} s: {remedy}"
+    return f"{said}; places are right to {TOLD:.0%} until t = {right:.3g} s: {remedy}"

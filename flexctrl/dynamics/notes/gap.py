@@ -17,7 +17,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Gap", "between"]
+__all__ = ["Gap", "between", "interpolated"]
 
 _POINTS, _FEW = 4, 1500
 _INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
@@ -108,7 +108,7 @@ def _of_rows(run: Run, other: Run, journey: Journey) -> Gap:
     yards = output_yardsticks(model, 1.0)[judged]
     rows = np.zeros((0, len(judged)))
     if t.size:
-        rows = other.y[within][:, judged] - _interpolated(run.t, run.y[:, judged], t)
+        rows = other.y[within][:, judged] - interpolated(run.t, run.y[:, judged], t)
     read[judged] = np.abs(rows).max(axis=0, initial=0.0)
     apart, names = np.abs(rows) / np.where(yards > 0.0, yards, np.inf), [model.outputs[i] for i in judged]
     if abs(other.final.t - run.final.t) <= near:
@@ -122,8 +122,20 @@ def _of_rows(run: Run, other: Run, journey: Journey) -> Gap:
     return Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst, read)
 
 
-def _interpolated(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Values at times between rows: the cubic through the four rows around each."""
+def interpolated(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return values at times between rows: those of the cubic through the four rows around each.
+
+    Parameters
+    ----------
+    times : numpy.ndarray, shape (rows,)
+        Four at least.
+    values : numpy.ndarray, shape (rows, count)
+    t : numpy.ndarray, shape (n,)
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, count)
+    """
     first = np.clip(np.searchsorted(times, t) - 2, 0, len(times) - _POINTS)
     at = first[:, None] + np.arange(_POINTS)
     x = times[at]

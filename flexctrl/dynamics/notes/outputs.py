@@ -16,7 +16,7 @@ from flexctrl.structure.outputs import DriveAngle, Position, Rotation, SwayAngle
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["OutputErrors", "by_rows", "by_sums", "placed", "reach", "seen"]
+__all__ = ["OutputErrors", "by_rows", "by_sums", "placed", "reach", "seen", "ways"]
 
 _TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
 _NAMED = 3
@@ -121,12 +121,22 @@ def _seen(journey: Journey, y: np.ndarray, sight: sp.csr_matrix) -> tuple[np.nda
     assert isinstance(model, Model)
     yards = yardsticks(model)
     least = _SEEN * tolerance.absolute * (sight @ np.where(np.isfinite(yards), yards, 0.0))
-    way = _ways(journey, y)
+    way = ways(journey, y)
     return way, [i for i in placed(model) if way[i] > least[i]]
 
 
-def _ways(journey: Journey, y: np.ndarray) -> np.ndarray:
-    """How far outputs go, from where the whole run began."""
+def ways(journey: Journey, y: np.ndarray) -> np.ndarray:
+    """Return how far outputs go, from where the whole run began.
+
+    Parameters
+    ----------
+    journey : Journey
+    y : numpy.ndarray, shape (rows, outputs)
+
+    Returns
+    -------
+    numpy.ndarray, shape (outputs,)
+    """
     return np.ptp(np.vstack([journey.plan.model.measure(journey.origin.state), y]), axis=0)
 
 
@@ -136,7 +146,7 @@ def _notes(journey: Journey, y: np.ndarray, shares: Mapping[str, float], error: 
     if not far:
         return ()
     worst, *others = sorted(far, key=lambda name: -shares[name])
-    way = float(_ways(journey, y)[journey.plan.model.outputs.index(worst)])
+    way = float(ways(journey, y)[journey.plan.model.outputs.index(worst)])
     share, do = shares[worst], remedy(journey, shares[worst])
     note = said.format(name=worst, way=way, far=f"{100.0 * share:.2g} %", steps=journey.mark.steps, remedy=do)
     if not others:

@@ -10,6 +10,8 @@ import numpy as np
 
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.notes.fading import fading
+from flexctrl.dynamics.notes.outputs import placed
+from flexctrl.dynamics.notes.rates import is_named
 from flexctrl.dynamics.notes.shocks import Fast, Swing, shocks
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.steps import Integrator
@@ -24,6 +26,7 @@ _SEEN, _LITTLE, _STEADY, _RESOLVED = 1.0, 0.05, 0.01, 0.2
 """Radians in a step; what counts, of what an output goes through and of its largest; a step that sees all."""
 _LAG = 0.3
 """Radians by which two runs part in phase from where on an extrapolation of them is larger than either."""
+_TOLD = 1e-3
 _LOOKED_AT = 0.02, 0.2, 0.5, 0.9
 _FADED, _MORE, _AIM = 0.1, 3.0, 0.05
 """What is noted of what an output goes through, where that is more than three times what is told; and what is not."""
@@ -64,27 +67,33 @@ def ringing(run: Run, journey: Journey) -> Run:
     model = journey.plan.model
     if not (isinstance(model, Model) and len(run.y)):
         return run
-    asked = [o for o in model.structure.outputs if isinstance(o, Fast)]
-    asked = [o for o in asked if o.name not in run.report.output_errors]
-    notes = tuple(_notes(run, journey, asked)) if asked else ()
-    return replace(run, report=replace(run.report, notes=(*run.report.notes, *notes))) if notes else run
+    asked = [o for o in model.structure.outputs if isinstance(o, Fast) and not is_named(o.name, run.report.notes)]
+    judged = list(_judged(run, journey, model, asked)) if asked else []
+    notes = tuple(note for _, _, note in judged if note)
+    known = run.report.output_errors
+    found = ((name, share) for name, share, note in judged if share > _TOLD and (note or name not in known))
+    shares = {name: max(share, known.get(name, 0.0)) for name, share in found}
+    report = replace(run.report, output_errors={**known, **shares}, notes=(*run.report.notes, *notes))
+    return replace(run, report=report) if judged else run
 
 
-def _notes(run: Run, journey: Journey, asked: list[Fast]) -> Iterator[str]:
-    told, found = max(run.report.error, *run.report.output_errors.values(), 0.0), list(shocks(run, journey))
+def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iterator[tuple[str, float, str]]:
+    """Each output, what it may be off by over its range, and what is to be said of it."""
+    known, found = run.report.output_errors, list(shocks(run, journey))
+    told = max(run.report.error, *(known.get(model.outputs[i], 0.0) for i in placed(model)), 0.0)
     for output in asked:
         values = run[output.name]
         way, most = float(np.ptp(values)), float(np.abs(values).max())
         swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
+        share, note = 0.0, ""
         for swing, shock in sorted(swings, key=lambda each: -each[0].size):
             if not swing.size > max(_LITTLE * way, _STEADY * most):
                 break
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
             step = _step(run, journey, shock.state.t, lasts)
-            said = _note(journey.plan.method, swing, _Ringing(output.name, shock.since, lasts, step, way, told))
-            if said:
-                yield said
-                break
+            off, said = _told(journey.plan.method, swing, _Ringing(output.name, shock.since, lasts, step, way, told))
+            share, note = max(share, min(off / way, 1.0) if way else 1.0), note or said
+        yield output.name, share, note
 
 
 def _lasting(decay: float, left: float) -> float:
@@ -123,18 +132,19 @@ class _Ringing(NamedTuple):
     told: float
 
 
-def _note(method: Integrator, swing: Swing, of: _Ringing) -> str:
-    """What is to be said of a vibration; empty if nothing is."""
+def _told(method: Integrator, swing: Swing, of: _Ringing) -> tuple[float, str]:
+    """How far off a vibration may have an output, and what is to be said of it; nothing where that is little."""
     turned, angle = of.step * swing.frequency, of.lasts * swing.frequency
     said = {"name": of.name, "swing": swing.size, "since": of.since}
     if turned > _SEEN:
-        return _SAID.format(**said, turned=turned, finer=_RESOLVED / swing.frequency)
+        return swing.size, _SAID.format(**said, turned=turned, finer=_RESOLVED / swing.frequency)
     if isinstance(method, Richardson):
         lag = 0.75 * angle * turned**2 / 12.0
-        return _PARTED.format(**said, lag=lag, finer=of.step * np.sqrt(0.1 * _LAG / lag)) if lag > _LAG else ""
+        note = _PARTED.format(**said, lag=lag, finer=of.step * np.sqrt(0.1 * _LAG / lag)) if lag > _LAG else ""
+        return min(lag**2, 1.0) * swing.size, note
     faded, lag = fading(method, turned, angle)
-    missed = abs(1.0 - np.exp(complex(-faded, min(lag, np.pi))))
-    if missed * swing.size > max(_FADED, _MORE * of.told) * of.way:
+    missed = abs(1.0 - np.exp(complex(-faded, min(lag, np.pi)))) * swing.size
+    if missed > max(_FADED, _MORE * of.told) * of.way:
         finer = of.step * np.sqrt(_AIM / (faded + lag))
-        return _FADING.format(**said, step=of.step, lost=-np.expm1(-faded), lag=lag, finer=finer)
-    return ""
+        return missed, _FADING.format(**said, step=of.step, lost=-np.expm1(-faded), lag=lag, finer=finer)
+    return missed, ""

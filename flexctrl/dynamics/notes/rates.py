@@ -1,0 +1,189 @@
+"""Forces and rates among the outputs: how far each may be off at an instant, by all runs laid beside one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexctrl.dynamics.notes.beside import agreeing
+from flexctrl.dynamics.notes.gap import interpolated
+from flexctrl.dynamics.notes.outputs import ways
+from flexctrl.dynamics.run import Run
+from flexctrl.dynamics.scales import output_yardsticks
+from flexctrl.dynamics.steps import Fixed
+from flexctrl.frozen import frozen
+from flexctrl.model.model import Model
+from flexctrl.structure.outputs import AngularVelocity, DriveSpeed, Tension, Velocity
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["Apart", "is_named", "rated", "said_of_rates"]
+
+_POINTS = 4
+_NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
+_SEEN, _LITTLE = 10.0, 1e-3
+"""What counts: so many absolute tolerances, and a share of its largest value."""
+_LEAST = 0.5
+"""A coarser run is off by less than three times what this one is where steps see as little of what rings."""
+_HALVINGS = 40
+_SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
+_ABOUT = " {name} rings by", " largest {name} is", " peaks of {name} may"
+
+
+@frozen
+class Apart:
+    """How far the outputs of another run are from those of a run.
+
+    Attributes
+    ----------
+    longer : float
+        By how much its steps are longer; below 1 it is a finer one.
+    free : float
+        The share of steps that are.
+    most : numpy.ndarray, shape (outputs,)
+        In rows, in units of the outputs.
+    """
+
+    longer: float
+    free: float
+    most: np.ndarray
+
+    @classmethod
+    def of(cls, run: Run, other: Run, longer: float) -> Apart:
+        """Return it of two runs, where both have rows.
+
+        Between its rows the first is somewhere between what it is there and a smooth curve through them.
+        """
+        fewer, near = other.report.steps / max(run.report.steps, 1), 1e-9 * run.final.t
+        free, most = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros(run.y.shape[1])
+        if len(run.t) >= _POINTS:
+            within = (other.t >= run.t[0] - near) & (other.t <= run.t[-1] + near)
+            low, high = _between(run, other.t[within], near)
+            y = other.y[within]
+            most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
+        return cls(longer, min(max(free, _LEAST), 1.0), most)
+
+    def left(self, order: np.ndarray) -> np.ndarray:
+        """What of a gap is the first run's own, if errors go by powers of the steps."""
+        return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), _LEAST)
+
+
+def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Run:
+    """Return a run with what others tell of its forces and rates, instant by instant.
+
+    Of two coarser runs the gaps tell by which power of the steps errors go; what no step resolves goes by none, and all
+    of a gap may be this run's. Of a single one nobody knows, but in steps of one length, as these are made finer where
+    corners are met, and what rings is told by itself. The gap of a finer one is most of what this one is off.
+
+    Parameters
+    ----------
+    run : Run
+        With what they tell of places.
+    others : sequence of (Run, float)
+        By how much their steps are longer.
+    journey : Journey
+        How the run went.
+
+    Returns
+    -------
+    Run
+    """
+    model = journey.plan.model
+    judged = _rates(model) if isinstance(model, Model) and len(run.y) >= _POINTS else []
+    apart = [Apart.of(run, other, longer) for other, longer in others if len(other.t)]
+    if not (judged and apart):
+        return run
+    steady = isinstance(journey.plan.method.pace, Fixed)
+    off, way, most = _off(apart, run.report.order, steady), ways(journey, run.y), np.abs(run.y).max(axis=0)
+    least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
+    counted = [i for i in judged if way[i] > max(least[i], _LITTLE * most[i])]
+    known = run.report.output_errors
+    found = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in counted}
+    shares = {name: max(share, known.get(name, 0.0)) for name, share in found.items()}
+    return replace(run, report=replace(run.report, output_errors={**known, **shares}))
+
+
+def _rates(model: Model) -> list[int]:
+    outputs = enumerate(model.structure.outputs)
+    return [i for i, o in outputs if isinstance(o, Tension | Velocity | AngularVelocity | DriveSpeed)]
+
+
+def _off(apart: list[Apart], order: float, steady: bool) -> np.ndarray:
+    """By how much each output may be off, by all that are laid beside."""
+    coarser = sorted((a for a in apart if a.longer > 1.0), key=lambda a: a.longer)
+    found = [a.left(np.full(a.most.shape, order)) for a in apart if a.longer < 1.0]
+    if coarser:
+        near, least = coarser[0], order if steady else min(np.log(2.0) / np.log(coarser[0].longer), order)
+        found.append(near.left(_orders(near, coarser[-1], np.full(near.most.shape, least), order)))
+    return np.asarray(np.max(found, axis=0))
+
+
+def _orders(near: Apart, far: Apart, least: np.ndarray, most: float) -> np.ndarray:
+    """The order p by which gaps go, rᵖ − 1 of each; the least where there is but one."""
+    if near.longer == far.longer:
+        return least
+    low, high = least.copy(), np.full(least.shape, most)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        above = far.most * (near.longer**middle - 1.0) > near.most * (far.longer**middle - 1.0)
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return low
+
+
+def _between(run: Run, t: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the most that outputs of a run may be at some times."""
+    after = np.clip(np.searchsorted(run.t, t), 1, len(run.t) - 1)
+    curve = interpolated(run.t, run.y, t)
+    low, high = np.minimum(curve, run.y[after]), np.maximum(curve, run.y[after])
+    low, high = np.minimum(low, run.y[after - 1]), np.maximum(high, run.y[after - 1])
+    for row in (after - 1, after):
+        there = np.abs(run.t[row] - t)[:, None] <= near
+        low, high = np.where(there, run.y[row], low), np.where(there, run.y[row], high)
+    return low, high
+
+
+def said_of_rates(run: Run, journey: Journey) -> Run:
+    """Return a run with a note on the forces and rates that are farther off than places are, unless others name them.
+
+    Parameters
+    ----------
+    run : Run
+        With all that is told of it.
+    journey : Journey
+        How it went.
+
+    Returns
+    -------
+    Run
+    """
+    model, report = journey.plan.model, run.report
+    names = [model.outputs[i] for i in _rates(model)] if isinstance(model, Model) else []
+    shares = {name: report.output_errors.get(name, 0.0) for name in names if not is_named(name, report.notes)}
+    far = [name for name in shares if shares[name] > max(_NOTED, _BESIDE * report.error)]
+    if not far:
+        return run
+    worst, *others = sorted(far, key=lambda name: -shares[name])
+    note = _SAID.format(name=worst, far=100.0 * shares[worst], finer=agreeing(journey))
+    named = ", ".join(f"{name} {100.0 * shares[name]:.2g} %" for name in others[:_NAMED])
+    more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+    note += f"; beside it {named}{more}" if others else ""
+    return replace(run, report=replace(report, notes=(*report.notes, note)))
+
+
+def is_named(name: str, notes: Sequence[str]) -> bool:
+    """Tell whether some note is about the peaks or the ringing of an output.
+
+    Parameters
+    ----------
+    name : str
+    notes : sequence of str
+
+    Returns
+    -------
+    bool
+    """
+    return any(words.format(name=name) in f" {note}" for words in _ABOUT for note in notes)

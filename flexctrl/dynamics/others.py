@@ -1,0 +1,211 @@
+"""Runs made again in other steps, from where a run began."""
+
+from __future__ import annotations
+
+import copy
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from flexctrl.design.controller import Controller
+from flexctrl.dynamics.checkpoint import Checkpoint, machine_of
+from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.journey import Journey
+from flexctrl.dynamics.methods.checked import Beside
+from flexctrl.dynamics.notes.gap import Gap, between
+from flexctrl.dynamics.records.record import InMemory
+from flexctrl.dynamics.run import Run, Tolerance
+from flexctrl.dynamics.setting_out import travelled
+from flexctrl.errors import FlexctrlError
+from flexctrl.frozen import frozen
+from flexctrl.model.equilibrium import Rest
+from flexctrl.model.state import State
+
+__all__ = ["UNCHECKED", "Beginning", "Other", "made", "noted", "standing"]
+
+_LONGER, _SECONDS = 2.0, 0.2
+UNCHECKED = "how far small differences have grown is not told by another run"
+
+
+@frozen
+class Beginning:
+    """Where a run begins, for others to begin there too.
+
+    Attributes
+    ----------
+    start : State, Rest, Checkpoint or None
+    spacing : float or None
+        Of rows [s].
+    feed : Feed
+    spare : Controller or None
+        As it was before the run, as a law in Python may remember what it is asked; None where it cannot be copied.
+    """
+
+    start: State | Rest | Checkpoint | None
+    spacing: float | None
+    feed: Feed
+    spare: Controller | None
+
+    @staticmethod
+    def of(start: State | Rest | Checkpoint | None, spacing: float | None, feed: Feed) -> Beginning:
+        """Return where a run is about to begin.
+
+        Parameters
+        ----------
+        start : State, Rest, Checkpoint or None
+        spacing : float or None
+        feed : Feed
+
+        Returns
+        -------
+        Beginning
+        """
+        return Beginning(start, spacing, feed, None if feed.continuous else _copied(feed.controller))
+
+    @property
+    def again(self) -> Feed | None:
+        """What feeds another run; None where a law's memory is not what it was."""
+        if self.feed.controller is None or self.feed.continuous or self.feed.lowered is not None:
+            return replace(self.feed, met=[])
+        law = _copied(self.spare)
+        return None if law is None else replace(self.feed, controller=law, met=[])
+
+    def beside(self, other: Beside) -> State | Rest | Checkpoint | None:
+        """Return where another run is to begin: where it stood when the run was cut, or where the whole began."""
+        if not isinstance(self.start, Checkpoint):
+            return self.start
+        kind = repr(other.method), other.tolerance, machine_of(self.feed.model)
+        stood = (saved for saved in self.start.origin.others if _kind(saved) == kind)
+        return next(stood, self.start.origin.state)
+
+    @property
+    def t(self) -> float:
+        """When the run goes on [s]."""
+        return _time(self.start)
+
+    @property
+    def steps(self) -> int:
+        """Taken before."""
+        return self.start.mark.steps if isinstance(self.start, Checkpoint) else 0
+
+
+def _time(start: State | Rest | Checkpoint | None) -> float:
+    return start.t if isinstance(start, Checkpoint) else 0.0
+
+
+def _kind(saved: Checkpoint) -> tuple[str, Tolerance, str]:
+    """What run stands there: how it is made, and of which machine."""
+    return saved.method, saved.tolerance, saved.machine
+
+
+def _copied(law: Controller | None) -> Controller | None:
+    try:
+        return copy.deepcopy(law)
+    except Exception:  # whatever a law of one's own is made of
+        return None
+
+
+@frozen
+class Other:
+    """A run beside another one.
+
+    Attributes
+    ----------
+    run : Run
+    gap : Gap
+        How far it is from the first: nothing where it has ended at once.
+    beside : Beside
+        How it was made.
+    """
+
+    run: Run
+    gap: Gap
+    beside: Beside
+
+
+def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Other | None]:
+    """Return the run with where one other stands, and that one, ended where it takes far longer.
+
+    Parameters
+    ----------
+    run : Run
+    journey : Journey
+        How it went.
+    beside : Beside
+        How the other is made.
+    beginning : Beginning
+        Where it begins, and of which machine it is.
+
+    Returns
+    -------
+    Run, Other or None
+        None if the other tells nothing; a note says why.
+    """
+    if run.final.t <= beginning.t:
+        return run, None
+    end, feed, start = run.final.t, beginning.again, beginning.beside(beside)
+    if feed is None:
+        return noted(run, f"{UNCHECKED}: the controller cannot be copied"), None
+    changed = replace(journey.plan, model=feed.model, feed=feed, method=beside.method, tolerance=beside.tolerance)
+    work = (end - _time(start)) / (end - beginning.t)
+    if not isinstance(start, Checkpoint):  # the whole way, of which this run has gone the last part
+        work = max(work, run.report.steps / max(run.report.steps - beginning.steps, 1))
+    work /= min(beside.longer, 1.0)
+    latest = time.perf_counter() + _LONGER * work * run.report.wall_s + _SECONDS
+
+    def ended(share: float) -> None:
+        if time.perf_counter() > latest:
+            raise KeyboardInterrupt
+
+    spacing = beginning.spacing if len(run.t) > 1 else end  # a run that keeps no rows is compared where it ends
+    if isinstance(start, Checkpoint):
+        spacing = start.every
+    try:
+        unwatched = replace(changed, until=end, tell=ended, autosave=None)
+        _, other = travelled(unwatched, start, (), InMemory(), spacing)
+    except (FlexctrlError, KeyboardInterrupt) as fault:
+        return noted(run, f"{UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), None
+    first = journey.origin.u
+    if len(first) and len(other.u) and other.t[0] == 0.0 and not np.array_equal(first, other.u[0]):
+        return noted(run, f"{UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
+    told = standing(run, other.checkpoint)
+    if other.final.t <= beginning.t:
+        return told, Other(other, Gap.unseen(run), beside)
+    try:
+        return told, Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside)
+    except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
+        return noted(told, f"{UNCHECKED}, whose numbers fail ({fault})"), None
+
+
+def standing(run: Run, other: Checkpoint) -> Run:
+    """Return a run with where another one stands for what goes on from there.
+
+    Parameters
+    ----------
+    run : Run
+    other : Checkpoint
+        Of the other one.
+
+    Returns
+    -------
+    Run
+    """
+    origin = run.checkpoint.origin
+    others = (*(saved for saved in origin.others if _kind(saved) != _kind(other)), other)
+    return replace(run, checkpoint=replace(run.checkpoint, origin=replace(origin, others=others)))
+
+
+def noted(run: Run, note: str) -> Run:
+    """Return a run with one more note.
+
+    Parameters
+    ----------
+    run : Run
+    note : str
+
+    Returns
+    -------
+    Run
+    """
+    return replace(run, report=replace(run.report, notes=(*run.report.notes, note)))
