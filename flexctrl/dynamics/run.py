@@ -119,7 +119,7 @@ class Report:
         What the method itself damps.
     steps, rejected_steps, newton_iterations, factorisations : int
     wall_s : float
-        Time it took [s].
+        Time it took [s], without the runs laid beside it.
     dofs : int
     energy : EnergyBalance
     energy_residual : float
