@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,3 +98,10 @@ def test_a_name_within_other_words_is_not_named():
     notes = ("rope_0_rx given by the others through v of node 1", "lv rings by up to 2 from the start on")
     assert not is_named("v", notes)
     assert is_named("lv", notes)
+
+
+def test_rows_that_are_no_numbers_tell_nothing():
+    run = fc.simulate(girder(), until=0.1, inputs={"torque": -196.2}, method=fc.GeneralizedAlpha(1e-3))
+    y = run.y.copy()
+    y[7] = np.nan
+    assert np.isfinite(Apart.of(run, replace(run, y=y), 2.0).most).all()

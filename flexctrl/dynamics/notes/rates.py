@@ -56,12 +56,13 @@ class Apart:
     def of(cls, run: Run, other: Run, longer: float) -> Apart:
         """Return it of two runs, where both have rows.
 
-        Between its rows the first is somewhere between what it is there and a smooth curve through them.
+        Between its rows the first is somewhere between what it is there and a smooth curve through them. Rows of a run
+        that has failed need be no numbers: they tell nothing.
         """
         fewer, near = other.report.steps / max(run.report.steps, 1), 1e-9 * run.final.t
         free, most = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros(run.y.shape[1])
         if len(run.t) >= _POINTS:
-            within = (other.t >= run.t[0] - near) & (other.t <= run.t[-1] + near)
+            within = (other.t >= run.t[0] - near) & (other.t <= run.t[-1] + near) & np.isfinite(other.y).all(axis=1)
             low, high = _between(run, other.t[within], near)
             y = other.y[within]
             most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
@@ -100,7 +101,7 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     steady = isinstance(journey.plan.method.pace, Fixed)
     off, way, most = _off(apart, run.report.order, steady), ways(journey, run.y), np.abs(run.y).max(axis=0)
     least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
-    counted = [i for i in judged if way[i] > max(least[i], _LITTLE * most[i])]
+    counted = [i for i in judged if np.inf > way[i] > max(least[i], _LITTLE * most[i])]
     known = run.report.output_errors
     found = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in counted}
     shares = {name: max(share, known.get(name, 0.0)) for name, share in found.items()}
