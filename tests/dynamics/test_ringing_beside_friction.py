@@ -71,3 +71,15 @@ def test_friction_takes_what_a_vibration_loses():
     assert lost == pytest.approx(2.0 / np.pi * 3.0 * 40.0)
     assert lost * (2.0 * np.pi / 20.0) == pytest.approx(4.0 * 3.0 * 2.0)
     assert contacts.rubbed(np.array([1e-3 * np.abs(run.final.v[0])])) == 0.0
+
+
+@pytest.mark.parametrize(("speed", "named"), [(1e-13, False), (1.0, True)])
+def test_round_off_does_not_ring(speed, named):
+    """A mass on a spring of 20 rad/s, in steps of 0.1 s, moved by nothing but the last digits."""
+    mass, spring = fc.PointMass("mass", (1, 0, 0), 2.0), fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=800.0)
+    joints = [fc.Support(spring.start), fc.Support(mass.node, "v w"), fc.Pin(spring.end, mass.node)]
+    plan = fc.Structure([mass, spring], joints, outputs=[fc.Velocity("speed", mass.node, "x")])
+    model = fc.assemble(plan, [fc.Flexible(), fc.LargeRotation()])
+    start = model.rest.with_(v=np.array([speed]))
+    run = fc.simulate(model, until=2.0, start=start, method=fc.GeneralizedAlpha(0.1))
+    assert any("speed rings" in note for note in run.report.notes) == named

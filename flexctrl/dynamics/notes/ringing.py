@@ -14,6 +14,7 @@ from flexctrl.dynamics.notes.outputs import placed
 from flexctrl.dynamics.notes.rates import is_named
 from flexctrl.dynamics.notes.shocks import Fast, Swing, shocks
 from flexctrl.dynamics.run import Run
+from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Integrator
 from flexctrl.model.model import Model
 
@@ -26,7 +27,7 @@ _SEEN, _LITTLE, _STEADY, _RESOLVED = 1.0, 0.05, 0.01, 0.2
 """Radians in a step; what counts, of what an output goes through and of its largest; a step that sees all."""
 _LAG = 0.3
 """Radians by which two runs part in phase from where on an extrapolation of them is larger than either."""
-_TOLD = 1e-3
+_TOLD, _DUST = 1e-3, 1e-9
 _LOOKED_AT = 0.02, 0.2, 0.5, 0.9
 _FADED, _MORE, _AIM = 0.1, 3.0, 0.05
 """What is noted of what an output goes through, where that is more than three times what is told; and what is not."""
@@ -81,13 +82,14 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
     """Each output, what it may be off by over its range, and what is to be said of it."""
     known, found = run.report.output_errors, list(shocks(run, journey))
     told = max(run.report.error, *(known.get(model.outputs[i], 0.0) for i in placed(model)), 0.0)
+    yards = output_yardsticks(model, 1.0)
     for output in asked:
         values = run[output.name]
         way, most = float(np.ptp(values)), float(np.abs(values).max())
         swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
         share, note = 0.0, ""
         for swing, shock in sorted(swings, key=lambda each: -each[0].size):
-            if not swing.size > max(_LITTLE * way, _STEADY * most):
+            if not swing.size > max(_LITTLE * way, _STEADY * most, _DUST * yards[model.outputs.index(output.name)]):
                 break
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
             step = _step(run, journey, shock.state.t, lasts)
