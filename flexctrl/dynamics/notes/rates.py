@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Apart", "is_named", "rated", "said_of_rates"]
 
-_POINTS = 4
+_POINTS, _NEAR = 4, 1e-9
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _SEEN, _LITTLE = 10.0, 1e-3
 """What counts: so many absolute tolerances, and a share of its largest value."""
 _LEAST = 0.5
-"""A coarser run is off by less than three times what this one is where steps see as little of what rings."""
+"""Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
 _HALVINGS = 40
 _SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
 _ABOUT = " {name} rings by", " largest {name} is", " peaks of {name} may"
@@ -59,7 +59,7 @@ class Apart:
         Between its rows the first is somewhere between what it is there and a smooth curve through them. Rows of a run
         that has failed need be no numbers: they tell nothing.
         """
-        fewer, near = other.report.steps / max(run.report.steps, 1), 1e-9 * run.final.t
+        fewer, near = other.report.steps / max(run.report.steps, 1), _NEAR * run.final.t
         free, most = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros(run.y.shape[1])
         if len(run.t) >= _POINTS:
             within = (other.t >= run.t[0] - near) & (other.t <= run.t[-1] + near) & np.isfinite(other.y).all(axis=1)
@@ -70,7 +70,8 @@ class Apart:
 
     def left(self, order: np.ndarray) -> np.ndarray:
         """What of a gap is the first run's own, if errors go by powers of the steps."""
-        return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), _LEAST)
+        least = _LEAST if self.longer < 1.0 else 1.0
+        return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), least)
 
 
 def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Run:
@@ -78,7 +79,8 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
 
     Of two coarser runs the gaps tell by which power of the steps errors go; what no step resolves goes by none, and all
     of a gap may be this run's. Of a single one nobody knows, but in steps of one length, as these are made finer where
-    corners are met, and what rings is told by itself. The gap of a finer one is most of what this one is off.
+    corners are met, and what rings is told by itself. The gap of a finer one is most of what this one is off, whatever
+    coarser ones say. One that ended early tells nothing if others did not.
 
     Parameters
     ----------
@@ -95,7 +97,8 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     """
     model = journey.plan.model
     judged = _rates(model) if isinstance(model, Model) and len(run.y) >= _POINTS else []
-    apart = [Apart.of(run, other, longer) for other, longer in others if len(other.t)]
+    ended = [each for each in others if each[0].final.t >= run.final.t * (1.0 - _NEAR)] or others
+    apart = [Apart.of(run, other, longer) for other, longer in ended if len(other.t)]
     if not (judged and apart):
         return run
     steady = isinstance(journey.plan.method.pace, Fixed)
@@ -114,13 +117,11 @@ def _rates(model: Model) -> list[int]:
 
 
 def _off(apart: list[Apart], order: float, steady: bool) -> np.ndarray:
-    """By how much each output may be off, by all that are laid beside."""
-    coarser = sorted((a for a in apart if a.longer > 1.0), key=lambda a: a.longer)
-    found = [a.left(np.full(a.most.shape, order)) for a in apart if a.longer < 1.0]
-    if coarser:
-        near, least = coarser[0], order if steady else min(np.log(2.0) / np.log(coarser[0].longer), order)
-        found.append(near.left(_orders(near, coarser[-1], np.full(near.most.shape, least), order)))
-    return np.asarray(np.max(found, axis=0))
+    """By how much each output may be off: by a finer run if there is one, else by the nearest coarser one."""
+    near, *farther = sorted(apart, key=lambda a: a.longer)
+    least = order if steady or near.longer < 1.0 else min(np.log(2.0) / np.log(near.longer), order)
+    orders = np.full(near.most.shape, least)
+    return near.left(_orders(near, farther[-1], orders, order) if farther and near.longer > 1.0 else orders)
 
 
 def _orders(near: Apart, far: Apart, least: np.ndarray, most: float) -> np.ndarray:

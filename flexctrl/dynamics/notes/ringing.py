@@ -93,7 +93,9 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
                 break
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
             step = _step(run, journey, shock.state.t, lasts)
-            off, said = _told(journey.plan.method, swing, _Ringing(output.name, shock.since, lasts, step, way, told))
+            beside = known.get(output.name, np.inf)
+            ringing = _Ringing(output.name, shock.since, lasts, step, way, told, beside)
+            off, said = _told(journey.plan.method, swing, ringing)
             share, note = max(share, min(off / way, 1.0) if way else 1.0), note or said
         yield output.name, share, note
 
@@ -122,8 +124,9 @@ class _Ringing(NamedTuple):
         Since when, in words.
     lasts, step : float
         For how long, and in what steps [s].
-    way, told : float
-        What it goes through, and the largest share that is told of others.
+    way, told, beside : float
+        What it goes through, the largest share that is told of others, and what runs beside tell of it; infinite if
+        there are none.
     """
 
     name: str
@@ -132,6 +135,7 @@ class _Ringing(NamedTuple):
     step: float
     way: float
     told: float
+    beside: float
 
 
 def _told(method: Integrator, swing: Swing, of: _Ringing) -> tuple[float, str]:
@@ -146,6 +150,8 @@ def _told(method: Integrator, swing: Swing, of: _Ringing) -> tuple[float, str]:
         return min(lag**2, 1.0) * swing.size, note
     faded, lag = fading(method, turned, angle)
     missed = abs(1.0 - np.exp(complex(-faded, min(lag, np.pi)))) * swing.size
+    if missed > _MORE * of.beside * of.way:  # something else ends it, or runs that lag unlike would be apart
+        return 0.0, ""
     if missed > max(_FADED, _MORE * of.told) * of.way:
         finer = of.step * np.sqrt(_AIM / (faded + lag))
         return missed, _FADING.format(**said, step=of.step, lost=-np.expm1(-faded), lag=lag, finer=finer)
