@@ -34,6 +34,7 @@ from flexctrl.dynamics.records.rows import Rows
 from flexctrl.dynamics.renewing import renew
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import (
+    Brief,
     Counts,
     Exact,
     Fixed,
@@ -201,6 +202,17 @@ class Journey:
         """
         stepper = self.stepper
         return self._taken(stepper.exactly if isinstance(stepper, Exact) else stepper.step, point, h)
+
+    def briefly(self, point: Any, h: float) -> Any:
+        """Return the point a step later, solved to the last digits by a march alone.
+
+        Raises
+        ------
+        StepError
+            As `step` does, and where there is no march.
+        """
+        stepper = self.stepper
+        return self._taken(stepper.briefly if isinstance(stepper, Brief) else stepper.step, point, h)
 
     def _taken(self, step: Callable[[Any, float], Any], point: Any, h: float) -> Any:
         try:

@@ -23,6 +23,7 @@ from flexctrl.structure.freedoms import check_seconds
 
 __all__ = [
     "MOST_STEPS",
+    "Brief",
     "Controlled",
     "Counts",
     "Exact",
@@ -261,6 +262,20 @@ class Exact(Stepper[P], Protocol[P]):
         ------
         StepError
             If it does not converge.
+        """
+
+
+@runtime_checkable
+class Brief(Exact[P], Protocol[P]):
+    """A stepper whose steps a march takes where it can."""
+
+    def briefly(self, point: P, h: float) -> P:
+        """Return the point a step later, solved to the last digits by the march alone.
+
+        Raises
+        ------
+        StepError
+            If that does not converge.
         """
 
 

@@ -16,7 +16,6 @@ from flexctrl.dynamics.march.answering import recite
 from flexctrl.dynamics.march.calling import Remembered
 from flexctrl.dynamics.march.making import CAPACITY, Method
 from flexctrl.dynamics.march.marching import Marcher, Pacing, can_march
-from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.frozen import frozen
@@ -272,12 +271,8 @@ class AnsweringStepper(MarchingStepper):
         assert isinstance(found, Answerer)
         return found.listening(p.feed)
 
-    def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
-        """Return the point a step later."""
-        self.enter(point)
-        done = self.marcher.fixed(h, 1) == DONE
-        self.count()
-        return self.leave(self.marcher.supplied(point.supply)) if done else self.plain.step(point, h)
+    def _supplied(self, point: AlphaPoint) -> Supply:
+        return self.marcher.supplied(point.supply)
 
     def enter(self, point: AlphaPoint) -> None:
         """Put the march at a point, unless it is there."""

@@ -16,7 +16,7 @@ from flexctrl.dynamics.march.making import Method
 from flexctrl.dynamics.march.marching import Marcher, can_march
 from flexctrl.dynamics.march.record import DONE
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.steps import Counts
+from flexctrl.dynamics.steps import Counts, StepError
 from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 
@@ -160,6 +160,24 @@ class MarchingStepper:
         finally:
             march.exact = 0
 
+    def briefly(self, point: AlphaPoint, h: float) -> AlphaPoint:
+        """Return the point a step later, solved to the last digits by the march alone.
+
+        Raises
+        ------
+        StepError
+            If that does not converge.
+        """
+        march = self.marcher.march
+        march.exact = 1
+        try:
+            after = self._marched(point, h)
+        finally:
+            march.exact = 0
+        if after is None:
+            raise StepError(self.counts.worst, f"the march ends nowhere {h:.3g} s after t = {point.state.t:.6g} s")
+        return after
+
     def step(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """Return the point a step later.
 
@@ -168,10 +186,18 @@ class MarchingStepper:
         StepError
             If Newton's method does not converge, even with a fresh tangent.
         """
+        return self._marched(point, h) or self.plain.step(point, h)
+
+    def _marched(self, point: AlphaPoint, h: float) -> AlphaPoint | None:
+        """The point a step later; None where the march does not end there."""
         self.enter(point)
         done = self.marcher.fixed(h, 1) == DONE
         self.count()
-        return self.leave(point.supply) if done else self.plain.step(point, h)
+        return self.leave(self._supplied(point)) if done else None
+
+    def _supplied(self, point: AlphaPoint) -> Supply:
+        """What is fed where the march stands."""
+        return point.supply
 
     def error(self, before: AlphaPoint, after: AlphaPoint, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Return the local error of the step just taken over what is allowed."""
