@@ -1,4 +1,4 @@
-"""A damped rope that is caught under a continuous law: steps to where its force jumps do not cost more than all else."""
+"""A damped rope that is caught under a continuous law: steps to where its force jumps cost no more than all else."""
 
 from __future__ import annotations
 
