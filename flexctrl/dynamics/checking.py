@@ -61,7 +61,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     told, first = _told(run, journey, coarser, beginning)
     if not first or first[0].run.status is Status.INTERRUPTED:
         return told, ()
-    other, nearer = first[0], first[1:]
+    other = first[0]
+    nearer: tuple[Other, ...] = ()
     nearby = method.coarser(tolerance, _NEARER)
     quiet = told.report.error < _LITTLE and not news(told, run)
     parted = not quiet and told.report.error > PARTED

@@ -11,18 +11,30 @@ import scipy.sparse as sp
 from flexctrl.dynamics.notes.adding import remedy
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.model.model import Model
-from flexctrl.structure.outputs import DriveAngle, Position, Rotation, SwayAngle
+from flexctrl.structure.outputs import (
+    AngularVelocity,
+    DriveAngle,
+    DriveSpeed,
+    Position,
+    Rotation,
+    SwayAngle,
+    Tension,
+    Velocity,
+)
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["OutputErrors", "by_rows", "by_sums", "placed", "reach", "seen", "ways"]
+__all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reach", "seen", "ways"]
 
 _TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
 _NAMED = 3
 _BY_SUMS = "{name} has moved by {way:.2g}, and errors of {steps} steps may have added up to {far} of that: {remedy}"
 _BESIDE_IT = "by a {kind} run, {name} is off by {far} of its motion, which is {way:.2g}: {remedy}"
 _PLACES = (Position, SwayAngle, Rotation, DriveAngle)
+
+Fast = Tension | DriveSpeed | Velocity | AngularVelocity
+"""A force or a rate."""
 
 
 class OutputErrors(NamedTuple):
@@ -43,6 +55,11 @@ class OutputErrors(NamedTuple):
 def placed(model: Model) -> list[int]:
     """Return which outputs are places or angles."""
     return [i for i, output in enumerate(model.structure.outputs) if isinstance(output, _PLACES)]
+
+
+def fast(model: Model) -> list[int]:
+    """Return which outputs are forces or rates."""
+    return [i for i, output in enumerate(model.structure.outputs) if isinstance(output, Fast)]
 
 
 def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:

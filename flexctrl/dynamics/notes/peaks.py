@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.dynamics.notes.outputs import fast
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Fixed
 from flexctrl.dynamics.swift.stiff_lines import frequency_of
 from flexctrl.model.model import Model
-from flexctrl.structure.outputs import AngularVelocity, DriveSpeed, Output, Tension, Velocity
+from flexctrl.structure.outputs import Output, Tension
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -84,7 +85,7 @@ def _compared(run: Run, other: Run, journey: Journey, longer: float) -> tuple[di
     peaks, others = (np.abs(r.y[r.t <= end]).max(axis=0, initial=0.0) for r in (run, other))
     most, off = np.maximum(peaks, others), np.abs(others - peaks) / (1.0 - longer)
     least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
-    far = [i for i in np.flatnonzero((most > least) & (off > _TOLD * most)).tolist() if _is_rate(model, i)]
+    far = [i for i in fast(model) if most[i] > least[i] and off[i] > _TOLD * most[i]]
     shares = {model.outputs[i]: min(float(off[i] / most[i]), 1.0) for i in far}
     return shares, tuple(_note(journey, i, peaks, others, shares[model.outputs[i]]) for i in far)
 
@@ -104,10 +105,6 @@ def _missed(journey: Journey, told: Collection[str]) -> Iterator[str]:
 def _frequency(model: Model, output: Output) -> float:
     """Of the line whose tension an output is [rad/s]; 0 for other outputs."""
     return frequency_of(model, output.line) if isinstance(output, Tension) else 0.0
-
-
-def _is_rate(model: Model, output: int) -> bool:
-    return isinstance(model.structure.outputs[output], Tension | Velocity | AngularVelocity | DriveSpeed)
 
 
 def _note(journey: Journey, output: int, peaks: np.ndarray, others: np.ndarray, share: float) -> str:

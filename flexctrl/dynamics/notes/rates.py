@@ -10,13 +10,12 @@ import numpy as np
 
 from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.gap import interpolated
-from flexctrl.dynamics.notes.outputs import ways
+from flexctrl.dynamics.notes.outputs import fast, ways
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Fixed
 from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
-from flexctrl.structure.outputs import AngularVelocity, DriveSpeed, Tension, Velocity
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -96,7 +95,7 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     Run
     """
     model = journey.plan.model
-    judged = _rates(model) if isinstance(model, Model) and len(run.y) >= _POINTS else []
+    judged = fast(model) if isinstance(model, Model) and len(run.y) >= _POINTS else []
     ended = [each for each in others if each[0].final.t >= run.final.t * (1.0 - _NEAR)] or others
     apart = [Apart.of(run, other, longer) for other, longer in ended if len(other.t)]
     if not (judged and apart):
@@ -109,11 +108,6 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     found = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in counted}
     shares = {name: max(share, known.get(name, 0.0)) for name, share in found.items()}
     return replace(run, report=replace(run.report, output_errors={**known, **shares}))
-
-
-def _rates(model: Model) -> list[int]:
-    outputs = enumerate(model.structure.outputs)
-    return [i for i, o in outputs if isinstance(o, Tension | Velocity | AngularVelocity | DriveSpeed)]
 
 
 def _off(apart: list[Apart], order: float, steady: bool) -> np.ndarray:
@@ -163,7 +157,7 @@ def said_of_rates(run: Run, journey: Journey) -> Run:
     Run
     """
     model, report = journey.plan.model, run.report
-    names = [model.outputs[i] for i in _rates(model)] if isinstance(model, Model) else []
+    names = [model.outputs[i] for i in fast(model)] if isinstance(model, Model) else []
     shares = {name: report.output_errors.get(name, 0.0) for name in names if not is_named(name, report.notes)}
     far = [name for name in shares if shares[name] > max(_NOTED, _BESIDE * report.error)]
     if not far:

@@ -10,9 +10,9 @@ import numpy as np
 
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.notes.fading import fading
-from flexctrl.dynamics.notes.outputs import placed
+from flexctrl.dynamics.notes.outputs import Fast, placed
 from flexctrl.dynamics.notes.rates import is_named
-from flexctrl.dynamics.notes.shocks import Fast, Swing, shocks
+from flexctrl.dynamics.notes.shocks import Swing, shocks
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Integrator

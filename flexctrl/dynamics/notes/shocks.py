@@ -14,6 +14,7 @@ from scipy.linalg import eigh
 
 from flexctrl.dynamics.notes.contacts import Contacts
 from flexctrl.dynamics.notes.heavy import without_light
+from flexctrl.dynamics.notes.outputs import Fast
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.swift.lengths import lengthening
 from flexctrl.errors import ControllerError, SingularMatrixError
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from flexctrl.dynamics.feed import Feed
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Fast", "Shock", "Swing", "shocks"]
+__all__ = ["Shock", "Swing", "shocks"]
 
 _SEEDS = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 _FEW = 200
@@ -37,8 +38,6 @@ _ROUND_OFF, _LITTLE = 1e-12, 1e-6
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
 _MOST, _BESIDE = 16, 1e-9
 """Breaks of a law that are looked at, and how far on either side, in parts of the run."""
-
-Fast = Tension | DriveSpeed | Velocity | AngularVelocity
 
 
 class Swing(NamedTuple):
