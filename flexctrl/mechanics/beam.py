@@ -26,8 +26,8 @@ class BeamForce:
         Works on stretch, θ₁ and θ₂.
     torque : casadi.SX, 3
         Works on the spin of the frame, in the frame.
-    nodal : casadi.SX, 12
-        Forces and moments on the nodes, in the frame.
+    beside : casadi.SX, 9
+        Works on ω₁, v₂ − v₁ and ω₂, in the frame.
     modal : casadi.SX or float
         Forces on the element's own modes; 0 where it has none.
     stress : casadi.SX, 6, or float
@@ -38,17 +38,17 @@ class BeamForce:
 
     deformation: ca.SX
     torque: ca.SX
-    nodal: ca.SX
+    beside: ca.SX
     modal: ca.SX | float = 0.0
     stress: ca.SX | float = 0.0
     mean: ca.SX | float = 0.0
 
     def __add__(self, other: BeamForce) -> BeamForce:
-        sums = (self.deformation + other.deformation, self.torque + other.torque, self.nodal + other.nodal)
+        sums = (self.deformation + other.deformation, self.torque + other.torque, self.beside + other.beside)
         return BeamForce(*sums, self.modal + other.modal, self.stress + other.stress, self.mean + other.mean)
 
     def __mul__(self, factor: float) -> BeamForce:
-        works = (self.deformation * factor, self.torque * factor, self.nodal * factor)
+        works = (self.deformation * factor, self.torque * factor, self.beside * factor)
         return BeamForce(*works, self.modal * factor, self.stress * factor, self.mean * factor)
 
 
@@ -56,13 +56,30 @@ def no_force() -> BeamForce:
     """Return the force that is not there."""
     import casadi as ca
 
-    return BeamForce(ca.SX(7, 1), ca.SX(3, 1), ca.SX(12, 1))
+    return BeamForce(ca.SX(7, 1), ca.SX(3, 1), ca.SX(9, 1))
 
 
 def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
-    """Return the force on the nodes in space axes (12): Bᵀ n + Gᵀ t + f, turned out of the frame."""
+    """Return the force on the nodes in space axes (12)."""
+    return _on_nodes(m, framed_force(m, force))
+
+
+def _on_nodes(m: BeamMotion, framed: ca.SX) -> ca.SX:
+    """What a `framed_force` does on the nodes, in space axes."""
     import casadi as ca
 
+    middle, first, apart, second = (m.frame @ block for block in ca.vertsplit(framed[:12], 3))
+    return ca.vertcat(0.5 * middle - apart, first, 0.5 * middle + apart, second)
+
+
+def framed_force(m: BeamMotion, force: BeamForce) -> ca.SX:
+    """Return the force that works on the middle of the chord, ω₁, v₂ − v₁, ω₂ (12) and on own modes, in the frame.
+
+    Bᵀ n + Gᵀ t + f.
+    """
+    import casadi as ca
+
+    middle = ca.SX(3, 1) + force.mean
     force = _resolved(m, force)
     n = force.deformation
     t1, t2 = inverse_tangent(m.theta[0], n[1:4]), inverse_tangent(m.theta[1], n[4:7])
@@ -71,9 +88,9 @@ def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     lever = torque[0] / across
     pull = ca.vertcat(m.lean * n[0], torque[2] / m.chord, -(torque[1] + lever * along) / m.chord)
     turn = [t + 0.5 * lever * arm for t, arm in zip((t1, t2), m.arms, strict=True)]
-    f = force.nodal
-    blocks = (f[0:3] - pull, f[3:6] + turn[0], f[6:9] + pull, f[9:12] + turn[1])
-    return ca.vertcat(*[m.frame @ block for block in blocks])
+    f = force.beside
+    blocks = (middle, f[0:3] + turn[0], f[3:6] + pull, f[6:9] + turn[1])
+    return ca.vertcat(*blocks, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else ca.vertcat(*blocks)
 
 
 def _resolved(m: BeamMotion, force: BeamForce) -> BeamForce:
@@ -88,9 +105,8 @@ def whole_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     """Return a force on the nodes of an element, in space axes, and then on its own modes."""
     import casadi as ca
 
-    force = _resolved(m, force)
-    nodal = nodal_force(m, force)
-    return ca.vertcat(nodal, ca.SX(m.modal[0].numel(), 1) + force.modal) if m.modal else nodal
+    framed = framed_force(m, force)
+    return ca.vertcat(_on_nodes(m, framed), framed[12:])
 
 
 def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
@@ -115,7 +131,7 @@ def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:
         about_y2 + s * (4.0 * y2 - y1) - half * z1 + t * (2.0 * about_z1 - about_z2),
         about_z2 + s * (4.0 * z2 - z1) + half * y1 - t * (2.0 * about_y1 - about_y2),
     )
-    return BeamForce(-ca.vertcat(N, m1, m2), ca.SX(3, 1), ca.SX(12, 1))
+    return replace(no_force(), deformation=-ca.vertcat(N, m1, m2))
 
 
 def _mean_force(m: BeamMotion, force: ca.SX) -> BeamForce:
@@ -125,13 +141,13 @@ def _mean_force(m: BeamMotion, force: ca.SX) -> BeamForce:
     (t1, t2), t, L = m.axes, m.axes[0] - m.axes[1], m.p["L"]
     on_slant = L * (force / 12.0 - ca.vertcat(force[0] / 20.0, 0, 0))
     on_chord = -L / 20.0 * (force[0] * t + t[0] * force)
-    nodal = ca.vertcat(0.5 * force, ca.cross(t1, on_slant), 0.5 * force, -ca.cross(t2, on_slant))
+    none = ca.SX(3, 1)
+    beside = ca.vertcat(ca.cross(t1, on_slant), none, -ca.cross(t2, on_slant))
     torque = ca.vertcat(0, -on_chord[2], on_chord[1])
     if not m.modal:
-        return BeamForce(ca.SX(7, 1), torque, nodal)
+        return BeamForce(ca.SX(7, 1), torque, beside)
     moments, turn, modal = component_modes.offset_force(m, force)
-    none = ca.SX(3, 1)
-    return BeamForce(ca.SX(7, 1), torque + turn, nodal + ca.vertcat(none, moments[:3], none, moments[3:]), modal)
+    return BeamForce(ca.SX(7, 1), torque + turn, beside + ca.vertcat(moments[:3], none, moments[3:]), modal)
 
 
 def work_of(m: BeamMotion, of: Callable[[BeamMotion], ca.SX]) -> BeamForce:
@@ -141,7 +157,7 @@ def work_of(m: BeamMotion, of: Callable[[BeamMotion], ca.SX]) -> BeamForce:
     seen, local = seen_deformed(m)
     now = ca.vertcat(m.stretch, *m.theta, *m.modal[:1])
     gradient = ca.substitute(ca.gradient(of(local), seen), seen, now)
-    return BeamForce(gradient[:7], ca.SX(3, 1), ca.SX(12, 1), gradient[7:] if m.modal else 0.0)
+    return replace(no_force(), deformation=gradient[:7], modal=gradient[7:] if m.modal else 0.0)
 
 
 def elastic_force(m: BeamMotion) -> BeamForce:

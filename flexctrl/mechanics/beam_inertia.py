@@ -17,34 +17,33 @@ if TYPE_CHECKING:
 
 
 def _relative(m: BeamMotion, rates: tuple[ca.SX, ...]) -> tuple[ca.SX, ...]:
-    """Momenta of the consistent mass less that of the mean motion it knows, four blocks: rates by differences."""
+    """Momenta of the consistent mass less that of the mean motion it knows, three blocks."""
     import casadi as ca
 
-    (vx1, vy1, vz1), (wx1, wy1, wz1), (vx2, vy2, vz2), (wx2, wy2, wz2) = (components(r) for r in rates)
-    px, polar = m.p["mass"] / 12.0 * (vx1 - vx2), m.p["polar"]
-    py, lz1, lz2 = _in_plane(m, vy1 - vy2, wz1, wz2, "z")
-    pz, ly1, ly2 = _in_plane(m, vz1 - vz2, -wy1, -wy2, "y")
+    (wx1, wy1, wz1), (vx, vy, vz), (wx2, wy2, wz2) = (components(r) for r in rates)
+    polar = m.p["polar"] / 6.0
+    py, lz1, lz2 = _in_plane(m, vy, wz1, wz2, "z")
+    pz, ly1, ly2 = _in_plane(m, vz, -wy1, -wy2, "y")
     return (
-        ca.vertcat(px, py, pz),
-        ca.vertcat(polar / 6.0 * (2.0 * wx1 + wx2), -ly1, lz1),
-        -ca.vertcat(px, py, pz),
-        ca.vertcat(polar / 6.0 * (wx1 + 2.0 * wx2), -ly2, lz2),
+        ca.vertcat(polar * (2.0 * wx1 + wx2), -ly1, lz1),
+        ca.vertcat(m.p["mass"] / 12.0 * vx, py, pz),
+        ca.vertcat(polar * (wx1 + 2.0 * wx2), -ly2, lz2),
     )
 
 
 def _in_plane(m: BeamMotion, v: ca.SX, w1: ca.SX, w2: ca.SX, about: str) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """The consistent mass in one plane less that of ½(v₁ + v₂) + L/12 (ω₁ − ω₂), on v = v₁ − v₂ and the spins."""
+    """The consistent mass in one plane less that of ½(v₁ + v₂) + L/12 (ω₁ − ω₂), on v = v₂ − v₁ and the spins."""
     mass, L = m.p["mass"], m.p["L"]
     vv, tv, tt, _, _, other_tt = (m.p[f"{about}_{entry}"] for entry in PlaneMass._fields)
     vv, tv, shared = vv - mass / 4.0, tv - mass * L / 24.0, mass * L * L / 144.0
     tt, other_tt = tt - shared, other_tt + shared
-    return vv * v + tv * (w1 + w2), tv * v + tt * w1 + other_tt * w2, tv * v + other_tt * w1 + tt * w2
+    return vv * v - tv * (w1 + w2), tt * w1 + other_tt * w2 - tv * v, other_tt * w1 + tt * w2 - tv * v
 
 
 def inertial_force(m: BeamMotion) -> BeamForce:
     """Return the force of inertia.
 
-    Lagrange's equations of T = ½ Vᵀ M V + ½ m |Ẋ|², V the nodal velocities in the frame, M the consistent mass
+    Lagrange's equations of T = ½ Vᵀ M V + ½ m |Ẋ|², V = (ω₁, v₂ − v₁, ω₂) in the frame, M the consistent mass
     relative to its mean, X the mean of the axis (`offset`): d/dt(R_E p) − (ω × on the rotations) − ∂T/∂q, with R_E
     changing by the spin of the frame, and −m Ẍ on X.
     """
@@ -55,14 +54,14 @@ def inertial_force(m: BeamMotion) -> BeamForce:
     rate, modal = _momenta(m, seen, 2)
     frame_torque = sum((ca.cross(v, q) for v, q in zip(m.rates, p, strict=True)), ca.SX.zeros(3))
     blocks = [r + ca.cross(m.spin, q) for r, q in zip(rate, p, strict=True)]
-    for i in (1, 3):
+    for i in (0, 2):
         blocks[i] = blocks[i] - ca.cross(m.rates[i], p[i])
-    apart = BeamForce(ca.SX(7, 1), -frame_torque, -ca.vertcat(*blocks), -modal)
-    return replace(apart, mean=-m.p["mass"] * _mean_acceleration(m))
+    beside = BeamForce(ca.SX(7, 1), -frame_torque, -ca.vertcat(*blocks), -modal)
+    return replace(beside, mean=-m.p["mass"] * _mean_acceleration(m))
 
 
 def _momenta(m: BeamMotion, rates: tuple[ca.SX, ...], order: int) -> tuple[tuple[ca.SX, ...], ca.SX | float]:
-    """Momenta but of the mean: of the nodes and of the element's own modes, by rates (order 1) or accelerations (2)."""
+    """Momenta but of the mean: of V and of the element's own modes, by rates (order 1) or accelerations (2)."""
     blocks = _relative(m, rates)
     if not m.modal:
         return blocks, 0.0
@@ -77,8 +76,8 @@ def kinetic_energy(m: BeamMotion) -> ca.SX:
     p, modal = _momenta(m, m.rates, 1)
     velocity = _mean_velocity(m)
     mean = 0.5 * m.p["mass"] * ca.dot(velocity, velocity)
-    nodal = 0.5 * ca.dot(ca.vertcat(*m.rates), ca.vertcat(*p))
-    return mean + nodal + 0.5 * ca.dot(m.modal[1], modal) if m.modal else mean + nodal
+    beside = 0.5 * ca.dot(ca.vertcat(*m.rates), ca.vertcat(*p))
+    return mean + beside + 0.5 * ca.dot(m.modal[1], modal) if m.modal else mean + beside
 
 
 def drag(m: BeamMotion) -> BeamForce:
@@ -86,8 +85,8 @@ def drag(m: BeamMotion) -> BeamForce:
     import casadi as ca
 
     blocks, modal = _momenta(m, m.rates, 1)
-    apart = BeamForce(ca.SX(7, 1), ca.SX(3, 1), -ca.vertcat(*blocks), -modal)
-    return replace(apart, mean=-m.p["mass"] * _mean_velocity(m))
+    beside = BeamForce(ca.SX(7, 1), ca.SX(3, 1), -ca.vertcat(*blocks), -modal)
+    return replace(beside, mean=-m.p["mass"] * _mean_velocity(m))
 
 
 def weight(m: BeamMotion, g: np.ndarray) -> BeamForce:
@@ -120,11 +119,11 @@ def _mean_velocity(m: BeamMotion) -> ca.SX:
     """Ẋ of X = ½(x₁ + x₂) + L/12 t − L/20 (t·e) e, t = t₁ − t₂, e along the chord, and of what modes add to it."""
     import casadi as ca
 
-    v1, w1, v2, w2 = m.rates
+    w1, _, w2 = m.rates
     (t1, t2), (t, turn) = m.axes, _chord(m)
     rate = ca.cross(w1, t1) - ca.cross(w2, t2)
     along = ca.vertcat(rate[0] + ca.dot(t, turn), 0, 0) + t[0] * turn
-    cubic = 0.5 * (v1 + v2) + m.p["L"] * (rate / 12.0 - along / 20.0)
+    cubic = m.middle[0] + m.p["L"] * (rate / 12.0 - along / 20.0)
     if not m.modal:
         return cubic
     y, seen, _ = component_modes.offset_rates(m)
@@ -143,15 +142,15 @@ def _mean_acceleration(m: BeamMotion) -> ca.SX:
     import casadi as ca
 
     (t1, t2), (t, turn) = m.axes, _chord(m)
-    (v1, w1, v2, w2), (a1, b1, a2, b2) = m.rates, m.accelerations
+    (w1, v, w2), (b1, a, b2) = m.rates, m.accelerations
     u1, u2 = ca.cross(w1, t1), ca.cross(w2, t2)
     rate = u1 - u2
     second = ca.cross(b1, t1) + ca.cross(w1, u1) - ca.cross(b2, t2) - ca.cross(w2, u2)
-    apart = (a2 - a1 - 2.0 * (v2 - v1)[0] * turn) / m.chord
+    apart = (a - 2.0 * v[0] * turn) / m.chord
     turned = ca.vertcat(-ca.dot(turn, turn), apart[1], apart[2])
     along = second[0] + 2.0 * ca.dot(rate, turn) + ca.dot(t, turned)
     twice = ca.vertcat(along, 0, 0) + 2.0 * (rate[0] + ca.dot(t, turn)) * turn + t[0] * turned
-    cubic = 0.5 * (a1 + a2) + m.p["L"] * (second / 12.0 - twice / 20.0)
+    cubic = m.middle[1] + m.p["L"] * (second / 12.0 - twice / 20.0)
     if not m.modal:
         return cubic
     y, seen, again = component_modes.offset_rates(m)

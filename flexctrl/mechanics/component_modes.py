@@ -88,8 +88,8 @@ def offset_rates(m: BeamMotion) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return `offset`, its rate and the rate of that, as seen by who turns with the frame."""
     import casadi as ca
 
-    own, spins = motion_of(m), [w - m.spin for w in m.rates[1::2]]
-    rates = [b - ca.cross(m.spin, w) - turning(m) for b, w in zip(m.accelerations[1::2], m.rates[1::2], strict=True)]
+    own, spins = motion_of(m), [w - m.spin for w in m.rates[::2]]
+    rates = [b - ca.cross(m.spin, w) - turning(m) for b, w in zip(m.accelerations[::2], m.rates[::2], strict=True)]
     first = [ca.cross(w, t) for w, t in zip(spins, m.axes, strict=True)]
     second = [ca.cross(b, t) + ca.cross(w, u) for b, w, t, u in zip(rates, spins, m.axes, first, strict=True)]
     now = ca.vertcat(*m.axes, own.amplitudes)
@@ -132,53 +132,54 @@ def stiffness(m: BeamMotion) -> ca.SX:
 
 
 def momenta(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[tuple[ca.SX, ...], ca.SX]:
-    """Return what modal rates add to the momenta of the nodes (four blocks), and the momenta of the modes.
+    """Return what modal rates add to the momenta that go with ``rates`` (three blocks), and the momenta of the modes.
 
     All less those of the mean motion, ½(v₁ + v₂) + L/12 (ω₁ − ω₂) × e₁ and the modes' `deflection`.
 
     Parameters
     ----------
     m : BeamMotion
-    rates : tuple of four casadi.SX
-        v₁, ω₁, v₂, ω₂ in the frame, or accelerations.
+    rates : tuple of three casadi.SX
+        ω₁, v₂ − v₁, ω₂ in the frame, or accelerations.
     modal : casadi.SX
         Rates of the modes, or accelerations.
     """
     import casadi as ca
 
     modes, L, mass = modes_of(m), m.p["L"], m.p["mass"]
-    blocks = [ca.SX(3, 1) for _ in range(4)]
+    first, apart, second = (ca.SX(3, 1) for _ in range(3))
+    half = 0.5 * rates[1]
     pushed_modes: list[ca.SX] = []
     for eta, across, (axis, sign, about) in zip(planes(m, modal), _ACROSS, _PLANES, strict=True):
         rotary = _rotary(m, about) / L
-        ends = ca.vertcat(rates[0][across], sign * L * rates[1][axis], rates[2][across], sign * L * rates[3][axis])
+        ends = ca.vertcat(-half[across], sign * L * rates[0][axis], half[across], sign * L * rates[2][axis])
         coupling = mass * ca.DM(modes.mass) + rotary * ca.DM(modes.rotary)
         pushed = coupling @ eta
-        for i in (0, 2):
-            blocks[i][across] += pushed[i]
-            blocks[i + 1][axis] += sign * L * pushed[i + 1]
+        first[axis] += sign * L * pushed[1]
+        apart[across] += 0.5 * (pushed[2] - pushed[0])
+        second[axis] += sign * L * pushed[3]
         pushed_modes.append(coupling.T @ ends + mass * eta + rotary * (ca.DM(modes.slope) @ eta))
     held = held_of(m)
-    for eta, first, inertia in zip(lines(m, modal), (0, 1), (mass, m.p["polar"]), strict=True):
-        pushed = inertia * (ca.DM(held.ends) @ eta)
-        for i, push in zip((first, first + 2), (pushed[0], pushed[1]), strict=True):
-            blocks[i][0] += push
-        ends = ca.vertcat(rates[first][0], rates[first + 2][0])
+    stretched, twisted = (ca.DM(held.ends) @ eta for eta in lines(m, modal))
+    apart[0] += 0.5 * mass * (stretched[1] - stretched[0])
+    first[0] += m.p["polar"] * twisted[0]
+    second[0] += m.p["polar"] * twisted[1]
+    along = (ca.vertcat(-half[0], half[0]), ca.vertcat(rates[0][0], rates[2][0]))
+    for eta, ends, inertia in zip(lines(m, modal), along, (mass, m.p["polar"]), strict=True):
         pushed_modes.append(inertia * (ca.DM(held.ends).T @ ends + ca.DM(held.mass) @ eta))
-    shared = _shared(m, rates, modal)
-    return tuple(b - s for b, s in zip(blocks, shared[:4], strict=True)), ca.vertcat(*pushed_modes) - shared[4]
+    turn, shared = _shared(m, rates, modal)
+    return (first - turn, apart, second + turn), ca.vertcat(*pushed_modes) - shared
 
 
-def _shared(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[ca.SX, ...]:
-    """What the mean motion has of these momenta: that of modal rates on the nodes, and all of it on the modes."""
+def _shared(m: BeamMotion, rates: tuple[ca.SX, ...], modal: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """What the mean motion has of these momenta: that of modal rates on ω₁ (and −ω₂), and all of it on the modes."""
     import casadi as ca
 
     mass, arm = m.p["mass"], ca.vertcat(m.p["L"] / 12.0, 0, 0)
     values = ca.SX.sym("values", modal.numel())
     own = deflection(m, modal)
-    mean = 0.5 * (rates[0] + rates[2]) + ca.cross(rates[1] - rates[3], arm) + own
-    half, turn = 0.5 * mass * own, ca.cross(arm, mass * own)
-    return half, turn, half, -turn, ca.gradient(ca.dot(deflection(m, values), mass * mean), values)
+    mean = ca.cross(rates[0] - rates[2], arm) + own
+    return ca.cross(arm, mass * own), ca.gradient(ca.dot(deflection(m, values), mass * mean), values)
 
 
 def _rotary(m: BeamMotion, about: str) -> ca.SX:

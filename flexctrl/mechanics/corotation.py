@@ -3,7 +3,8 @@
 The element frame R_e has its x axis through both nodes and its twist from the mean of the nodal
 rotations. Deformations are measured in it: the stretch of the chord and the rotation vectors
 θ₁, θ₂ of the nodes. Velocities of the nodes seen in the frame carry the constant consistent mass
-matrix (Crisfield, Galvanetto & Jelenić 1997).
+matrix (Crisfield, Galvanetto & Jelenić 1997). They are told by that of the middle of the chord, which only the mean
+motion of the element has to do with, and those beside it: ω₁, v₂ − v₁, ω₂.
 """
 
 from __future__ import annotations
@@ -100,8 +101,10 @@ class BeamMotion:
         Rotation vectors of the nodes against the frame [rad].
     spin : casadi.SX
         Spin of the frame.
-    rates, accelerations : tuple of four casadi.SX
-        v₁, ω₁, v₂, ω₂ and their rates, absolute, resolved in the frame.
+    middle : tuple of two casadi.SX
+        Velocity and acceleration of the middle of the chord, absolute, resolved in the frame.
+    rates, accelerations : tuple of three casadi.SX
+        ω₁, v₂ − v₁, ω₂ and their rates, absolute, resolved in the frame.
     modal : OwnMotion, or empty
         That of the element's own modes.
     lean : casadi.SX or float
@@ -116,8 +119,9 @@ class BeamMotion:
     stretch: ca.SX
     theta: tuple[ca.SX, ca.SX]
     spin: ca.SX
-    rates: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
-    accelerations: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
+    middle: tuple[ca.SX, ca.SX]
+    rates: tuple[ca.SX, ca.SX, ca.SX]
+    accelerations: tuple[ca.SX, ca.SX, ca.SX]
     modal: OwnMotion | tuple[()] = ()
     lean: ca.SX | float = 1.0
 
@@ -142,10 +146,10 @@ def turning(m: BeamMotion) -> ca.SX:
     """Return the rate of the frame's spin, resolved in the frame."""
     import casadi as ca
 
-    v = m.rates[2] - m.rates[0]
-    apart = m.accelerations[2] - m.accelerations[0] - ca.cross(m.spin, v) - v * v[0] / m.chord
+    v = m.rates[1]
+    apart = m.accelerations[1] - ca.cross(m.spin, v) - v * v[0] / m.chord
     about_y, about_z = -apart[2] / m.chord, apart[1] / m.chord
-    spins, rates = m.rates[1::2], m.accelerations[1::2]
+    spins, rates = m.rates[::2], m.accelerations[::2]
     sides = [ca.cross(w - m.spin, q) for w, q in zip(spins, m.sides, strict=True)]
     twist = about_y * m.normal[0]
     for w, b, arm, side in zip(spins, rates, m.arms, sides, strict=True):
@@ -186,14 +190,18 @@ def beam_motion(
     e3 = e3 / ca.sqrt(ca.if_else(sound, upright, float("nan")))
     e2 = ca.cross(e3, e1)
     frame = ca.horzcat(e1, e2, e3)
-    rates, accelerations = (first.v, first.w, second.v, second.w), (first.a, first.b, second.a, second.b)
+    axes = [frame.T @ (node.R @ rest[:, 0]) for node in (first, second)]
+    sides = [frame.T @ side for side in sides]
+    middle = (0.5 * (first.v + second.v), 0.5 * (first.a + second.a))
+    rates, accelerations = (first.w, second.v - first.v, second.w), (first.b, second.a - first.a, second.b)
     m = framed_motion(
         p,
         frame,
         chord,
-        tuple(frame.T @ (node.R @ rest[:, 0]) for node in (first, second)),
-        tuple(frame.T @ side for side in sides),
-        tuple(rotation_vector(frame.T @ (node.R @ rest)) for node in (first, second)),
+        tuple(axes),
+        tuple(sides),
+        tuple(rotation_vector(ca.horzcat(x, y, ca.cross(x, y))) for x, y in zip(axes, sides, strict=True)),
+        tuple(frame.T @ v for v in middle),
         tuple(frame.T @ v for v in rates),
         tuple(frame.T @ a for a in accelerations),
         modal,
@@ -208,6 +216,7 @@ def framed_motion(
     axes: tuple[ca.SX, ...],
     sides: tuple[ca.SX, ...],
     theta: tuple[ca.SX, ...],
+    middle: tuple[ca.SX, ...],
     rates: tuple[ca.SX, ...],
     accelerations: tuple[ca.SX, ...],
     modal: OwnMotion | tuple[()] = (),
@@ -215,8 +224,7 @@ def framed_motion(
     """Return the motion of an element from what is seen in its frame; ``axes``, ``sides``: first, second of nodes."""
     import casadi as ca
 
-    dv = rates[2] - rates[0]
-    spin_y, spin_z = -dv[2] / chord, dv[1] / chord
+    spin_y, spin_z = -rates[1][2] / chord, rates[1][1] / chord
     m = BeamMotion(
         p=p,
         frame=frame,
@@ -226,11 +234,12 @@ def framed_motion(
         stretch=chord - p["L"],
         theta=theta,  # type: ignore[arg-type]
         spin=ca.vertcat(0, spin_y, spin_z),
+        middle=middle,  # type: ignore[arg-type]
         rates=rates,  # type: ignore[arg-type]
         accelerations=accelerations,  # type: ignore[arg-type]
         modal=modal,
     )
-    twist = 0.5 * (ca.dot(rates[1], m.arms[0]) + ca.dot(rates[3], m.arms[1]))
+    twist = 0.5 * (ca.dot(rates[0], m.arms[0]) + ca.dot(rates[2], m.arms[1]))
     return replace(m, spin=ca.vertcat((twist + spin_y * m.normal[0]) / m.normal[1], spin_y, spin_z))
 
 

@@ -138,11 +138,17 @@ def turn_kernel(rotation: Callable[[ca.SX], ca.SX] = rotation_of) -> Kernel:
 
 
 def turned_rows(rows: ca.SX, by: ca.SX) -> ca.SX:
-    """Return a rotation times R, R given and returned row by row, nearer to orthonormal than R."""
+    """Return a rotation times R, R given and returned row by row, nearer to orthonormal than R.
+
+    Its first two rows are made so to first order in what they are not; the third is across them.
+    """
     import casadi as ca
 
-    R = by @ ca.reshape(rows, 3, 3).T
-    return ca.vec((R @ (1.5 * ca.DM.eye(3) - 0.5 * R.T @ R)).T)
+    R = ca.reshape(rows, 3, 3).T
+    one, two = by[0, :] @ R, by[1, :] @ R
+    skew = 0.5 * ca.dot(one, two)
+    first, second = ((1.5 - 0.5 * ca.dot(own, own)) * own - skew * other for own, other in ((one, two), (two, one)))
+    return ca.vertcat(first.T, second.T, ca.cross(first, second).T)
 
 
 def exponential(theta: np.ndarray) -> np.ndarray:

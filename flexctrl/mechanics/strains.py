@@ -118,8 +118,8 @@ def deformation_rates(m: BeamMotion) -> ca.SX:
     import casadi as ca
 
     # the rate of a rotation vector is T⁻¹ times the relative spin; T⁻¹(θ) = T⁻ᵀ(−θ)
-    turning = [inverse_tangent(-t, m.rates[k] - m.spin) for t, k in zip(m.theta, (1, 3), strict=True)]
-    return ca.vertcat(m.lean * (m.rates[2] - m.rates[0])[0], *turning)
+    turning = [inverse_tangent(-t, w - m.spin) for t, w in zip(m.theta, m.rates[::2], strict=True)]
+    return ca.vertcat(m.lean * m.rates[1][0], *turning)
 
 
 def strain_rates(m: BeamMotion) -> ca.SX:
