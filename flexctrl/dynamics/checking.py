@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
+from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.peaks import peaked
 from flexctrl.dynamics.notes.rates import rated
 from flexctrl.dynamics.others import UNCHECKED, Beginning, Other, made, noted, standing
 from flexctrl.dynamics.run import Run, Status
-from flexctrl.dynamics.steps import Fixed
+from flexctrl.dynamics.steps import Controlled, Fixed
 
 __all__ = ["laid_beside", "news"]
 
@@ -21,6 +24,8 @@ _FARTHER = 5.0 / 3.0
 """How far the last one is, in powers: 243 times the tolerance."""
 _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
+_ALIKE = 0.7
+"""A coarser run with more of the steps is much the same, and makes the same errors."""
 _NEARLY = 0.001
 """A thirtieth of what is noted: coarser runs have told of rattling too little by seven times."""
 
@@ -28,7 +33,8 @@ _NEARLY = 0.001
 def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> Run:
     """Return the run with what a coarser one tells of it; where that is much, a second one has the last word.
 
-    Where they tell little, one far coarser shows how errors grow with the tolerance, and a note says whether it goes
+    Where it takes nearly as many steps, as something else keeps them short, a finer one has the last word. Where
+    they tell little, one far coarser shows how errors grow with the tolerance, and a note says whether it goes
     elsewhere; of steps of one length the others know enough.
 
     Parameters
@@ -62,6 +68,9 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if not first or first[0].run.status is Status.INTERRUPTED:
         return told, ()
     other = first[0]
+    if isinstance(method.pace, Controlled) and other.run.report.steps > _ALIKE * run.report.steps:
+        halved, finer = _halved(replace(run, checkpoint=told.checkpoint), journey, method, beginning)
+        return (halved, (other, *finer)) if finer else (told, (other,))
     nearer: tuple[Other, ...] = ()
     nearby = method.coarser(tolerance, _NEARER)
     quiet = told.report.error < _LITTLE and not news(told, run)
@@ -110,25 +119,20 @@ def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning
     return _as_much(known, finer), others
 
 
+def _halved(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
+    """The run with what one in half the steps tells, also of those that are kept short."""
+    mean = run.final.t / max(run.report.steps, 1)
+    usual = journey.plan.feed.sample_time or 2.0 ** math.floor(math.log2(mean))  # the same when the run goes on
+    return _told(run, journey, method.finer(journey.plan.tolerance, usual, 0.5), beginning)
+
+
 def _order(near: Other, far: Other, most: float) -> float:
-    """The order of errors as two runs beside show it: of what they are apart no more than all is the finer one's.
-
-    With errors that grow as rᵖ the gaps are as rᵖ − 1; what does not grow so, as where corners come one after another,
-    has a lower order than its method.
-    """
-    from scipy.optimize import brentq
-
+    """The order of errors as two runs beside show it: of what they are apart no more than all is the finer one's."""
     if not near.gap.most or _reached(near.run) != _reached(far.run):
         return most
-    one, other = math.log(near.beside.longer), math.log(far.beside.longer)
-    ratio, least = far.gap.most / near.gap.most, min(math.log(2.0) / one, most)
-
-    def short(order: float) -> float:
-        return math.expm1(order * other) - ratio * math.expm1(order * one)
-
-    if short(least) >= 0.0:
-        return least
-    return float(brentq(short, least, most)) if short(most) > 0.0 else most
+    longer = near.beside.longer, far.beside.longer
+    least = np.array([least_order(longer[0], most)])
+    return float(orders_seen(np.array([near.gap.most]), np.array([far.gap.most]), longer, (least, most))[0])
 
 
 def _grown(

@@ -224,11 +224,16 @@ class Feed:
         return replace(self._answered(t, y, supply.x), trend=supply.trend, most=supply.most)
 
     def _answered(self, t: float, y: np.ndarray, x: np.ndarray) -> Supply:
+        u, rate = self.answer(t, y, x)
+        return Supply(np.array(u), x, rate)
+
+    def answer(self, t: float, y: np.ndarray, x: np.ndarray) -> tuple[list[float], np.ndarray]:
+        """Return the inputs that a continuous controller in state x gives, and how fast that changes."""
         c = self.controller
         assert c is not None
         try:
             rate = state_of(c, c.rate(t, x, y), "rate", x.size) if x.size else x
-            return Supply(np.array(self._total(c.command(t, x, y))), x, rate)
+            return self._total(c.command(t, x, y)), rate
         except Exception as error:
             raise blamed(error)  # noqa: B904 - its cause is set
 

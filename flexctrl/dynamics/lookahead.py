@@ -9,6 +9,7 @@ ended before; a jump is found by bisection, and steps end there as at a break.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -146,7 +147,7 @@ def _asked(journey: Journey, span: float, count: int) -> _Course:
     beyond = span < journey.stops.next - t  # what jumps right at the end is seen, too
     shares = np.concatenate([[0.0], (k + (_GOLDEN * k + 0.5) % 1.0) / count, [1.0 + (_TOUCH if beyond else -_TOUCH)]])
     times = t + span * np.sort(shares)
-    values = np.array([_said(journey, s) for s in times.tolist()])
+    values = np.array(list(_said(journey, times.tolist())))
     swing = np.ptp(values, axis=0)
     swing[swing <= _ROUND_OFF * np.abs(values).max(axis=0)] = 0.0
     before = np.array(mark.swings) if mark.swings else np.zeros(swing.size)
@@ -154,11 +155,13 @@ def _asked(journey: Journey, span: float, count: int) -> _Course:
     return _Course(times, values, np.where(np.array(mark.swings) > 0.0, mark.swings, math.inf))
 
 
-def _said(journey: Journey, t: float) -> np.ndarray:
-    """What the law would say at a time, if it read what it does here."""
+def _said(journey: Journey, times: list[float]) -> Iterator[list[float]]:
+    """What the law would say at some times, if it read what it does here."""
     feed, point = journey.plan.feed, journey.point
-    said = feed.renewed(t, feed.measured(point.state), point.supply)
-    return np.append(said.u, said.rate)
+    y, x = feed.measured(point.state), point.supply.x
+    for t in times:
+        u, rate = feed.answer(t, y, x)
+        yield [*u, *rate.tolist()]
 
 
 def _jump(journey: Journey, course: _Course) -> float | None:
@@ -167,7 +170,7 @@ def _jump(journey: Journey, course: _Course) -> float | None:
     (a, b), (low, high) = course.times[at : at + 2].tolist(), course.values[at : at + 2]
     whole = np.max(np.abs(high - low) / course.swings)
     while a < (middle := 0.5 * (a + b)) < b:
-        said = _said(journey, middle)
+        said = np.array(*_said(journey, [middle]))
         if np.max(np.abs(said - low) / course.swings) > np.max(np.abs(high - said) / course.swings):
             b, high = middle, said
         else:

@@ -74,7 +74,7 @@ def simulate(
         it goes on until one happens again.
     inputs : mapping of str to float, optional
         Constant inputs, applied as a step at the start; a controller's commands add to them. A `Checkpoint` brings its
-        own along, and takes no others.
+        own along, and takes no others. Functions of time are a controller: ``OpenLoop({"push": lambda t: …})``.
     method : Integrator, optional
         Default: `AdaptiveAlpha`, steps chosen to meet ``tolerance``, with a coarser run laid beside where small
         differences may grow (`Checked`); for a linear model `Exact`, with a state at every row, or at the steps of the

@@ -323,6 +323,11 @@ class Model:
         for name, value in inputs.items():
             if name not in self.inputs:
                 raise StructureError(f"model has no input {name!r}{did_you_mean(name, self.inputs)}")
+            if callable(value):
+                raise StructureError(
+                    f"model: input {name!r} is a function; expected a number: functions of time are a controller, "
+                    f"OpenLoop({{{name!r}: …}})"
+                )
             u[self.inputs.index(name)] = check_finite(value, f"input {name!r}", "model")
         return u
 

@@ -26,7 +26,7 @@ def off(run: fc.Run, push: float) -> float:
     return float(np.abs(run["x"] - 1.0 - right).max() / np.ptp(right))
 
 
-@pytest.mark.parametrize("push", [1e-6, 1e-5])
+@pytest.mark.parametrize("push", [1e-6, 1e-5, 1e-4])
 def test_what_is_smaller_than_errors_of_steps(push):
     run = fc.simulate(oscillator(), until=1.0, inputs={"push": push})
     (note,) = [note for note in run.report.notes if note.startswith("nothing moves by more than")]

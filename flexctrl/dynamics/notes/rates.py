@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.gap import interpolated
+from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.outputs import fast, ways
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
@@ -28,7 +29,6 @@ _SEEN, _LITTLE = 10.0, 1e-3
 """What counts: so many absolute tolerances, and a share of its largest value."""
 _LEAST = 0.5
 """Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
-_HALVINGS = 40
 _SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
 _ABOUT = " {name} rings by", " largest {name} is", " peaks of {name} may"
 
@@ -94,40 +94,41 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     -------
     Run
     """
-    model = journey.plan.model
-    judged = fast(model) if isinstance(model, Model) and len(run.y) >= _POINTS else []
-    ended = [each for each in others if each[0].final.t >= run.final.t * (1.0 - _NEAR)] or others
-    apart = [Apart.of(run, other, longer) for other, longer in ended if len(other.t)]
-    if not (judged and apart):
+    way = _judged(run, journey)
+    apart = _apart(run, others) if way else []
+    if not apart:
         return run
     steady = isinstance(journey.plan.method.pace, Fixed)
-    off, way, most = _off(apart, run.report.order, steady), ways(journey, run.y), np.abs(run.y).max(axis=0)
-    least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
-    counted = [i for i in judged if np.inf > way[i] > max(least[i], _LITTLE * most[i])]
-    known = run.report.output_errors
-    found = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in counted}
+    off, known = _off(apart, run.report.order, steady), run.report.output_errors
+    found = {run.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in way}
     shares = {name: max(share, known.get(name, 0.0)) for name, share in found.items()}
     return replace(run, report=replace(run.report, output_errors={**known, **shares}))
+
+
+def _judged(run: Run, journey: Journey) -> dict[int, float]:
+    """The forces and rates that count, and what each goes through."""
+    model = journey.plan.model
+    if not isinstance(model, Model) or len(run.y) < _POINTS:
+        return {}
+    way, most = ways(journey, run.y), np.abs(run.y).max(axis=0)
+    least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
+    return {i: float(way[i]) for i in fast(model) if np.inf > way[i] > max(least[i], _LITTLE * most[i])}
+
+
+def _apart(run: Run, others: Sequence[tuple[Run, float]]) -> list[Apart]:
+    """How far others are from a run: those that ended as late, if any did."""
+    ended = [each for each in others if each[0].final.t >= run.final.t * (1.0 - _NEAR)] or others
+    return [Apart.of(run, other, longer) for other, longer in ended if len(other.t)]
 
 
 def _off(apart: list[Apart], order: float, steady: bool) -> np.ndarray:
     """By how much each output may be off: by a finer run if there is one, else by the nearest coarser one."""
     near, *farther = sorted(apart, key=lambda a: a.longer)
-    least = order if steady or near.longer < 1.0 else min(np.log(2.0) / np.log(near.longer), order)
-    orders = np.full(near.most.shape, least)
-    return near.left(_orders(near, farther[-1], orders, order) if farther and near.longer > 1.0 else orders)
-
-
-def _orders(near: Apart, far: Apart, least: np.ndarray, most: float) -> np.ndarray:
-    """The order p by which gaps go, rᵖ − 1 of each; the least where there is but one."""
-    if near.longer == far.longer:
-        return least
-    low, high = least.copy(), np.full(least.shape, most)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        above = far.most * (near.longer**middle - 1.0) > near.most * (far.longer**middle - 1.0)
-        low, high = np.where(above, middle, low), np.where(above, high, middle)
-    return low
+    least = np.full(near.most.shape, order if steady or near.longer < 1.0 else least_order(near.longer, order))
+    if not farther or near.longer < 1.0 or near.longer == farther[-1].longer:
+        return near.left(least)
+    far = farther[-1]
+    return near.left(orders_seen(near.most, far.most, (near.longer, far.longer), (least, order)))
 
 
 def _between(run: Run, t: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:

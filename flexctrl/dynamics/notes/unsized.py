@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["little", "unsized"]
 
-_LITTLE, _NOTHING, _FIT = 2.0, 1e-2, 1e-3
-"""Absolute tolerances that a motion goes through: as little as steps may err by, no more than rounding; what fits."""
+_LITTLE, _NOTHING, _FIT = 20.0, 1e-2, 1e-3
+"""Absolute tolerances that a motion goes through: a few errors of steps, no more than rounding; what fits."""
 
 
 def unsized(journey: Journey) -> tuple[str, ...]:
@@ -47,7 +47,7 @@ def unsized(journey: Journey) -> tuple[str, ...]:
 
 
 def little(journey: Journey) -> tuple[str, ...]:
-    """Return what is to be said of a motion that is smaller than what each of its steps may err by.
+    """Return what is to be said of a motion that is little against what each of its steps may err by.
 
     Parameters
     ----------
