@@ -122,7 +122,7 @@ def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning
 def _halved(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
     """The run with what one in half the steps tells, also of those that are kept short."""
     mean = run.final.t / max(run.report.steps, 1)
-    usual = journey.plan.feed.sample_time or 2.0 ** math.floor(math.log2(mean))  # the same when the run goes on
+    usual = journey.plan.feed.sample_time or 2.0 ** round(math.log2(mean))  # the same when the run goes on
     return _told(run, journey, method.finer(journey.plan.tolerance, usual, 0.5), beginning)
 
 

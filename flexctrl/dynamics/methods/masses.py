@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Counts
 from flexctrl.errors import SingularMatrixError
+from flexctrl.frozen import frozen
+from flexctrl.model.flat.flattening import Flattened, can_be_flat, flatten
+from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import Plan, Solve, factorise, plan
 from flexctrl.model.state import State
@@ -18,6 +22,25 @@ __all__ = ["Masses"]
 
 _EXACT = 1e-12
 _SWEEPS = 12
+
+
+@frozen(eq=False)
+class _Entire:
+    """A machine of few freedoms, all accelerations of which one kernel tells."""
+
+    flattened: Flattened
+
+    def accelerations(self, state: State, u: np.ndarray) -> np.ndarray | None:
+        """Return the accelerations of a state under its inputs; None where the kernel does not tell them."""
+        F, f = self.flattened, self.flattened.flat
+        pose = f.pose.reshape(-1, 12)
+        pose[:, :3], pose[:, 3:] = state.x, state.R.reshape(-1, 9)
+        f.q[: f.n], f.v[: f.n] = state.q[F.plan.order], state.v[F.plan.order]
+        f.driven[:], f.u[:] = state.driven, u
+        if not F.keeps_shape:
+            return None
+        f.entire[0](f.z, f.z)
+        return F.own(f.answer) if np.isfinite(f.answer).all() else None
 
 
 @dataclass
@@ -46,6 +69,15 @@ class Masses:
         if self.made_at is not None:
             self.make(self.made_at)
 
+    @cached_property
+    def _entire(self) -> _Entire | None:
+        """Kernels of the whole machine, if it has such; where contacts stick or slide, they do not tell."""
+        model = self.model
+        if not isinstance(model, Model) or model.switches.names or not can_be_flat(model):
+            return None
+        flattened = flatten(model)
+        return _Entire(flattened) if flattened.entire.runs and not flattened.entire.pressing else None
+
     def make(self, state: State) -> None:
         """Factorise the mass matrix of a state.
 
@@ -67,6 +99,8 @@ class Masses:
 
     def accelerations(self, state: State, u: np.ndarray, guess: np.ndarray) -> np.ndarray:
         """Return the accelerations of a state under its inputs."""
+        if self._entire is not None and (told := self._entire.accelerations(state, u)) is not None:
+            return told
         loads = self.model.loads(state, u)
         return self.solve(lambda a: -self.model.balance(state, state.v, a) - loads, state, guess)
 
