@@ -33,6 +33,7 @@ __all__ = [
     "Judging",
     "Mark",
     "Pace",
+    "Parting",
     "Point",
     "Reusable",
     "StepError",
@@ -238,6 +239,19 @@ class Judging(Stepper[P], Protocol[P]):
 
     def remains(self, share: float) -> float:
         """Return what a run is off by whose local errors add up to a share of the motion."""
+
+
+@runtime_checkable
+class Parting(Protocol):
+    """A stepper of two runs side by side.
+
+    Attributes
+    ----------
+    parted : numpy.ndarray, shape (n,)
+        How far they have been apart at most, where that was looked at.
+    """
+
+    parted: np.ndarray
 
 
 @runtime_checkable

@@ -116,6 +116,7 @@ class _Stepper:
         self.between = Difference(self.model)
         self.local = _Apart(self.model)
         self.seen = _Seen(self.model)
+        self.parted = np.zeros(self.model.n)
 
     def curve(self, before: Point, after: Point) -> _Course:
         """Return the motion over a step."""
@@ -225,7 +226,8 @@ class _Stepper:
         return self.coarse.error(before.coarse, after.coarse, h, moved, tolerance)
 
     def missed(self, before: _Point, after: _Point) -> np.ndarray:
-        """Return the local error of the coarser run."""
+        """Return the local error of the coarser run; look how far the two are apart."""
+        self.parted = np.maximum(self.parted, np.abs(self.between(after.coarse.state, after.fine.state)))
         return cast("Judging[Any]", plain_of(self.coarse)).missed(before.coarse, after.coarse)
 
     def remains(self, share: float) -> float:

@@ -17,6 +17,8 @@ __all__ = ["Drift", "drifted", "remedy"]
 
 _TOLD, _AIM = 0.03, 0.01
 _REST = 10.0
+_ASTRAY = 0.3
+"""What has gone as far astray no extrapolation mends."""
 _MOST = 10.0
 """Nearer to where it stands on its head a pendulum's period grows by more than its energy tells."""
 
@@ -138,4 +140,4 @@ def remedy(journey: Journey, share: float) -> str:
     else:
         finer = pace.step * (_AIM / share) ** (1.0 / max(2.0 * power, plan.method.order))
         said = f"take steps of {finer:.1g} s"
-    return said + ", or take Richardson of the method" * (plan.method.order == 2)
+    return said + ", or take Richardson of the method" * (plan.method.order == 2 and share < _ASTRAY)

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from flexctrl.dynamics.notes.adding import remedy
 from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.steps import Parting
 from flexctrl.model.model import Model
 from flexctrl.structure.outputs import (
     AngularVelocity,
@@ -29,6 +30,8 @@ __all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reac
 
 _TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
 _NAMED = 3
+_LEFT = 16.0 / 9.0
+"""Two runs that lag by φ and φ/4 behind a vibration ±a are ¾ φ a apart; what is extrapolated is off by ½ φ² a."""
 _BY_SUMS = "{name} has moved by {way:.2g}, and errors of {steps} steps may have added up to {far} of that: {remedy}"
 _BESIDE_IT = "by a {kind} run, {name} is off by {far} of its motion, which is {way:.2g}: {remedy}"
 _PLACES = (Position, SwayAngle, Rotation, DriveAngle)
@@ -82,6 +85,9 @@ def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:
     sight = reach(journey)
     off = sight @ late
     way, judged = _seen(journey, y, sight)
+    if isinstance(journey.judging, Parting):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.fmax(off, _LEFT * (sight @ journey.judging.parted) ** 2 / way)
     shares = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in judged}
     return OutputErrors(shares, _notes(journey, y, shares, journey.drift.share, _BY_SUMS))
 

@@ -30,6 +30,10 @@ _SEEN, _LITTLE = 10.0, 1e-3
 _LEAST = 0.5
 """Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
 _SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
+_LINEAR = (
+    "what errors of steps do to single outputs is not told of a linear model: the method Exact makes none, and is its "
+    "default"
+)
 _ABOUT = " {name} rings by", " largest {name} is", " peaks of {name} may"
 
 
@@ -158,7 +162,9 @@ def said_of_rates(run: Run, journey: Journey) -> Run:
     Run
     """
     model, report = journey.plan.model, run.report
-    names = [model.outputs[i] for i in fast(model)] if isinstance(model, Model) else []
+    if not isinstance(model, Model):  # linear equations; `judging` is None where they are solved exactly
+        return run if journey.judging is None else replace(run, report=replace(report, notes=(*report.notes, _LINEAR)))
+    names = [model.outputs[i] for i in fast(model)]
     shares = {name: report.output_errors.get(name, 0.0) for name in names if not is_named(name, report.notes)}
     far = [name for name in shares if shares[name] > max(_NOTED, _BESIDE * report.error)]
     if not far:
