@@ -120,6 +120,8 @@ class Journey:
         Until when the law is known to follow a line, with what it reads held [s]; infinity if nothing is in sight.
     seen : tuple of int and float
         How many steps had been taken when their number was last foreseen, and when that was [s].
+    interruption : Interruption
+        Whether Ctrl-C has been pressed.
     """
 
     plan: Plan
@@ -146,6 +148,7 @@ class Journey:
     horizon: float = math.inf
     seen: tuple[int, float] = (0, 0.0)
     saved: Checkpoint | None = None
+    interruption: Interruption = field(default_factory=Interruption)
     _memory: Any = None
     _counts: Counts = field(default_factory=Counts)
     _told: float = 0.0
@@ -156,8 +159,8 @@ class Journey:
         self.pause()
         began = self.point
         try:
-            with Interruption() as interruption:
-                self._through_stops(interruption)
+            with self.interruption:
+                self._through_stops()
         except KeyboardInterrupt:
             self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
         except (ControllerError, EventError, Unwritten) as error:
@@ -272,7 +275,7 @@ class Journey:
         """What times are told apart by [s]."""
         return 1e-12 * self.plan.until
 
-    def _through_stops(self, interruption: Interruption) -> None:
+    def _through_stops(self) -> None:
         end, self._told = self.plan.until - self.tick, time.perf_counter()
         self._kept = self._told
         while self.status is Status.FINISHED:
@@ -293,7 +296,7 @@ class Journey:
             if self.plan.autosave is not None and now - self._kept > self.plan.autosave.seconds:
                 self._kept = now
                 self._keep(self.plan.autosave.path)
-            interruption.check()
+            self.interruption.check()
 
     def pause(self) -> None:
         """Take note of what later steps depend on, and what they have cost so far."""
@@ -303,10 +306,15 @@ class Journey:
         """Go on towards a stop, by many steps at once (``most`` of them) or by one, not passing ``until``."""
         if not self.balked and ride(self, until, most):
             return
-        if isinstance(self.plan.method.pace, Fixed):
-            fixed(self, stop, until)
-        else:
-            controlled(self, stop, until)
+        begun = self.snapshot()
+        try:
+            if isinstance(self.plan.method.pace, Fixed):
+                fixed(self, stop, until)
+            else:
+                controlled(self, stop, until)
+        except KeyboardInterrupt:  # a step in pieces is taken again as a whole
+            self.saved = self.saved or begun
+            raise
         self.balked = False
 
     @property

@@ -135,6 +135,7 @@ def towards(journey: Journey, before: Point, h: float) -> Point:
     """
     for take in [journey.briefly, journey.exactly] if isinstance(journey.stepper, Brief) else [journey.exactly]:
         for k in range(TRIES):
+            journey.interruption.check()  # of a step that ends nowhere there may be hundreds
             try:
                 return take(before, h * (1.0 - shorter(k)))
             except StepError as error:
