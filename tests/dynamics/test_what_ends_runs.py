@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 
 import numpy as np
@@ -159,7 +160,7 @@ def light(mass: float) -> fc.Model:
 def test_a_singular_tangent_tells_its_time(method):
     run = fc.simulate(light(1e-200), until=1.0, method=method)
     assert run.status is fc.Status.FAILED
-    assert "the tangent is singular at t = " in run.report.message
+    assert re.search("(the tangent is singular|the motion is not resolved) at t = ", run.report.message)
 
 
 def test_a_run_without_steps_has_nothing_between_them():
