@@ -17,7 +17,7 @@ __all__ = ["Drift", "drifted", "remedy"]
 
 _TOLD, _AIM = 0.03, 0.01
 _REST = 10.0
-_ASTRAY = 0.3
+_ASTRAY = 0.5
 """What has gone as far astray no extrapolation mends."""
 _MOST = 10.0
 """Nearer to where it stands on its head a pendulum's period grows by more than its energy tells."""
