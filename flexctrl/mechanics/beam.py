@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @frozen
 class BeamForce:
-    """A force on an element by what it works on; shares add, and reach the nodes by `nodal_force` once.
+    """A force on an element by what it works on; shares add, and reach the nodes by `whole_force` once.
 
     Attributes
     ----------
@@ -59,19 +59,6 @@ def no_force() -> BeamForce:
     return BeamForce(ca.SX(7, 1), ca.SX(3, 1), ca.SX(9, 1))
 
 
-def nodal_force(m: BeamMotion, force: BeamForce) -> ca.SX:
-    """Return the force on the nodes in space axes (12)."""
-    return _on_nodes(m, framed_force(m, force))
-
-
-def _on_nodes(m: BeamMotion, framed: ca.SX) -> ca.SX:
-    """What a `framed_force` does on the nodes, in space axes."""
-    import casadi as ca
-
-    middle, first, apart, second = (m.frame @ block for block in ca.vertsplit(framed[:12], 3))
-    return ca.vertcat(0.5 * middle - apart, first, 0.5 * middle + apart, second)
-
-
 def framed_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     """Return the force that works on the middle of the chord, ω₁, v₂ − v₁, ω₂ (12) and on own modes, in the frame.
 
@@ -106,7 +93,8 @@ def whole_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     import casadi as ca
 
     framed = framed_force(m, force)
-    return ca.vertcat(_on_nodes(m, framed), framed[12:])
+    middle, first, apart, second = (m.frame @ block for block in ca.vertsplit(framed[:12], 3))
+    return ca.vertcat(0.5 * middle - apart, first, 0.5 * middle + apart, second, framed[12:])
 
 
 def stress_force(m: BeamMotion, stress: ca.SX) -> BeamForce:

@@ -37,7 +37,7 @@ def motion(a, b):
 def force(share):
     def make(a, b):
         m = motion(a, b)
-        return beam.nodal_force(m, share(m))
+        return beam.whole_force(m, share(m))
 
     return make
 
@@ -225,7 +225,7 @@ def test_a_wire_that_bends_along_arcs_is_damped_as_bending(theta):
 
     def share(a, b):
         m = corotation.beam_motion(a, b, ca.SX(parameters(wire, length, np.eye(3))))
-        return beam.nodal_force(m, beam.viscous_force(m))
+        return beam.whole_force(m, beam.viscous_force(m))
 
     half = 0.5 * theta
     chord, nearing = (

@@ -38,7 +38,7 @@ def motion(a, b):
 
 def elastic(a, b):
     m = motion(a, b)
-    return beam.nodal_force(m, beam.elastic_force(m))
+    return beam.whole_force(m, beam.elastic_force(m))
 
 
 def strain(a, b):
