@@ -12,7 +12,7 @@ from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.peaks import peaked
-from flexctrl.dynamics.notes.rates import rated
+from flexctrl.dynamics.notes.rates import may_be_lost, rated
 from flexctrl.dynamics.others import UNCHECKED, Beginning, Other, made, noted, standing
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Controlled, Fixed
@@ -35,7 +35,7 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
 
     Where it takes nearly as many steps, as something else keeps them short, a finer one has the last word. Where
     they tell little, one far coarser shows how errors grow with the tolerance, and a note says whether it goes
-    elsewhere; of steps of one length the others know enough.
+    elsewhere. Of steps of one length the others know enough, or one nearer by if rates may have lost their phase.
 
     Parameters
     ----------
@@ -82,7 +82,9 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if parted:
         return elsewhere(told, other.gap, journey, coarser.said), (other, *nearer)
     if isinstance(method.pace, Fixed):
-        return told, (other, *nearer)
+        lost = not nearer and may_be_lost(run, other.run, journey)
+        kept, second = made(told, journey, nearby, beginning) if lost else (told, None)
+        return kept, (other, *nearer) if second is None else (other, second)
     farther = method.coarser(tolerance, _FARTHER)
     kept, third = made(told, journey, farther, beginning)
     if third is None:

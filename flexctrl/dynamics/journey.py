@@ -161,6 +161,7 @@ class Journey:
         try:
             with self.interruption:
                 self._through_stops()
+                self.interruption.check()  # it may have been pressed in the last step
         except KeyboardInterrupt:
             self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
         except (ControllerError, EventError, Unwritten) as error:
@@ -174,10 +175,13 @@ class Journey:
             self.status, self.message = Status.FAILED, f"{self._cause(str(failure))}; {where}"
         self.saved = self.saved or self.snapshot()
         self.books.close(self.point)
-        self._judge()
-        if self.status in (Status.FINISHED, Status.STOPPED):
-            self._look_for_growth(began)
-            self._look_at_parts(began.state)
+        try:
+            self._judge()
+            if self.status in (Status.FINISHED, Status.STOPPED):
+                self._look_for_growth(began)
+                self._look_at_parts(began.state)
+        except KeyboardInterrupt:
+            self.status, self.message = Status.INTERRUPTED, f"interrupted at t = {self.point.state.t:.6g} s"
 
     @cached_property
     def judging(self) -> Judging[Any] | None:

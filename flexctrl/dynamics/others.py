@@ -144,6 +144,8 @@ def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tu
     """
     if run.final.t <= beginning.t:
         return run, None
+    if journey.interruption.asked:
+        return noted(run, f"{UNCHECKED} (interrupted)"), None
     end, feed, start = run.final.t, beginning.again, beginning.beside(beside)
     if feed is None:
         return noted(run, f"{UNCHECKED}: the controller cannot be copied"), None

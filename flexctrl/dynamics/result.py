@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
+
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.notes.adding import drifted
 from flexctrl.dynamics.notes.left_out import left_out
@@ -41,12 +43,11 @@ def result(journey: Journey) -> Run:
         journey.fail(error)
         rows = journey.rows.recorder.table()
     width = len(plan.model.outputs)
-    journey.drift = drift = drifted(journey)
     y = rows[:, 1 : 1 + width]
-    journey.outputs = by_sums(journey, y)
-    journey.notes += strayed(journey) + unsized(journey) + little(journey) + unsure(journey, y) + left_out(journey)
-    if journey.status is not Status.FAILED:
-        journey.notes += (drift.note,) * bool(drift.note) + journey.outputs.notes
+    try:
+        _judged(journey, y)
+    except KeyboardInterrupt:  # nothing is lost but what is told of it
+        journey.notes += ("Ctrl-C, pressed twice, cut off what is told of errors",)
     return Run(
         rows[:, 0],
         plan.model.outputs,
@@ -63,6 +64,15 @@ def result(journey: Journey) -> Run:
         journey.track,
         journey.fault,
     )
+
+
+def _judged(journey: Journey, y: np.ndarray) -> None:
+    """Let a run know what errors of steps add up to, and what is to be said of it."""
+    journey.drift = drift = drifted(journey)
+    journey.outputs = by_sums(journey, y)
+    journey.notes += strayed(journey) + unsized(journey) + little(journey) + unsure(journey, y) + left_out(journey)
+    if journey.status is not Status.FAILED:
+        journey.notes += (drift.note,) * bool(drift.note) + journey.outputs.notes
 
 
 def _report(journey: Journey) -> Report:

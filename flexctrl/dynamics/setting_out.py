@@ -11,6 +11,7 @@ from flexctrl.dynamics.events.event import Event
 from flexctrl.dynamics.events.nearing import SMALLEST
 from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply
+from flexctrl.dynamics.interrupt import heed
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track, curves_of
@@ -119,6 +120,7 @@ def _begun(
     except SingularMatrixError as error:
         name = model.coordinates[error.where]
         raise MechanismError(f"simulate: {name} has neither mass nor stiffness; {needed(model, error.where)}") from None
+    heed()
     watch.begin(point)
     books = Books(plan.feed, point.state, plan.method, plan.tolerance)
     books.turn(point, size)

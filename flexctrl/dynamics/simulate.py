@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,14 @@ from flexctrl.dynamics.checking import laid_beside
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same
 from flexctrl.dynamics.events.event import Event
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.journey import Plan
+from flexctrl.dynamics.interrupt import Interruption
+from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.notes.answers import answers
 from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
 from flexctrl.dynamics.notes.leaving import leaves
-from flexctrl.dynamics.notes.rates import said_of_rates
+from flexctrl.dynamics.notes.rates import are_asked, said_of_rates
 from flexctrl.dynamics.notes.ringing import ringing
 from flexctrl.dynamics.others import Beginning
 from flexctrl.dynamics.records.record import InMemory, Record
@@ -139,20 +141,45 @@ def simulate(
         autosave,
         time.perf_counter(),
     )
-    with np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
+    with Interruption() as kept, np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
         journey, run = travelled(plan, start, events_of(events), record, spacing)
-        if beginning and feed.sample_time:
-            from flexctrl.dynamics.notes.sampled_growth import of_sampled_loop  # brings all that modes need
+        looked = run
+        try:
+            looked = _growing(run, journey, beginning)
+            if check and looked.status is not Status.FAILED:
+                looked = _compared(looked, journey, check, beginning, isinstance(method, Checked))
+        except KeyboardInterrupt:  # the second one: whatever is known by now
+            return _cut(looked)
+        return _cut(looked) if kept.asked else looked
 
-            run = of_sampled_loop(run, journey, beginning.again)
-        if run.status is Status.FAILED:
-            return run
-        if check and beginning and can_be_told(journey):
-            law = answers(run, journey, beginning.again)
-            if isinstance(method, Checked) or may_grow(journey, law) or leaves(run, journey, beginning.again):
-                told = laid_beside(run, journey, check, beginning, shorter(journey, law))
-                run = loosened(told, run, journey, beginning)
-        return said_of_rates(ringing(run, journey), journey) if check else run
+
+def _growing(run: Run, journey: Journey, beginning: Beginning | None) -> Run:
+    """The run with what is told of growth under a sampled law that its steps do not see."""
+    if not (beginning and journey.plan.feed.sample_time):
+        return run
+    from flexctrl.dynamics.notes.sampled_growth import of_sampled_loop  # brings all that modes need
+
+    return of_sampled_loop(run, journey, beginning.again)
+
+
+def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning | None, always: bool) -> Run:
+    """The run with what others beside it tell."""
+    if beginning and can_be_told(journey):
+        law = answers(run, journey, beginning.again)
+        asked = always or may_grow(journey, law) or are_asked(run, journey)
+        if asked or leaves(run, journey, beginning.again):
+            told = laid_beside(run, journey, check, beginning, shorter(journey, law))
+            run = loosened(told, run, journey, beginning)
+    return said_of_rates(ringing(run, journey), journey)
+
+
+def _cut(run: Run) -> Run:
+    """The run, interrupted at its end, as others were laid beside it."""
+    if run.status is Status.FAILED or run.status is Status.INTERRUPTED:
+        return run
+    ended = f"{run.report.message}; " if run.report.message else ""
+    message = f"{ended}interrupted at t = {run.final.t:.6g} s, as others were laid beside: not all is told of errors"
+    return replace(run, status=Status.INTERRUPTED, report=replace(run.report, message=message))
 
 
 def _default(model: Model | LinearModel, step: float) -> Integrator:

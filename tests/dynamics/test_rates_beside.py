@@ -75,17 +75,17 @@ def test_two_coarser_runs_tell_the_order(order):
 
     near, far = (Apart(r, 1.0, np.array([1e-3 * max(r**order - 1.0, 1.0 - 1.0 / r)])) for r in (3.0, 6.0))
     expected = 1e-3 if order else near.most[0]
-    assert _off([far, near], 2.0, steady=False)[0] == pytest.approx(expected, rel=1e-6)
+    assert _off([far, near], np.ones(1), 2.0, steady=False)[0] == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_single_coarser_run_may_be_right_where_this_one_is_wrong():
     from flexctrl.dynamics.notes.rates import _off
 
-    assert _off([Apart(3.0, 1.0, np.array([0.3]))], 2.0, steady=False)[0] == pytest.approx(0.3)
-    assert _off([Apart(2.0, 1.0, np.array([0.3]))], 2.0, steady=True)[0] == pytest.approx(0.1)
+    assert _off([Apart(3.0, 1.0, np.array([0.3]))], np.array([3.0]), 2.0, steady=False)[0] == pytest.approx(0.3)
+    assert _off([Apart(2.0, 1.0, np.array([0.3]))], np.array([3.0]), 2.0, steady=True)[0] == pytest.approx(0.1)
     finer = Apart(0.5, 1.0, np.array([0.3]))
-    assert _off([finer], 2.0, steady=False)[0] == pytest.approx(0.4)
-    assert _off([Apart(3.0, 1.0, np.array([0.9])), finer], 2.0, steady=False)[0] == pytest.approx(0.4)
+    assert _off([finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.4)
+    assert _off([Apart(3.0, 1.0, np.array([0.9])), finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.4)
 
 
 def test_rows_at_other_times_are_laid_beside_what_is_between():
@@ -107,3 +107,14 @@ def test_rows_that_are_no_numbers_tell_nothing():
     y = run.y.copy()
     y[7] = np.nan
     assert np.isfinite(Apart.of(run, replace(run, y=y), 2.0).most).all()
+
+
+def test_what_has_lost_its_phase_goes_by_no_power():
+    """Of a gap that is a third of an output's range all may be the run's own, unless a farther run shows otherwise."""
+    from flexctrl.dynamics.notes.rates import _off
+
+    gap = np.array([0.3])
+    assert _off([Apart(2.0, 1.0, gap)], np.ones(1), 2.0, steady=True)[0] == pytest.approx(0.3)
+    second, saturated = (Apart(6.0, 1.0, gap * grown) for grown in (35.0 / 8.0, 1.5))
+    assert _off([Apart(3.0, 1.0, gap), second], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.3 / 8.0)
+    assert _off([Apart(3.0, 1.0, gap), saturated], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.3)

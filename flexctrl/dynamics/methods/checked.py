@@ -96,10 +96,11 @@ class Checked(_Wrapped):
 
     What errors of steps add up to (the report's ``drift``) says nothing of what grows of itself, as in a double
     pendulum that goes over. Where a machine has swung by more than a quarter of a radian, gone farther than a
-    fiftieth of its size, met corners of its laws of force or followed a continuous law, and wherever this is asked
-    for, it is therefore run once more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or
-    in steps of twice the length, or of half of it past corners. Of what the two are apart, a method of order p
-    leaves 1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 % a note says so, and
+    fiftieth of its size, met corners of its laws of force or followed a continuous law, where forces or rates are
+    among its outputs, of which errors of steps tell nothing, and wherever this is asked for, it is therefore run once
+    more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or in steps of twice the length, or
+    of half of it past corners. Of what the two are apart, a method of order p leaves
+    1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 % a note says so, and
     until when the run is right to that. What would be noted is asked of a second run first, half as far away (in
     powers): its word counts. Where they tell little, a note says whether a third one, under 243 times the
     tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at
@@ -115,8 +116,8 @@ class Checked(_Wrapped):
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so, for corners and for laws that
     meet limits; in a quarter of the steps for laws that jump by half a percent of what they say. Nothing is run again
-    for linear models and small motion under other laws. A sampled law in Python is asked again as a copy of what it was
-    before the run; what goes on from a `Checkpoint` is laid beside what goes on from where the run beside stood.
+    for linear models. A sampled law in Python is asked again as a copy of what it was before the run; what goes on from
+    a `Checkpoint` is laid beside what goes on from where the run beside stood.
 
     Parameters
     ----------

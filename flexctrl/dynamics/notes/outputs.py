@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reach", "seen", "ways"]
 
-_TOLD, _SEEN, _BESIDE = 0.05, 10.0, 2.0
+_TOLD, _SEEN, _BESIDE = 0.05, 1.0, 2.0
 _NAMED = 3
 _LEFT = 16.0 / 9.0
 """Two runs that lag by φ and φ/4 behind a vibration ±a are ¾ φ a apart; what is extrapolated is off by ½ φ² a."""

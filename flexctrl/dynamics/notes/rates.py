@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.notes.beside import agreeing
+from flexctrl.dynamics.notes.beside import agreeing, kept_short
 from flexctrl.dynamics.notes.gap import interpolated
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.outputs import fast, ways
@@ -21,14 +21,17 @@ from flexctrl.model.model import Model
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Apart", "is_named", "rated", "said_of_rates"]
+__all__ = ["Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
 _POINTS, _NEAR = 4, 1e-9
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
-_SEEN, _LITTLE = 10.0, 1e-3
+_SEEN, _LITTLE = 1.0, 1e-3
 """What counts: so many absolute tolerances, and a share of its largest value."""
 _LEAST = 0.5
 """Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
+_LOST, _SURE = 0.1, 0.25
+"""From which share of an output's range a gap is no longer one of small lags (all of it from twice that), and by how
+much the order seen may be lower."""
 _SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
 _LINEAR = (
     "what errors of steps do to single outputs is not told of a linear model: the method Exact makes none, and is its "
@@ -77,6 +80,43 @@ class Apart:
         return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), least)
 
 
+def are_asked(run: Run, journey: Journey) -> bool:
+    """Tell whether a run shows forces or rates, of which sums of local errors tell nothing.
+
+    Parameters
+    ----------
+    run : Run
+    journey : Journey
+        How it went.
+
+    Returns
+    -------
+    bool
+        False where samples keep steps short: the other run is a finer one there, which costs twice as much as the run.
+    """
+    return bool(_judged(run, journey)) and not kept_short(journey)
+
+
+def may_be_lost(run: Run, other: Run, journey: Journey) -> bool:
+    """Tell whether some force or rate of another run is so far away that it may have lost its phase.
+
+    Parameters
+    ----------
+    run : Run
+    other : Run
+        In other steps.
+    journey : Journey
+        How the first went.
+
+    Returns
+    -------
+    bool
+    """
+    way = _judged(run, journey)
+    most = Apart.of(run, other, 2.0).most if way else np.zeros(0)
+    return any(most[i] > _LOST * far for i, far in way.items())
+
+
 def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Run:
     """Return a run with what others tell of its forces and rates, instant by instant.
 
@@ -103,7 +143,7 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     if not apart:
         return run
     steady = isinstance(journey.plan.method.pace, Fixed)
-    off, known = _off(apart, run.report.order, steady), run.report.output_errors
+    off, known = _off(apart, ways(journey, run.y), run.report.order, steady), run.report.output_errors
     found = {run.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in way}
     shares = {name: max(share, known.get(name, 0.0)) for name, share in found.items()}
     return replace(run, report=replace(run.report, output_errors={**known, **shares}))
@@ -125,14 +165,26 @@ def _apart(run: Run, others: Sequence[tuple[Run, float]]) -> list[Apart]:
     return [Apart.of(run, other, longer) for other, longer in ended if len(other.t)]
 
 
-def _off(apart: list[Apart], order: float, steady: bool) -> np.ndarray:
-    """By how much each output may be off: by a finer run if there is one, else by the nearest coarser one."""
+def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np.ndarray:
+    """By how much each output may be off: by a finer run if there is one, else by the nearest coarser one.
+
+    What rings in a coarser run may have lost its phase there: gaps that are a fifth of all that there is go by no power
+    of the steps, if no farther run shows that they do.
+    """
     near, *farther = sorted(apart, key=lambda a: a.longer)
-    least = np.full(near.most.shape, order if steady or near.longer < 1.0 else least_order(near.longer, order))
-    if not farther or near.longer < 1.0 or near.longer == farther[-1].longer:
+    single = not farther or near.longer == farther[-1].longer
+    known = near.longer < 1.0 or (steady and single)
+    least = np.full(near.most.shape, order if known else least_order(near.longer, order))
+    if near.longer < 1.0:
         return near.left(least)
-    far = farther[-1]
-    return near.left(orders_seen(near.most, far.most, (near.longer, far.longer), (least, order)))
+    seen = (
+        least if single else orders_seen(near.most, farther[-1].most, (near.longer, farther[-1].longer), (least, order))
+    )
+    off = near.left(seen)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lost = np.where(ways > 0.0, np.clip(near.most / ways / _LOST - 1.0, 0.0, 1.0), 0.0)
+    sure = ~np.full(off.shape, single) & (seen > order - _SURE)
+    return np.where(sure, off, off + lost * (near.most - off))
 
 
 def _between(run: Run, t: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
