@@ -57,7 +57,7 @@ def taylor_slope(force: Callable[[np.ndarray], np.ndarray], K: sp.spmatrix, scal
         sides = (force(e * direction) + e * push for e in (size, -size))
         return max(float(np.abs(side * weight).max(initial=0.0)) for side in sides)
 
-    sizes = 10.0 ** np.arange(-1.5, -10.25, -0.5)
+    sizes = 10.0 ** np.arange(-1.5, -12.25, -0.5)
     rest = [left(size) for size in sizes]
     noise = max(np.finfo(float).eps, _CAUTION * max(map(left, _VANISHING)))
     clear = np.flatnonzero(np.array(rest[:-1]) > 30.0 * noise)
@@ -97,7 +97,8 @@ def certify(
         raise LinearizationError(
             f"linearize: the forces have no derivative here (Taylor slope {slope:.2f}, 2 expected): on one side of "
             "this place they are others than on the other. Linearise beside it; if what is next to such a corner is a "
-            "taut line so stiff that its load hardly stretches it, make that softer, or rigid"
+            "taut line so stiff that its load hardly stretches it, as the last element of a rope whose end hangs free, "
+            "make that softer, or rigid"
         )
     even, gap = symmetric(linear.K)
     linear = linear if gap == 0.0 else replace(linear, K=even)
