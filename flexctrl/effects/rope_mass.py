@@ -19,12 +19,14 @@ class RopeMass(Effect):
     """Ropes have their mass ρA, and as many elements as they are given: they sag, swing and carry waves.
 
     Without it a rope is one massless element. Each element has the mass matrix ρA ℓ₀/12 [[5, 1], [1, 5]], the mean
-    of the lumped and the consistent one: frequencies of a taut rope are then exact to fourth order in the element's
-    length, those of one that hangs free to second (20 elements: the first is off by 3e-4, by 2e-8 with 20 elements of a
-    `Beam` of next to no bending stiffness). With `RopeStretch` the elements stretch, without it they are rigid
-    links. In the model the elements of a rope are ropes of their own, ``rope0``, ``rope1`` … from its start; outputs
-    name the rope as it is given. Its `Tension` is that of the first element; where another is asked for, draw two ropes
-    with a `Pin` between them, and measure the one that starts there.
+    of the lumped and the consistent one, but at either end of the rope ρA ℓ₀/24 [[8, 3], [3, 10]] (the one element of
+    a rope is consistent). Frequencies of a taut rope held at both ends are then exact to fourth order in the
+    element's length, those of one that hangs free, bears a load or vibrates along itself to third: 20 elements have the
+    first mode of a rope that hangs free within 3e-6, the fifth within 5e-3. With `RopeStretch` the elements stretch,
+    without it they are rigid links. In the model the elements of a rope are ropes of their own, ``rope0``, ``rope1`` …
+    from its start; outputs name the rope as it is given. Its `Tension` is that of the first element, the support bears
+    11/24 of that element's weight; where another is asked for, draw two ropes with a `Pin` between them, and measure
+    the one that starts there.
 
     Parameters
     ----------

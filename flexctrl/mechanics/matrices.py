@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexctrl.structure.lines import Rope, RopePiece
 from flexctrl.structure.sections import Section
 
 
@@ -102,6 +103,26 @@ def beam_mass(section: Section, length: float) -> np.ndarray:
         turn = np.array([1.0, sign, 1.0, sign])
         M[np.ix_(freedoms, freedoms)] = np.outer(turn, turn) * mass.matrix
     return M
+
+
+def rope_mass(rope: Rope) -> np.ndarray:
+    """Return the M_e (2 × 2) of a rope's element, the same in every direction (docs/theory/effects.md).
+
+    The mean of the lumped and the consistent one; at either end of the rope it hands the inner node 1/24 of the mass,
+    so that all the rope's mass, centre and moment of inertia are exact: the one element of a rope is consistent.
+
+    Parameters
+    ----------
+    rope : Rope
+        Of one element.
+
+    Returns
+    -------
+    (2, 2) array
+    """
+    first, last = rope.outer if isinstance(rope, RopePiece) else (True, True)
+    shared = 2 + first + last
+    return rope.mass / 24.0 * np.array([[10 - 2 * first, shared], [shared, 10 - 2 * last]])
 
 
 class PlaneMass(NamedTuple):

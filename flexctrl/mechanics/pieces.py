@@ -103,15 +103,15 @@ def line_force(m: LineMotion, tension: ca.SX) -> ca.SX:
     return ca.vertcat(m.direction * tension, -m.direction * tension)
 
 
-def rope_share(first: ca.SX, second: ca.SX) -> ca.SX:
-    """Return forces on both ends of a rope's element (6) from those on half its mass at either end (6 each).
+def rope_share(first: ca.SX, second: ca.SX, mass: ca.SX) -> ca.SX:
+    """Return forces on both ends of a rope's element (6) from those on a unit mass at either end (6 each).
 
-    What is linear in the motion, as inertia is, gets the mass matrix m/12 [[5, 1], [1, 5]].
+    What is linear in the motion, as inertia is, gets the mass matrix whose entries 11, 12 and 22 are given.
     """
     import casadi as ca
 
     a, b = first[:3], second[:3]
-    return ca.vertcat(5.0 * a + b, a + 5.0 * b) / 6.0
+    return ca.vertcat(mass[0] * a + mass[1] * b, mass[1] * a + mass[2] * b)
 
 
 def space_inertia(node: NodeMotion, p: dict[str, ca.SX]) -> ca.SX:

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
-from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, to_space
+from flexctrl.mechanics.matrices import beam_mass, beam_stiffness, rope_mass, to_space
 from flexctrl.mechanics.modal_matrices import modal_matrices
 from flexctrl.mechanics.rotation import cross
 from flexctrl.model.motion import Motion
@@ -35,7 +35,7 @@ def mass_blocks(s: Structure, motion: Motion) -> Iterator[tuple[str, Block]]:
             yield part.name, (6 * s.number(part.node) + np.arange(6), _body_mass(part))
         elif isinstance(part, Rope) and part.rhoA:
             places = np.concatenate([6 * s.number(node) + np.arange(3) for node in part.nodes])
-            yield part.name, (places, part.mass / 12.0 * np.kron([[5.0, 1.0], [1.0, 5.0]], np.eye(3)))
+            yield part.name, (places, np.kron(rope_mass(part), np.eye(3)))
     for i, drive in enumerate(s.drives):
         yield drive.name, (np.array([motion.source_base + i]), np.array([[drive.inertia]]))
 

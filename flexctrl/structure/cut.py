@@ -12,7 +12,7 @@ from flexctrl.errors import StructureError
 from flexctrl.structure.freedoms import FREEDOMS
 from flexctrl.structure.join_table import JoinTable
 from flexctrl.structure.joints import Joint, Pin, Support
-from flexctrl.structure.lines import Rope
+from flexctrl.structure.lines import Rope, RopePiece
 from flexctrl.structure.nodes import Node
 from flexctrl.structure.outputs import Output, Tension
 from flexctrl.structure.refine import with_nodes
@@ -74,10 +74,7 @@ def _pieces(rope: Rope) -> tuple[Rope, ...]:
     if count == 1:
         return (rope,)
     places = np.linspace(rope.start.position, rope.end.position, count + 1).tolist()
-    return tuple(
-        Rope(f"{rope.name}{i}", a, b, rope.EA, rope.length / count, rope.damping * count, rhoA=rope.rhoA)
-        for i, (a, b) in enumerate(pairwise(places))
-    )
+    return tuple(RopePiece(rope, i, a, b) for i, (a, b) in enumerate(pairwise(places)))
 
 
 def _moved(pieces: dict[str, tuple[Rope, ...]], node: Node) -> Node:

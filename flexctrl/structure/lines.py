@@ -9,7 +9,7 @@ from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import TRANSLATIONS, check_finite, check_name, check_whole
 from flexctrl.structure.nodes import Node, check_length, position_of
 
-__all__ = ["Rope", "Spring"]
+__all__ = ["Rope", "RopePiece", "Spring"]
 
 
 @frozen
@@ -31,7 +31,7 @@ class Rope:
     rhoA : float
         Mass per unstretched length [kg/m], ≥ 0.
     elements : int
-        Number of elements where it has mass.
+        Number of elements where it has mass (`RopeMass`): 20 for 1e-4 of the first frequency and 1 % of the fifth.
 
     Raises
     ------
@@ -80,6 +80,30 @@ class Rope:
     def nodes(self) -> tuple[Node, ...]:
         """Both ends."""
         return (self.start, self.end)
+
+
+@frozen
+class RopePiece(Rope):
+    """One element of a rope that has several.
+
+    Parameters
+    ----------
+    rope : Rope
+        The whole, whose EA and mass per length it has.
+    number : int
+        Its place from the rope's start, from 0.
+    start, end : sequence of 3 floats
+        Its own ends at rest [m].
+    """
+
+    outer: tuple[bool, bool]
+    """Whether its start is the rope's own, and its end."""
+
+    def __init__(self, rope: Rope, number: int, start: Sequence[float], end: Sequence[float]) -> None:
+        count = rope.elements
+        length, damping = rope.length / count, rope.damping * count
+        super().__init__(f"{rope.name}{number}", start, end, rope.EA, length, damping, rope.rhoA)
+        object.__setattr__(self, "outer", (number == 0, number == count - 1))
 
 
 @frozen

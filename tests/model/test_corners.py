@@ -81,10 +81,34 @@ def test_the_taylor_remainder_sees_a_corner_from_either_side(seed):
             assert slope == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize("EA", [1e12, 1e13])
-def test_a_taut_rope_too_stiff_for_the_digits_of_places_is_named_as_such(EA):
+def loaded(EA: float) -> fc.Model:
+    """A kilogram on a rope of a metre."""
     rope = fc.Rope("rope", (0, 0, 0), (0, 0, -1), EA=EA)
     load = fc.PointMass("load", rope.end, 1.0)
     structure = fc.Structure([rope, load], [fc.Support(rope.start), fc.Pin(rope.end, load.node)])
+    return fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.RopeStretch()], fc.CasadiVM())
+
+
+def hanging_free(EA: float) -> fc.Model:
+    """A rope of its own weight, whose last element is stretched by 2e-10 at EA = 1e10."""
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -4), EA=EA, rhoA=2.0, elements=20)
+    structure = fc.planar(fc.Structure([rope], [fc.Support(rope.start)]), "y")
+    return fc.assemble(structure, [fc.Gravity(), fc.RopeMass(), *FLEXIBLE], fc.CasadiVM())
+
+
+@pytest.mark.parametrize("model", [loaded(1e13), hanging_free(1e12)], ids=["loaded", "free"])
+def test_a_taut_rope_too_stiff_for_the_digits_of_places_is_named_as_such(model):
     with pytest.raises(LinearizationError, match=r"so stiff that .* make (it|that) softer, or rigid"):
-        fc.linearize(fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.RopeStretch()]))
+        fc.linearize(model)
+
+
+@pytest.mark.parametrize(
+    ("model", "lowest"),
+    [(loaded(1e12), np.sqrt(9.81)), (hanging_free(1e9), 1.2024155 * np.sqrt(9.81 / 4))],
+    ids=["loaded", "free"],
+)
+def test_a_taut_rope_that_hardly_stretches_has_a_linear_model(model, lowest):
+    """Its corner is 1e-11 away, and the frequencies are as good as the certificate says."""
+    linear = fc.linearize(model)
+    assert linear.modes().omega[0] == pytest.approx(lowest, rel=linear.certificate.frequency_error + 1e-7)
+    assert linear.certificate.frequency_error < 2e-5

@@ -10,7 +10,7 @@ from flexctrl.effects.component_modes import ComponentModes
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.flexibility import BeamFlexibility, RopeStretch
 from flexctrl.frozen import frozen
-from flexctrl.mechanics.matrices import beam_mass, bending, coupling, plane_masses
+from flexctrl.mechanics.matrices import beam_mass, bending, coupling, plane_masses, rope_mass
 from flexctrl.model.laws import part_kinds
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT, Kernels, Kind, kernels_of
 from flexctrl.structure.beams import Beam
@@ -186,7 +186,11 @@ def lines_family(kind: Kind, s: Structure, effects: tuple[Effect, ...], lines: S
     nodes = [[s.number(line.start), s.number(line.end)] for line in lines]
     parameters = [[line.stiffness, line.length, line.damping] for line in lines]
     if kind is part_kinds.HEAVY_ROPE:
-        parameters = [[*p, line.mass] for p, line in zip(parameters, lines, strict=True) if isinstance(line, Rope)]
+        parameters = [
+            [*p, *rope_mass(line)[[0, 0, 1], [0, 1, 1]].tolist()]
+            for p, line in zip(parameters, lines, strict=True)
+            if isinstance(line, Rope)
+        ]
     return family(kind, effects, [line.name for line in lines], nodes, parameters)
 
 

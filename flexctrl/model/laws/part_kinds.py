@@ -83,34 +83,35 @@ def _rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX,
 
 
 def _heavy_rope(effects: tuple[Effect, ...], nodes: Sequence[NodeMotion], slot: ca.SX, parameters: ca.SX) -> Shares:
-    """A rope with mass, the last of its parameters."""
+    """A rope with mass: the entries 11, 12 and 22 of its mass matrix are the last of its parameters."""
     import casadi as ca
 
-    rope = _rope(effects, nodes, slot, parameters[:-1])
-    half = ca.vertcat(0.5 * parameters[-1], ca.SX(6, 1))
-    ends = [_body(effects, [node], slot, half) for node in nodes]
+    mass = parameters[-3:]
+    rope = _rope(effects, nodes, slot, parameters[:-3])
     first, second = nodes
+    ends = [_body(effects, [node], slot, ca.vertcat(1.0, ca.SX(6, 1))) for node in nodes]
+    a, b = mass[0] + mass[1], mass[1] + mass[2]
     return Shares(
-        pieces.rope_share(*(e.inertia for e in ends)),
-        rope.force + pieces.rope_share(*(e.force for e in ends)),
-        ends[0].kinetic + ends[1].kinetic - _apart(first, second, half),
-        rope.stored + ends[0].stored + ends[1].stored + _carried_apart(effects, first, second, half),
+        pieces.rope_share(ends[0].inertia, ends[1].inertia, mass),
+        rope.force + pieces.rope_share(ends[0].force, ends[1].force, mass),
+        a * ends[0].kinetic + b * ends[1].kinetic - _apart(first, second, mass[1]),
+        rope.stored + a * ends[0].stored + b * ends[1].stored + _carried_apart(effects, first, second, mass[1]),
     )
 
 
-def _apart(first: NodeMotion, second: NodeMotion, half: ca.SX) -> ca.SX:
-    """What m/12 [[5, 1], [1, 5]] lacks of the kinetic energy of half the mass at either end."""
-    relative = replace(first, v=first.v - second.v)
-    return pieces.body_energy(relative, pieces.named(pieces.BODY_PARAMETERS, half)) / 6.0
+def _apart(first: NodeMotion, second: NodeMotion, shared: ca.SX) -> ca.SX:
+    """What the entry 12 of a mass matrix takes from the kinetic energy of its rows' sums at the ends."""
+    relative = first.v - second.v
+    return 0.5 * shared * relative.T @ relative
 
 
-def _carried_apart(effects: tuple[Effect, ...], first: NodeMotion, second: NodeMotion, half: ca.SX) -> ca.SX:
+def _carried_apart(effects: tuple[Effect, ...], first: NodeMotion, second: NodeMotion, shared: ca.SX) -> ca.SX:
     """The same of what a turning frame carries along: what the centrifugal potential at the ends has too much."""
     import casadi as ca
 
     if not turning(effects):
         return ca.SX(1, 1)
-    return _apart(seen_outside(effects, standing(first)), seen_outside(effects, standing(second)), half)
+    return _apart(seen_outside(effects, standing(first)), seen_outside(effects, standing(second)), shared)
 
 
 def rope_pull(effects: tuple[Effect, ...], m: pieces.LineMotion) -> ca.SX:
@@ -200,7 +201,7 @@ def along_of(kind: Kind) -> int:
 
 SPRING = Kind("spring", 2, 3, 0, len(pieces.LINE_PARAMETERS), _spring)
 ROPE = Kind("rope", 2, 3, 0, len(pieces.LINE_PARAMETERS), _rope)
-HEAVY_ROPE = Kind("heavy_rope", 2, 3, 0, len(pieces.LINE_PARAMETERS) + 1, _heavy_rope)
+HEAVY_ROPE = Kind("heavy_rope", 2, 3, 0, len(pieces.LINE_PARAMETERS) + 3, _heavy_rope)
 POINT = Kind("point", 1, 3, 0, len(pieces.BODY_PARAMETERS), _point)
 RIGID_BEAM = Kind("rigid_beam", 2, 6, 0, len(pieces.BODY_PARAMETERS), _rigid_beam)
 BODY = Kind("body", 1, 6, 0, len(pieces.BODY_PARAMETERS), _body)
