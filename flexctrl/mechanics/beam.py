@@ -71,9 +71,9 @@ def framed_force(m: BeamMotion, force: BeamForce) -> ca.SX:
     n = force.deformation
     t1, t2 = inverse_tangent(m.theta[0], n[1:4]), inverse_tangent(m.theta[1], n[4:7])
     torque = force.torque - (t1 + t2)
-    along, across = m.normal
-    lever = torque[0] / across
-    pull = ca.vertcat(m.lean * n[0], torque[2] / m.chord, -(torque[1] + lever * along) / m.chord)
+    lever = torque[0] / m.lever[0]
+    about_y, about_z = torque[1] - lever * m.lever[1], torque[2] - lever * m.lever[2]
+    pull = ca.vertcat(m.lean * n[0], about_z / m.chord, -about_y / m.chord)
     turn = [t + 0.5 * lever * arm for t, arm in zip((t1, t2), m.arms, strict=True)]
     f = force.beside
     blocks = (middle, f[0:3] + turn[0], f[3:6] + pull, f[6:9] + turn[1])

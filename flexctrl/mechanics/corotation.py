@@ -1,7 +1,7 @@
 """The motion of a beam element seen from its corotated frame.
 
-The element frame R_e has its x axis through both nodes and its twist from the mean of the nodal
-rotations. Deformations are measured in it: the stretch of the chord and the rotation vectors
+The element frame R_e has its x axis through both nodes and is turned about it so as to be as near to both nodes'
+axes as it gets, however these lie in the section. Deformations are measured in it: the stretch of the chord and the rotation vectors
 θ₁, θ₂ of the nodes. Velocities of the nodes seen in the frame carry the constant consistent mass
 matrix (Crisfield, Galvanetto & Jelenić 1997). They are told by that of the middle of the chord, which only the mean
 motion of the element has to do with, and those beside it: ω₁, v₂ − v₁, ω₂.
@@ -30,9 +30,9 @@ PARAMETERS = (
 SHEARING = ("r_y", "r_z", *(f"c{i}{j}" for i in range(6) for j in range(i, 6)))
 """Per element that shears, after these: 1/(1 + Φ) of bending about y and z; what couplings add to the stiffness."""
 
-_UPRIGHT, _TURNED = 1e-3, -0.84
-"""What sides have in common across the chord, squared. The trace of a turn of 2.74 rad from end to end: the frame turns
-over at half a turn."""
+_UPRIGHT, _TURNED = 4e-3, -0.84
+"""What sides and thirds have in common across the chord, squared. The trace of a turn of 2.74 rad from end to end: the
+frame turns over at half a turn."""
 
 
 @frozen
@@ -126,20 +126,28 @@ class BeamMotion:
     lean: ca.SX | float = 1.0
 
     @property
-    def normal(self) -> tuple[ca.SX, ca.SX]:
-        """The mean of the sides in the frame, but for its third component, which is 0."""
-        return tuple(0.5 * (self.sides[0][i] + self.sides[1][i]) for i in range(2))  # type: ignore[return-value]
+    def thirds(self) -> tuple[ca.SX, ca.SX]:
+        """Third axes of the nodes."""
+        import casadi as ca
+
+        return tuple(ca.cross(t, q) for t, q in zip(self.axes, self.sides, strict=True))  # type: ignore[return-value]
 
     @property
     def arms(self) -> tuple[ca.SX, ca.SX]:
-        """On which the twist of the frame hangs with the nodal rotations: q × e₃, q = (q₁, q₂, q₃) a side."""
-        return tuple(_arm(q) for q in self.sides)  # type: ignore[return-value]
+        """On which the twist of the frame hangs with the nodal rotations: q × e₃ − r × e₂, q a side, r a third axis."""
+        return tuple(_arm(q, r) for q, r in zip(self.sides, self.thirds, strict=True))  # type: ignore[return-value]
+
+    @property
+    def lever(self) -> ca.SX:
+        """The mean of the arms: the first component is what they turn the frame over, the others are of its spin."""
+        first, second = self.arms
+        return 0.5 * (first + second)
 
 
-def _arm(side: ca.SX) -> ca.SX:
+def _arm(side: ca.SX, third: ca.SX) -> ca.SX:
     import casadi as ca
 
-    return ca.vertcat(side[1], -side[0], 0)
+    return ca.vertcat(side[1] + third[2], -side[0], -third[0])
 
 
 def turning(m: BeamMotion) -> ca.SX:
@@ -149,13 +157,12 @@ def turning(m: BeamMotion) -> ca.SX:
     v = m.rates[1]
     apart = m.accelerations[1] - ca.cross(m.spin, v) - v * v[0] / m.chord
     about_y, about_z = -apart[2] / m.chord, apart[1] / m.chord
-    spins, rates = m.rates[::2], m.accelerations[::2]
-    sides = [ca.cross(w - m.spin, q) for w, q in zip(spins, m.sides, strict=True)]
-    twist = about_y * m.normal[0]
-    for w, b, arm, side in zip(spins, rates, m.arms, sides, strict=True):
-        twist += 0.5 * (ca.dot(b - ca.cross(m.spin, w), arm) + ca.dot(w, _arm(side)))
-        twist += 0.5 * (m.spin[1] * side[0] - m.spin[0] * side[1])
-    return ca.vertcat(twist / m.normal[1], about_y, about_z)
+    twist = -(about_y * m.lever[1] + about_z * m.lever[2])
+    for w, b, arm, q, r in zip(m.rates[::2], m.accelerations[::2], m.arms, m.sides, m.thirds, strict=True):
+        relative = w - m.spin
+        turned = _arm(ca.cross(relative, q), ca.cross(relative, r))
+        twist += 0.5 * (ca.dot(b - ca.cross(m.spin, w), arm) + ca.dot(relative, turned))
+    return ca.vertcat(twist / m.lever[0], about_y, about_z)
 
 
 def beam_motion(
@@ -182,16 +189,15 @@ def beam_motion(
     rest = ca.reshape(parameters[:9], 3, 3).T
     chord, length = reach(first, second)
     e1 = (second.x - first.x) / chord
-    sides = [node.R @ rest[:, 1] for node in (first, second)]
-    mean = 0.5 * (sides[0] + sides[1])
-    e3 = ca.cross(e1, mean)
-    upright, turn = ca.dot(e3, e3), ca.dot(first.R, second.R)
+    axes, sides = ([node.R @ rest[:, i] for node in (first, second)] for i in range(2))
+    third = 0.5 * (ca.cross(axes[0], sides[0]) + ca.cross(axes[1], sides[1]))
+    # the mean of the thirds, and of the sides turned to them: what of both is turned about the chord counts alike
+    e2 = ca.cross(third + ca.cross(e1, 0.5 * (sides[0] + sides[1])), e1)
+    upright, turn = ca.dot(e2, e2), ca.dot(first.R, second.R)
     sound = ca.logic_and(upright > _UPRIGHT, turn > _TURNED)
-    e3 = e3 / ca.sqrt(ca.if_else(sound, upright, float("nan")))
-    e2 = ca.cross(e3, e1)
-    frame = ca.horzcat(e1, e2, e3)
-    axes = [frame.T @ (node.R @ rest[:, 0]) for node in (first, second)]
-    sides = [frame.T @ side for side in sides]
+    e2 = e2 / ca.sqrt(ca.if_else(sound, upright, float("nan")))
+    frame = ca.horzcat(e1, e2, ca.cross(e1, e2))
+    axes, sides = ([frame.T @ axis for axis in both] for both in (axes, sides))
     middle = (0.5 * (first.v + second.v), 0.5 * (first.a + second.a))
     rates, accelerations = (first.w, second.v - first.v, second.w), (first.b, second.a - first.a, second.b)
     m = framed_motion(
@@ -240,7 +246,8 @@ def framed_motion(
         modal=modal,
     )
     twist = 0.5 * (ca.dot(rates[0], m.arms[0]) + ca.dot(rates[2], m.arms[1]))
-    return replace(m, spin=ca.vertcat((twist + spin_y * m.normal[0]) / m.normal[1], spin_y, spin_z))
+    twist -= spin_y * m.lever[1] + spin_z * m.lever[2]
+    return replace(m, spin=ca.vertcat(twist / m.lever[0], spin_y, spin_z))
 
 
 def components(v: ca.SX) -> tuple:

@@ -55,7 +55,7 @@ def _sheared(m: BeamMotion) -> ca.SX:
     mean, half, L = 0.5 * (m.theta[0] + m.theta[1]), 0.5 * (m.theta[1] - m.theta[0]), m.p["L"]
     bent = ca.vertcat(0, m.p["r_y"] * mean[1], m.p["r_z"] * mean[2])
     y, z = mean[1] - bent[1], mean[2] - bent[2]
-    turn = ca.vertcat(-0.5 * y * z, y, z)  # no twist: the sections' second axes stay across the frame's third
+    turn = ca.vertcat(0, y, z)  # the frame takes all twist along
     square, across = y * y + z * z, ca.vertcat(0, z, -y)
     axis = 0.5 * ca.cross(turn, across) - (1.0 - square / 6.0) * across  # exp(−ψ) e₁ − e₁
     turned = half - 0.5 * ca.cross(turn - bent, half) + ca.cross(turn, ca.cross(turn, half)) / 6.0
