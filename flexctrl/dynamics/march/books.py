@@ -107,7 +107,7 @@ def enter(m: March) -> None:
     elif m.losing == 1:
         lost = 0.5 * m.h * (m.power + f.books[2])
         m.power = f.books[2]
-        m.lost += lost if lost <= unlooked(m.unseen, m.turnover) else looked_at(m, lost)
+        m.lost += lost if lost <= unlooked(m.entered, m.made, m.unseen, m.turnover) else looked_at(m, lost)
     if due:
         draw(m)
 

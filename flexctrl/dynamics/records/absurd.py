@@ -16,7 +16,7 @@ ROUND_OFF = 1e-6
 """Share of the energy at the start that may be lost in the last digits of places."""
 LOOKED_AT = 4
 """Steps of which the error of one is added up: of more, it could be told from the clock."""
-_MUCH, _LITTLE = 1e-2, 1e-6
+_MUCH, _SLIGHT, _LITTLE = 1e-2, 1e-4, 1e-6
 
 
 def looking(entered: int) -> bool:
@@ -35,9 +35,12 @@ def absurd(entered: int, made: float, turnover: float, moved: float, start: floa
     return made > ABSURD * turnover and made >= ROUND_OFF * abs(start)
 
 
-def unlooked(unseen: float, turnover: float) -> float:
+def unlooked(entered: int, made: float, unseen: float, turnover: float) -> float:
     """Return the energy that a step may dissipate without a close look [J].
 
-    Rates that damping should have ended within a step may swing on for many.
+    Rates that damping should have ended within a step may swing on for many. Where a little of it in each step has
+    become more, the books have made energy, as the next balance says.
     """
-    return (_LITTLE if unseen > _MUCH * turnover else _MUCH) * turnover
+    if made > _SLIGHT * turnover:
+        return _SLIGHT * turnover / entered
+    return (_LITTLE if unseen > _MUCH * turnover else _MUCH / OFTEN) * turnover

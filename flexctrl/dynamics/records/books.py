@@ -195,7 +195,7 @@ class Books:
         way, as wind does, is no drag.
         """
         s = self.sums
-        if lost <= unlooked(s.unseen, s.turnover):
+        if lost <= unlooked(s.entered + 1, s.made, s.unseen, s.turnover):
             return lost
         h = after.t - before.t
         mean = (after.q - before.q) / h
