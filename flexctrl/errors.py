@@ -70,7 +70,15 @@ class ReductionError(FlexctrlError, ValueError):
 
 
 class ControllerError(FlexctrlError, ValueError):
-    """A controller, wrapper or signal that cannot be: names it, what was expected and the remedy."""
+    """A controller, wrapper or signal that cannot be: names it, what was expected and the remedy.
+
+    Attributes
+    ----------
+    asked : float or None
+        When a run had asked it what it said then [s].
+    """
+
+    asked: float | None = None
 
 
 class DesignError(FlexctrlError, RuntimeError):

@@ -182,7 +182,7 @@ class Feed:
         try:
             x = state_of(self.controller, self.controller.initial(), "initial state")
         except Exception as error:
-            raise blamed(error)  # noqa: B904 - its cause is set
+            raise blamed(error, state.t)  # noqa: B904 - its cause is set
         return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self.evaluate(state, x)
 
     def sample(self, state: State, supply: Supply) -> Supply:
@@ -204,7 +204,7 @@ class Feed:
             u = self._total(c.command(t, x, y))
             return u, state_of(c, c.update(t, x, y), "update", x.size) if x.size else x
         except Exception as error:
-            raise blamed(error)  # noqa: B904 - its cause is set
+            raise blamed(error, t)  # noqa: B904 - its cause is set
 
     def restart(self, state: State, supply: Supply) -> Supply:
         """Return the inputs after a break of a continuous command."""
@@ -235,7 +235,7 @@ class Feed:
             rate = state_of(c, c.rate(t, x, y), "rate", x.size) if x.size else x
             return self._total(c.command(t, x, y)), rate
         except Exception as error:
-            raise blamed(error)  # noqa: B904 - its cause is set
+            raise blamed(error, t)  # noqa: B904 - its cause is set
 
     def within(self, state: State, x: np.ndarray) -> Supply:
         """Return these inputs within a step or at its end: one that ends where the command jumps does not feel it."""
@@ -294,7 +294,7 @@ class Feed:
             x, rate = trapezoidal(c, t, y, (before.x, before.rate), h)
             return Supply(np.array(self._total(c.command(t, x, y))), x, rate).after(before, h)
         except Exception as error:
-            raise blamed(error)  # noqa: B904 - its cause is set
+            raise blamed(error, t)  # noqa: B904 - its cause is set
 
     def gains(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> np.ndarray:
         """Return ∂(inputs)/∂(own motion) through a continuous controller over a step, shape (inputs, n)."""
@@ -334,7 +334,7 @@ class Feed:
         try:
             return error(before, after, (state.t, h), tolerance, soften)
         except Exception as fault:
-            raise blamed(fault)  # noqa: B904 - its cause is set
+            raise blamed(fault, state.t)  # noqa: B904 - its cause is set
 
     def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:
         """∂u/∂y over a step, by central differences of the controller itself."""

@@ -240,7 +240,11 @@ class Journey:
 
     def fail(self, error: Exception) -> None:
         """End as failed, for what is no fault of the step."""
-        self.status, self.message = Status.FAILED, f"{error} (t = {self.point.state.t:.6g} s)"
+        come = where = f"t = {self.point.state.t:.6g} s"
+        if isinstance(error, ControllerError) and error.asked is not None:
+            where = f"t = {error.asked:.6g} s"
+        ahead = f"; the run had come to {come}" if where != come else ""
+        self.status, self.message = Status.FAILED, f"{error} ({where}{ahead})"
         self.fault = error.__cause__
 
     def _judge(self) -> None:

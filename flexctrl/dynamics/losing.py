@@ -26,7 +26,9 @@ def look_back(journey: Journey) -> None:
         raise StepError(worst, f"{apart} (t = {journey.point.state.t:.6g} s)")
     if journey.books.overflown:
         beyond = "energies are beyond all numbers"
-        raise StepError(worst, f"{beyond} {where}; look at the commands and at the start")
+        look = "look at the commands and at the start"
+        look = remedy(journey) if isinstance(journey.plan.method, ExplicitRungeKutta) else look
+        raise StepError(worst, f"{beyond} {where}; {look}")
     if nonsense := journey.books.nonsense:
         raise StepError(worst, f"{nonsense} {where}; {remedy(journey)}")
     look = "look at signs and gains of the controller"

@@ -82,16 +82,18 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
     Returns where it ends, its length, the length meant before, and by what its error lets that grow.
     """
     mark, t, why = journey.mark, journey.point.state.t, ""
+    counts, worst = journey.stepper.counts, journey.stepper.counts.worst
     size, hit = mark.size, NO_IMPACT
     while True:
         if mark.led and h != mark.led:
             lead(journey, h)
         if h < SMALLEST * max(SHORTEST * journey.plan.until, t):
-            raise StepError(journey.stepper.counts.worst, f"the step fell to {h:.1e} s at t = {t:.6g} s{why}")
+            worst, why = (worst, why) if why else _reason(journey, 4.0 * h)
+            raise StepError(worst, f"the step fell to {h:.1e} s at t = {t:.6g} s: {why}")
         try:
             after = journey.step(journey.point, h)
         except StepError as failure:
-            why = f": {failure}"
+            why, worst = str(failure), failure.worst
             mark.rejected += 1
             size = h = 0.25 * h
             continue
@@ -108,7 +110,18 @@ def _tried(journey: Journey, pace: Controlled, h: float) -> tuple[Point, float, 
                 continue
             return after, h, size, factor
         mark.rejected += 1
+        why, worst = f"its error was {error:.3g} times what the Tolerance allows", counts.worst
         size = h = h * max(0.2, factor)
+
+
+def _reason(journey: Journey, h: float) -> tuple[int, str]:
+    """Why compiled loops have rejected a step, which keep no word of it: its worst freedom, and what is said."""
+    try:
+        after = journey.step(journey.point, h)
+    except StepError as failure:
+        return failure.worst, str(failure)
+    error = journey.stepper.error(journey.point, after, h, journey.books.sums.moved, journey.plan.tolerance)
+    return journey.stepper.counts.worst, f"its error was {error:.3g} times what the Tolerance allows"
 
 
 def _take(journey: Journey, h: float, stop: float, most: float) -> None:

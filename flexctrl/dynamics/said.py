@@ -18,21 +18,24 @@ class CommandError(ControllerError):
     """A controller says what is no finite number, or raises an exception: that is its cause."""
 
 
-def blamed(error: Exception) -> ControllerError:
+def blamed(error: Exception, t: float) -> ControllerError:
     """Return what a run says of an exception in a controller.
 
     Parameters
     ----------
     error : Exception
+    t : float
+        When the controller was asked [s].
 
     Returns
     -------
     ControllerError
     """
-    if isinstance(error, ControllerError):
-        return error
-    found = CommandError(f"the controller raised {type(error).__name__}: {error}")
-    found.__cause__ = error
+    found = error
+    if not isinstance(found, ControllerError):
+        found = CommandError(f"the controller raised {type(error).__name__}: {error}")
+        found.__cause__ = error
+    found.asked = t
     return found
 
 

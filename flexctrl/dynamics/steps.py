@@ -19,6 +19,7 @@ from flexctrl.errors import FlexctrlError, SingularMatrixError
 from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
+from flexctrl.model.units import force_unit
 from flexctrl.structure.freedoms import check_seconds
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "check_step",
     "failed_step",
     "singular_tangent",
+    "unsolved",
 ]
 
 
@@ -145,6 +147,29 @@ def failed_step(error: Exception, worst: int, t: float) -> StepError:
 def singular_tangent(error: SingularMatrixError, t: float, h: float) -> StepError:
     """Return the failure of an implicit step to a time whose tangent is singular [s]."""
     return StepError(error.where, f"the tangent is singular at t = {t:.6g} s with a step of {h:.3g} s")
+
+
+def unsolved(name: str, worst: int, left: float, t: float, h: float) -> StepError:
+    """Return the failure of an implicit step that Newton's method did not solve.
+
+    Parameters
+    ----------
+    name : str
+        Of the worst freedom.
+    worst : int
+        Its number.
+    left : float
+        What is left of the balance of forces on it [N or N m].
+    t, h : float
+        Where the step was to end, and its length [s].
+
+    Returns
+    -------
+    StepError
+    """
+    off = f"{abs(left):.3g}{force_unit(name)}" if math.isfinite(left) else "more than all numbers"
+    why = f"Newton's method did not converge at t = {t:.6g} s with a step of {h:.3g} s"
+    return StepError(worst, f"{why}: forces on {name} are out of balance by {off}")
 
 
 @frozen

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from flexctrl.model.plant import Plant
 
-__all__ = ["TURNS", "geared", "turning", "units", "yardsticks"]
+__all__ = ["TURNS", "force_unit", "geared", "turning", "units", "yardsticks"]
 
 TURNS = ("_rx", "_ry", "_rz", "_turn")
 _SHIFTS = ("_u", "_v", "_w", "_slide", "_source")
@@ -67,6 +67,22 @@ def units(model: Plant, size: float) -> np.ndarray:
     """
     found = yardsticks(model, size)
     return np.where(np.isfinite(found), found, size)
+
+
+def force_unit(name: str) -> str:
+    """Return what forces on a degree of freedom are measured in, with a space before; empty for an inner one.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    str
+    """
+    if name.endswith((*TURNS, "_source")):
+        return " N m"
+    return " N" if name.endswith(_SHIFTS) else ""
 
 
 def geared(model: Plant, size: float) -> np.ndarray:

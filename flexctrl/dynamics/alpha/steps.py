@@ -24,7 +24,7 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.lagging import CHANGED, lag_share, lagged, lags_of
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import farthest, largest, turning, yardsticks
-from flexctrl.dynamics.steps import Counts, StepError, singular_tangent
+from flexctrl.dynamics.steps import Counts, StepError, singular_tangent, unsolved
 from flexctrl.dynamics.swift.stiff_lines import STIFF, SURE, Caution, firmest
 from flexctrl.dynamics.swift.thrown import AT_HAND, BLURRED, THROWN, holding_inputs, may_throw
 from flexctrl.errors import SingularMatrixError
@@ -205,7 +205,7 @@ class Stepper:
                 if not across:
                     return self._finish(point, h, step, v, rate, _Last(worst, supply.u, correction))
             last = size
-        raise StepError(worst, f"Newton's method did not converge at t = {now.t + h:.6g} s with a step of {h:.3g} s")
+        raise unsolved(self.model.coordinates[worst], worst, float(force[worst]), now.t + h, h)
 
     def _hastened(self, point: AlphaPoint, h: float) -> AlphaPoint:
         """A point that a step of another length than the last one sets out from along stiff lines."""

@@ -180,12 +180,21 @@ class _Stepper:
             end = y + h * (table.B @ K[:-1])
             K[-1] = self._slope(point, end, t + h, self._split(K[-2])[1])
         except SingularMatrixError as error:
-            if not self._far(h * K):
-                raise StepError(error.where, f"the masses do not move every freedom at t = {t:.6g} s") from error
-            K[-1] = np.nan
+            raise self._failure(error, K, t, h) from error
         if not np.isfinite(K).all():
-            raise StepError(0, f"the step of {h:.3g} s from t = {t:.6g} s is unstable: too long for what is stiff")
+            raise self._unstable(K, t, h)
         return self._end(point, end, K, later(t, h))
+
+    def _failure(self, error: SingularMatrixError, K: np.ndarray, t: float, h: float) -> StepError:
+        """The failure of a step that has come to a shape without a mass matrix: a wrong one, if it is far off."""
+        if self._far(h * K):
+            return self._unstable(K, t, h)
+        return StepError(error.where, f"the masses do not move every freedom at t = {t:.6g} s")
+
+    def _unstable(self, K: np.ndarray, t: float, h: float) -> StepError:
+        ways = np.nan_to_num(np.abs(K[:, : self.model.n]), nan=np.inf).max(axis=0) * self.weight
+        why = f"the step of {h:.3g} s from t = {t:.6g} s is unstable: too long for what is stiff"
+        return StepError(int(np.argmax(ways)), why)
 
     def _far(self, ways: np.ndarray) -> bool:
         """Whether a step goes farther than a radian or the machine's size: no masses are told by a shape like that."""
@@ -248,8 +257,13 @@ class _Curve:
         h, t = self.after.state.t - before.state.t, before.state.t
         y, first = s._begin(before)
         K = np.vstack([self.after.slopes, np.zeros((len(table.C_EXTRA), y.size))])
-        for i, (a, c) in enumerate(zip(table.A_EXTRA, table.C_EXTRA, strict=True), start=table.n_stages + 1):
-            K[i] = s._slope(before, y + h * (a[:i] @ K[:i]), t + c * h, self.after.rate)
+        try:
+            for i, (a, c) in enumerate(zip(table.A_EXTRA, table.C_EXTRA, strict=True), start=table.n_stages + 1):
+                K[i] = s._slope(before, y + h * (a[:i] @ K[:i]), t + c * h, self.after.rate)
+        except SingularMatrixError as error:
+            failure = s._failure(error, K, t, h)
+            remedy = "take far shorter ones from the start, or an implicit method (AdaptiveAlpha)"
+            raise StepError(failure.worst, f"{failure}; {remedy}") from error
         step = h * (table.B @ K[: table.n_stages])
         last = K[table.n_stages]
         F = [step, h * first - step, 2.0 * step - h * (last + first), *(h * (table.D @ K))]

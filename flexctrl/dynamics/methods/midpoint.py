@@ -22,7 +22,7 @@ from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.methods.masses import Masses
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import largest, turning, yardsticks
-from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step, singular_tangent
+from flexctrl.dynamics.steps import Counts, Fixed, Point, StepError, check_step, singular_tangent, unsolved
 from flexctrl.dynamics.swift.massless import massless
 from flexctrl.dynamics.swift.reflected import Motors
 from flexctrl.dynamics.swift.settling import settled, steadied
@@ -240,7 +240,7 @@ class _Stepper:
             if not np.isfinite(size) or (contraction > 2.0 and iteration > 3) or (contraction > 1.0 and not fresh):
                 break
             last = size
-        raise _astray(worst, t, h)
+        raise self._astray(worst, gap, t + h, h)
 
     def _carefully(self, point: _Point, h: float) -> _Point:
         """Take a step over what is stiff in it, with a tangent of its own in every iteration.
@@ -253,8 +253,8 @@ class _Stepper:
             middle, supply, momenta, change = self._middle(point, step, h)
             self._factor(_Tangent(middle, 2.0 * (step / h - now.v) / h, supply, h))
             assert self._solve is not None
-            start = point.momenta - self._wound(point, step, h)
-            correction = (caution.short - 1.0) * self._solve(momenta - start - 0.5 * h * change)
+            gap = momenta - (point.momenta - self._wound(point, step, h)) - 0.5 * h * change
+            correction = (caution.short - 1.0) * self._solve(gap)
             size, worst = largest(correction * self.weight)
             self.counts.newton += 1
             step = step + correction
@@ -267,7 +267,11 @@ class _Stepper:
                 start = start + self.motors.along(now, momenta - start - 0.5 * h * change)
                 return self._end(point, h, step, 2.0 * momenta - start)
             last = size
-        raise _astray(worst, t, h)
+        raise self._astray(worst, gap, t + h, h)
+
+    def _astray(self, worst: int, gap: np.ndarray, t: float, h: float) -> StepError:
+        """The failure of a step that leaves so much of its momenta."""
+        return unsolved(self.model.coordinates[worst], worst, 2.0 * float(gap[worst]) / h, t, h)
 
     def _middle(self, point: _Point, step: np.ndarray, h: float) -> tuple[State, Supply, np.ndarray, np.ndarray]:
         """The middle of a step, inputs there, momenta there, and how they change."""
@@ -350,7 +354,3 @@ class _Stepper:
     def error(self, before: _Point, after: _Point, h: float, moved: np.ndarray, tolerance: Tolerance) -> float:
         """Steps are of one length; nothing is estimated."""
         return 0.0
-
-
-def _astray(worst: int, t: float, h: float) -> StepError:
-    return StepError(worst, f"Newton's method did not converge at t = {t + h:.6g} s with a step of {h:.3g} s")
