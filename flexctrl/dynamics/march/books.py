@@ -8,7 +8,7 @@ from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import follow, lean, miss, tighten
 from flexctrl.dynamics.march.record import DONE, March
 from flexctrl.dynamics.march.step import blended
-from flexctrl.dynamics.records.absurd import OFTEN, absurd, looking, unlooked
+from flexctrl.dynamics.records.absurd import OFTEN, absurd, borne_out, looking, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
@@ -118,6 +118,8 @@ def looked_at(m: March, lost: float) -> float:
     f = m.flat
     energy(f)
     gap = f.books[0] + f.books[1] - m.begun - m.gained + m.lost
+    if borne_out(lost, gap + lost, m.unseen, m.turnover):
+        return lost
     mix(m, 1.0)
     swing = f.books[0]
     drag = f.books[2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flexctrl.kernels.native import seldom
 
-__all__ = ["ABSURD", "LOOKED_AT", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "looking", "unlooked"]
+__all__ = ["ABSURD", "LOOKED_AT", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "borne_out", "looking", "unlooked"]
 
 OFTEN = 32
 """Steps from one balance to the next; at first there is one after each."""
@@ -16,7 +16,7 @@ ROUND_OFF = 1e-6
 """Share of the energy at the start that may be lost in the last digits of places."""
 LOOKED_AT = 4
 """Steps of which the error of one is added up: of more, it could be told from the clock."""
-_MUCH, _SLIGHT, _LITTLE = 1e-2, 1e-4, 1e-6
+_MUCH, _SLIGHT, _LITTLE = 1e-2, 1e-3, 1e-6
 
 
 def looking(entered: int) -> bool:
@@ -44,3 +44,11 @@ def unlooked(entered: int, made: float, unseen: float, turnover: float) -> float
     if made > _SLIGHT * turnover:
         return _SLIGHT * turnover / entered
     return (_LITTLE if unseen > _MUCH * turnover else _MUCH / OFTEN) * turnover
+
+
+def borne_out(lost: float, made: float, unseen: float, turnover: float) -> bool:
+    """Tell whether the balance bears out what little a step has dissipated: nothing is put right then.
+
+    ``made`` is what the books make with it [J].
+    """
+    return max(lost, unseen) <= _MUCH * turnover and made <= _SLIGHT * turnover

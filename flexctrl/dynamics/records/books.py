@@ -10,7 +10,17 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.local import Local
-from flexctrl.dynamics.records.absurd import ABSURD, LOOKED_AT, OFTEN, ROUND_OFF, VISIBLE, absurd, looking, unlooked
+from flexctrl.dynamics.records.absurd import (
+    ABSURD,
+    LOOKED_AT,
+    OFTEN,
+    ROUND_OFF,
+    VISIBLE,
+    absurd,
+    borne_out,
+    looking,
+    unlooked,
+)
 from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.scales import yardsticks
@@ -197,14 +207,16 @@ class Books:
         s = self.sums
         if lost <= unlooked(s.entered + 1, s.made, s.unseen, s.turnover):
             return lost
+        kinetic, stored, _ = self.model.energy(after)
+        gap = kinetic + stored - s.start - s.work + s.lost
+        if borne_out(lost, gap + lost, s.unseen, s.turnover):
+            return lost
         h = after.t - before.t
         mean = (after.q - before.q) / h
         beside = after.v - mean
         (swing, _, there), (_, _, back), (_, _, least) = (self._energy(after, v) for v in (beside, -beside, mean))
         if h * min(there, back) <= swing:
             return lost
-        kinetic, stored, _ = self.model.energy(after)
-        gap = kinetic + stored - s.start - s.work + s.lost
         told = min(lost, max(h * least, s.made - gap))
         s.unseen += min(told, lost - told)
         return told
