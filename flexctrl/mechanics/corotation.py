@@ -1,8 +1,8 @@
 """The motion of a beam element seen from its corotated frame.
 
 The element frame R_e has its x axis through both nodes and is turned about it so as to be as near to both nodes'
-axes as it gets, however these lie in the section. Deformations are measured in it: the stretch of the chord and the rotation vectors
-θ₁, θ₂ of the nodes. Velocities of the nodes seen in the frame carry the constant consistent mass
+axes as it gets, however these lie in the section. Deformations are measured in it: the stretch of the chord and the
+rotation vectors θ₁, θ₂ of the nodes. Velocities of the nodes seen in the frame carry the constant consistent mass
 matrix (Crisfield, Galvanetto & Jelenić 1997). They are told by that of the middle of the chord, which only the mean
 motion of the element has to do with, and those beside it: ω₁, v₂ − v₁, ω₂.
 """

@@ -1,8 +1,9 @@
 """A1: cantilever rolled up by an end moment.
 
-Exact: a circle of radius EI/M. Straight elements close a regular polygon at whole turns, to round-off, in whatever plane
-a section with equal stiffnesses bends, and exactly half a turn is a place as any other. GXBeam.jl ``test/examples/tipmoment.jl`` has the data
-(L = 12, EI = 2.5e6); its own remark is that load factors above 1.8 do not converge.
+Exact: a circle of radius EI/M. Straight elements close a regular polygon at whole turns, to round-off, in whatever
+plane a section with equal stiffnesses bends, and exactly half a turn is a place as any other. GXBeam.jl
+``test/examples/tipmoment.jl`` has the data (L = 12, EI = 2.5e6); its own remark is that load factors above 1.8 do not
+converge.
 """
 
 from __future__ import annotations

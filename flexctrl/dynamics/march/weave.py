@@ -16,6 +16,7 @@ _POSE = 12
 _SPIN = 15
 _STRAIGHT = 1e-3
 _ALIGNED = 1e-6
+_WHOLE = 1e-4  # as in `flexctrl.model.linkages.chart`
 
 
 @dataclass
@@ -349,7 +350,10 @@ def unspun(theta: Reals, spin: Reals, out: Reals) -> None:
     eta = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0))
     if square >= _STRAIGHT:
         half = 0.5 * math.sqrt(square)
-        eta = (1.0 - half / math.tan(half)) / square
+        tangent = math.tan(half)
+        if abs(tangent) < _WHOLE * half:
+            tangent = _WHOLE * half if tangent > 0.0 else -_WHOLE * half
+        eta = (1.0 - half / tangent) / square
     for i in range(3):
         j = i + 1 if i < 2 else 0
         k = 3 - i - j

@@ -197,8 +197,8 @@ class _Stepper:
         return StepError(int(np.argmax(ways)), why)
 
     def _far(self, ways: np.ndarray) -> bool:
-        """Whether a step goes farther than a radian or the machine's size: no masses are told by a shape like that."""
-        return not bool((np.abs(ways[:, : self.model.n]) * self.weight <= 1.0).all())
+        """Whether a step goes farther than a quarter of a radian or of the machine's size: that tells no masses."""
+        return not bool((np.abs(ways[:, : self.model.n]) * self.weight <= 0.25).all())
 
     def _end(self, point: _Point, end: np.ndarray, K: np.ndarray, t: float) -> _Point:
         xi, v, x = self._split(end)

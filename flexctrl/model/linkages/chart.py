@@ -30,6 +30,8 @@ __all__ = ["Chart", "Follower", "LeaningRope", "TurningNode", "inverse_tangents"
 _CLOSINGS = 3
 _SMALL = 1e-6
 _FULL_TURN, _HALF_TURN = 6.1, 3.05
+_WHOLE = 1e-4
+"""Nearer to whole turns than that round-off across the axis would be all that there is to a rate."""
 
 
 @frozen
@@ -265,7 +267,10 @@ def inverse_tangents(theta: np.ndarray, spin: np.ndarray) -> np.ndarray:
     small = square < 1e-3
     safe = np.where(small, 1.0, square)
     half = 0.5 * np.sqrt(safe)
+    tangent = np.tan(half)
+    least = _WHOLE * half
+    tangent = np.where(np.abs(tangent) < least, np.where(tangent > 0.0, least, -least), tangent)
     series = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0))
-    eta = np.where(small, series, (1.0 - half / np.tan(half)) / safe)
+    eta = np.where(small, series, (1.0 - half / tangent) / safe)
     turned = cross(theta, spin)
     return np.asarray(spin - 0.5 * turned + eta[:, None] * cross(theta, turned))
