@@ -35,7 +35,8 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
 
     Where it takes nearly as many steps, as something else keeps them short, a finer one has the last word. Where
     they tell little, one far coarser shows how errors grow with the tolerance, and a note says whether it goes
-    elsewhere. Of steps of one length the others know enough, or one nearer by if rates may have lost their phase.
+    elsewhere; of steps of one length the others know enough. Where rates may have lost their phase one nearer by is
+    asked.
 
     Parameters
     ----------
@@ -52,7 +53,17 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     Run
     """
     told, others = _by_all(run, journey, method, beginning, shorter)
+    if others and _may_be_lost(run, journey, method, others):
+        told, nearer = made(told, journey, method.coarser(journey.plan.tolerance, _NEARER), beginning)
+        others = (*others, nearer) if nearer else others
     return rated(told, [(other.run, other.beside.longer) for other in others], journey)
+
+
+def _may_be_lost(run: Run, journey: Journey, method: Checked, others: tuple[Other, ...]) -> bool:
+    """Tell whether rates may have lost their phase in all coarser runs, where none is nearer by than the first."""
+    nearest = min(others, key=lambda other: other.beside.longer)
+    first = method.coarser(journey.plan.tolerance).longer
+    return nearest.beside.longer == first and may_be_lost(run, nearest.run, journey)
 
 
 _Known = tuple[Run, tuple[Other, ...]]
@@ -82,9 +93,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if parted:
         return elsewhere(told, other.gap, journey, coarser.said), (other, *nearer)
     if isinstance(method.pace, Fixed):
-        lost = not nearer and may_be_lost(run, other.run, journey)
-        kept, second = made(told, journey, nearby, beginning) if lost else (told, None)
-        return kept, (other, *nearer) if second is None else (other, second)
+        return told, (other, *nearer)
     farther = method.coarser(tolerance, _FARTHER)
     kept, third = made(told, journey, farther, beginning)
     if third is None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.design import pd
 from flexctrl.dynamics import others
 from flexctrl.dynamics import simulate as running
 from flexctrl.errors import SingularMatrixError
@@ -436,16 +435,10 @@ def test_a_run_is_kept_where_the_one_beside_it_is_ended(monkeypatch):
 
 
 def test_small_swings_cost_nothing_more(monkeypatch):
-    """Nor do rates where samples keep steps short."""
+    """Where only places are asked for."""
     model, start = chain(2, 0.01, 1)
     monkeypatch.setattr(running, "laid_beside", None)
     assert fc.simulate(model, until=3.0, start=start).status is fc.Status.FINISHED
-    law = pd(kp=5.0, kd=1.0, measured="angle", rate="speed", command="torque")
-    arm = driven()
-    assert (
-        fc.simulate(arm, fc.Sampled(law, 1e-3), until=1.0, start=arm.displace([0.01, 0.01])).status
-        is fc.Status.FINISHED
-    )
 
 
 @pytest.mark.parametrize("wrap", [fc.Checked, fc.Unchecked])

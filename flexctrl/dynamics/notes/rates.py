@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.notes.beside import agreeing, kept_short
+from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.gap import interpolated
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.outputs import fast, ways
@@ -25,8 +25,8 @@ __all__ = ["Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_ra
 
 _POINTS, _NEAR = 4, 1e-9
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
-_SEEN, _LITTLE = 1.0, 1e-3
-"""What counts: so many absolute tolerances, and a share of its largest value."""
+_SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
+"""What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
 _LEAST = 0.5
 """Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
 _LOST, _SURE = 0.1, 0.25
@@ -81,7 +81,7 @@ class Apart:
 
 
 def are_asked(run: Run, journey: Journey) -> bool:
-    """Tell whether a run shows forces or rates, of which sums of local errors tell nothing.
+    """Tell whether a run shows forces or rates that count, of which sums of local errors tell nothing.
 
     Parameters
     ----------
@@ -92,9 +92,8 @@ def are_asked(run: Run, journey: Journey) -> bool:
     Returns
     -------
     bool
-        False where samples keep steps short: the other run is a finer one there, which costs twice as much as the run.
     """
-    return bool(_judged(run, journey)) and not kept_short(journey)
+    return bool(_judged(run, journey, _LITTLE))
 
 
 def may_be_lost(run: Run, other: Run, journey: Journey) -> bool:
@@ -112,7 +111,7 @@ def may_be_lost(run: Run, other: Run, journey: Journey) -> bool:
     -------
     bool
     """
-    way = _judged(run, journey)
+    way = _judged(run, journey, _LITTLE)
     most = Apart.of(run, other, 2.0).most if way else np.zeros(0)
     return any(most[i] > _LOST * far for i, far in way.items())
 
@@ -138,7 +137,7 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     -------
     Run
     """
-    way = _judged(run, journey)
+    way = _judged(run, journey, _DUST)
     apart = _apart(run, others) if way else []
     if not apart:
         return run
@@ -149,14 +148,14 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     return replace(run, report=replace(run.report, output_errors={**known, **shares}))
 
 
-def _judged(run: Run, journey: Journey) -> dict[int, float]:
-    """The forces and rates that count, and what each goes through."""
+def _judged(run: Run, journey: Journey, little: float) -> dict[int, float]:
+    """The forces and rates that go through more than a share of their largest value, and what each goes through."""
     model = journey.plan.model
     if not isinstance(model, Model) or len(run.y) < _POINTS:
         return {}
     way, most = ways(journey, run.y), np.abs(run.y).max(axis=0)
     least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
-    return {i: float(way[i]) for i in fast(model) if np.inf > way[i] > max(least[i], _LITTLE * most[i])}
+    return {i: float(way[i]) for i in fast(model) if np.inf > way[i] > max(least[i], little * most[i])}
 
 
 def _apart(run: Run, others: Sequence[tuple[Run, float]]) -> list[Apart]:
@@ -216,7 +215,7 @@ def said_of_rates(run: Run, journey: Journey) -> Run:
     model, report = journey.plan.model, run.report
     if not isinstance(model, Model):  # linear equations; `judging` is None where they are solved exactly
         return run if journey.judging is None else replace(run, report=replace(report, notes=(*report.notes, _LINEAR)))
-    names = [model.outputs[i] for i in fast(model)]
+    names = [model.outputs[i] for i in _judged(run, journey, _LITTLE)]
     shares = {name: report.output_errors.get(name, 0.0) for name in names if not is_named(name, report.notes)}
     far = [name for name in shares if shares[name] > max(_NOTED, _BESIDE * report.error)]
     if not far:
