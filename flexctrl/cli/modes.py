@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
-
 import numpy as np
 
 from flexctrl.cli.answer import Answer, grid, plain, write_csv, write_json, write_picture
@@ -14,7 +11,6 @@ from flexctrl.errors import SceneError
 from flexctrl.linear.modes import Modes
 from flexctrl.plots.modes import modes_figure
 from flexctrl.scene import Scene, load_scene
-from flexctrl.study.mesh_modes import Vanishing, vanishing
 
 _PICTURES = 9
 
@@ -27,8 +23,7 @@ def answer(request: Request) -> Answer:
     every = scene.linear.modes()
     modes = every.select(list(range(min(request.count, len(every)))))
     counts = {"rigid_body_modes": every.rigid, "unstable_modes": every.unstable, "massless_freedoms": every.massless}
-    loose = vanishing(scene, modes)
-    data = plain(_data(scene, modes) | counts | {"of_the_mesh": [asdict(v) | {"mode": v.mode + 1} for v in loose]})
+    data = plain(_data(scene, modes) | counts)
     keys = ("frequencies_hz", "damping", "kinds", "parts", "shares")
     write_csv(request.out, "modes.csv", {"mode": range(1, len(modes) + 1)} | {key: data[key] for key in keys})
     write_json(request.out, "modes.json", data)
@@ -41,7 +36,7 @@ def answer(request: Request) -> Answer:
         modes_figure(figure, modes.place, modes, chosen)  # type: ignore[arg-type]
 
     write_picture(request.out, "modes.png", draw, size=(12.0, 10.0))
-    return Answer(_text(scene, data, loose), data)
+    return Answer(_text(scene, data), data)
 
 
 def _data(scene: Scene, modes: Modes) -> dict[str, object]:
@@ -65,33 +60,19 @@ def _share(modes: Modes, k: int, part: str) -> float:
     return float(np.clip(modes.part_shares(k)[part], 0.0, 1.0)) if part else 0.0
 
 
-def _text(scene: Scene, data: dict, loose: Sequence[Vanishing]) -> str:
+def _text(scene: Scene, data: dict) -> str:
     rest = data["equilibrium"]
     left = f"residual {rest['residual']:.2g}" if rest["residual"] else "balanced to rounding"
     head = f"{scene.name}: equilibrium of {data['dofs']} degrees of freedom, {left}"
     outputs = grid(("output", "at rest"), rest["outputs"].items())
     columns = zip(*(data[k] for k in ("frequencies_hz", "damping", "kinds", "parts", "shares")), strict=True)
-    names = {v.mode + 1: "of the mesh" for v in loose}
-    rows = [
-        (k, f, z, names.get(k, kind), part, f"{100 * share:.0f} %")
-        for k, (f, z, kind, part, share) in enumerate(columns, 1)
-    ]
+    rows = [(k, f, z, kind, part, f"{100 * share:.0f} %") for k, (f, z, kind, part, share) in enumerate(columns, 1)]
     modes = grid(("mode", "Hz", "damping", "kind", "part", "its share"), rows)
     count = data["rigid_body_modes"]
     more = f"{count} rigid-body mode{'s' * (count != 1)}" + (
         f", {data['unstable_modes']} unstable" if data["unstable_modes"] else ""
     )
-    loose_ones = [_of_mesh(v, data["coordinates"][v.mode]) for v in loose]
-    return "\n".join([f"{head}\n\n{outputs}\n\n{modes}\n\n{more}", *loose_ones, *noted(data["notes"])])
-
-
-def _of_mesh(found: Vanishing, most: str) -> str:
-    """Why a mode that is slow but not at rest is no vibration."""
-    finer = f"{np.sqrt(max(found.finer, 0.0)) / (2 * np.pi):.2g} Hz"
-    return (
-        f"mode {found.mode + 1} ({most}) is no vibration of the machine: the mesh resists it, and with twice as many "
-        f"elements it is at {finer}"
-    )
+    return "\n".join([f"{head}\n\n{outputs}\n\n{modes}\n\n{more}", *noted(data["notes"])])
 
 
 __all__ = ["answer"]

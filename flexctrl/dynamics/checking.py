@@ -24,7 +24,7 @@ _FARTHER = 5.0 / 3.0
 """How far the last one is, in powers: 243 times the tolerance."""
 _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
-_ALIKE = 0.7
+_ALIKE = 0.5
 """A coarser run with more of the steps is much the same, and makes the same errors."""
 _NEARLY = 0.001
 """A thirtieth of what is noted: coarser runs have told of rattling too little by seven times."""

@@ -150,6 +150,10 @@ def simulate(
                 looked = _compared(looked, journey, check, beginning, isinstance(method, Checked))
         except KeyboardInterrupt:  # the second one: whatever is known by now
             return _cut(looked)
+        except Exception:  # what is in other hands may fail by it otherwise
+            if not kept.asked:
+                raise
+            return _cut(looked)
         return _cut(looked) if kept.asked else looked
 
 
@@ -163,7 +167,9 @@ def _growing(run: Run, journey: Journey, beginning: Beginning | None) -> Run:
 
 
 def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning | None, always: bool) -> Run:
-    """The run with what others beside it tell."""
+    """The run with what others beside it tell; nothing of one that stands where it was to begin."""
+    if not journey.mark.steps:
+        return run
     if beginning and can_be_told(journey):
         law = answers(run, journey, beginning.again)
         asked = always or may_grow(journey, law) or are_asked(run, journey)

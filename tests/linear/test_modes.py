@@ -10,6 +10,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from fixtures import structures as s
 
+import flexctrl as fc
 from flexctrl.errors import LinearizationError, MechanismError, StructureError
 from flexctrl.linear import eigen
 from flexctrl.linear.krylov import _orthonormal
@@ -412,3 +413,17 @@ def test_what_is_unstable_in_every_mode_has_them_all(n):
         found = eigen.complete_pairs(-A, M)
         assert found.values == pytest.approx(-la.eigh(A, M)[0][::-1], rel=1e-9)
         assert found.misfit.max() <= eigen.MISFIT
+
+
+@pytest.mark.parametrize("elements", [2, 6])
+def test_a_bent_round_bar_turns_freely_about_its_own_line(elements):
+    """It sags between two ball joints; its energy does not know which way a round section points."""
+    section = fc.Section(6e5, 157.0, 157.0, 157.0, 1.0, 1e-4)
+    bar = fc.Beam("bar", (0, -3, 0), (0, 3, 0), section, elements=elements)
+    load = fc.PointMass("load", bar.node(elements // 2), 0.3)
+    joints = [fc.Support(bar.start, "u v w"), fc.Support(bar.end, "u w"), fc.Pin(bar.node(elements // 2), load.node)]
+    model = fc.assemble(fc.Structure([bar, load], joints), [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
+    modes = fc.linearize(model).modes()
+    assert modes.rigid == 1
+    assert modes.coordinates[np.argmax(np.abs(modes.shapes[:, modes.unstable]))].endswith("_ry")
+    assert modes.omega_squared[1] > 10.0

@@ -120,14 +120,9 @@ def looked_at(m: March, lost: float) -> float:
     gap = f.books[0] + f.books[1] - m.begun - m.gained + m.lost
     if borne_out(lost, gap + lost, m.unseen, m.turnover):
         return lost
-    mix(m, 1.0)
-    swing = f.books[0]
-    drag = f.books[2]
-    mix(m, -1.0)
-    drag = min(drag, f.books[2])
     told = lost
-    if m.h * drag > swing:
-        mix(m, 0.0)
+    if ended(m, 0.0) or ended(m, 0.5 * m.h):
+        mix(m, 0.0, 0.0)
         told = min(lost, max(m.h * f.books[2], m.made - gap))
         m.unseen += min(told, lost - told)
     copy(f.padded, m.v, f.v)
@@ -137,12 +132,23 @@ def looked_at(m: March, lost: float) -> float:
 
 
 @seldom
-def mix(m: March, beside: float) -> None:
-    """Work out energies at what rates have beside the mean ones, at its reverse, or at the mean ones (0)."""
+def ended(m: March, onward: float) -> bool:
+    """Tell whether drag ends within the step what rates have beside a course, whose rates change for so long."""
+    f = m.flat
+    mix(m, 1.0, onward)
+    swing = f.books[0]
+    drag = f.books[2]
+    mix(m, -1.0, onward)
+    return m.h * min(drag, f.books[2]) > swing
+
+
+@seldom
+def mix(m: March, beside: float, onward: float) -> None:
+    """Work out energies at what rates have beside a course, at its reverse, or at the mean rates (0)."""
     f = m.flat
     for i in range(0, f.padded, 8):
         mean = eight(f.step[i:]) * (1.0 / m.h)
-        put(f.v[i:], beside * (eight(m.v[i:]) - mean) if beside != 0.0 else mean)
+        put(f.v[i:], beside * (eight(m.v[i:]) - mean - onward * eight(m.rate[i:])) if beside != 0.0 else mean)
     drive(f)
     energy(f)
 

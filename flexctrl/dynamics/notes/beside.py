@@ -65,10 +65,10 @@ def can_be_told(journey: Journey) -> bool:
     Returns
     -------
     bool
-        False for linear models, and where the run ended early.
+        False for linear models, what is integrated exactly, and where the run ended early.
     """
     model, ended = journey.plan.model, journey.status in (Status.FINISHED, Status.STOPPED)
-    return ended and isinstance(model, Model) and journey.mark.steps > 0
+    return ended and isinstance(model, Model) and journey.judging is not None and journey.mark.steps > 0
 
 
 def kept_short(journey: Journey) -> bool:

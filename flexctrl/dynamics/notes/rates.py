@@ -27,6 +27,8 @@ _POINTS, _NEAR = 4, 1e-9
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
 """What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
+_ALIKE = 0.97
+"""A coarser run in more of the steps is the same run: samples may round steps of any length to one."""
 _LEAST = 0.5
 """Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
 _LOST, _SURE = 0.1, 0.25
@@ -159,9 +161,10 @@ def _judged(run: Run, journey: Journey, little: float) -> dict[int, float]:
 
 
 def _apart(run: Run, others: Sequence[tuple[Run, float]]) -> list[Apart]:
-    """How far others are from a run: those that ended as late, if any did."""
+    """How far others are from a run: those that ended as late, if any did, in other steps than its own."""
     ended = [each for each in others if each[0].final.t >= run.final.t * (1.0 - _NEAR)] or others
-    return [Apart.of(run, other, longer) for other, longer in ended if len(other.t)]
+    unlike = [each for each in ended if each[1] < 1.0 or each[0].report.steps < _ALIKE * run.report.steps]
+    return [Apart.of(run, other, longer) for other, longer in unlike if len(other.t)]
 
 
 def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np.ndarray:

@@ -169,7 +169,7 @@ class Books:
         if self.dissipates:
             power = self.model.energy(after.state)[2]
             lost = 0.5 * (self.sums.power + power) * (after.state.t - before.state.t)
-            self.sums.lost += self._dissipated(lost, before.state, after.state)
+            self.sums.lost += self._dissipated(lost, before.state, after)
             self.sums.power = power
 
     def _integrate(self, before: Point, after: Point, curve: Curve) -> None:
@@ -194,17 +194,17 @@ class Books:
             calm = Hermite(Local(self.model), before.state, after.state)
             total = within(0.5, calm.secant()) if total[1] > _OVERSHOT * mean(calm)[1] else total
         self.sums.work += h * float(total[0])
-        self.sums.lost += self._dissipated(h * float(total[1]), before.state, after.state)
+        self.sums.lost += self._dissipated(h * float(total[1]), before.state, after)
         self.sums.power = float(last[1])
 
-    def _dissipated(self, lost: float, before: State, after: State) -> float:
+    def _dissipated(self, lost: float, before: State, end: Point) -> float:
         """What a step has dissipated, of which quadrature says so much.
 
-        That goes by rates at the ends. Where drag takes within the step what they have beside the mean rates, it is
-        the most; what is lost at the mean rates is the least, and between the two the balance tells. What drives one
-        way, as wind does, is no drag.
+        That goes by rates at the ends. Where drag takes within the step what they have beside the mean rates, or
+        beside these and what accelerations add to them, it is the most; what is lost at the mean rates is the least,
+        and between the two the balance tells.
         """
-        s = self.sums
+        s, after = self.sums, end.state
         if lost <= unlooked(s.entered + 1, s.made, s.unseen, s.turnover):
             return lost
         kinetic, stored, _ = self.model.energy(after)
@@ -214,12 +214,17 @@ class Books:
         h = after.t - before.t
         mean = (after.q - before.q) / h
         beside = after.v - mean
-        (swing, _, there), (_, _, back), (_, _, least) = (self._energy(after, v) for v in (beside, -beside, mean))
-        if h * min(there, back) <= swing:
+        if not (self._ended(h, after, beside) or self._ended(h, after, beside - 0.5 * h * end.rate)):
             return lost
+        least = self._energy(after, mean)[2]
         told = min(lost, max(h * least, s.made - gap))
         s.unseen += min(told, lost - told)
         return told
+
+    def _ended(self, h: float, state: State, beside: np.ndarray) -> bool:
+        """Whether drag ends some rates within a step; what drives one way, as wind does, is no drag."""
+        (swing, _, there), (_, _, back) = (self._energy(state, v) for v in (beside, -beside))
+        return h * min(there, back) > swing
 
     def _energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
         return self.model.energy(state.with_(v=v))
