@@ -106,7 +106,7 @@ class Checked(_Wrapped):
     tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at
     most that of the method: what rattles goes by no power of its steps. A run that has met four corners and more,
     and of which 0.1 % or more is told but nothing noted, is laid beside a finer one too, in half the steps; what that
-    tells counts if it is more. Where the first takes more than 0.7 of the steps, a finer one is all that follows.
+    tells counts if it is more. Where the first takes more than half of the steps, a finer one is all that follows.
 
     Where nothing of that is told, and dry contacts stick or break loose that slide with less than it takes to break
     them loose, it is run in the same steps with contacts that bear 5 % more (if one has broken loose), and 5 % less: a
@@ -114,10 +114,11 @@ class Checked(_Wrapped):
     own. All runs in other steps may be wrong alike there.
 
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
-    steps short the other run is a finer one, in half the steps, for what has turned so, for corners and for laws that
-    meet limits; in a quarter of the steps for laws that jump by half a percent of what they say. Nothing is run again
-    for linear models. A sampled law in Python is asked again as a copy of what it was before the run; what goes on from
-    a `Checkpoint` is laid beside what goes on from where the run beside stood.
+    steps short the other run is a finer one, in half the steps, for what has turned so, for corners, for forces and
+    rates, and for laws that meet limits; in a quarter of the steps for laws that jump by half a percent of what they
+    say. Nothing is run again for linear models and what is integrated exactly. A sampled law in Python is asked again
+    as a copy of what it was before the run; what goes on from a `Checkpoint` is laid beside what goes on from where
+    the run beside stood.
 
     Parameters
     ----------
