@@ -100,7 +100,8 @@ def shorter(journey: Journey, law: Manner) -> float:
     Returns
     -------
     float
-        A half where samples keep steps short, in steps of one length past corners, and in those that do not see a line
+        A half where samples keep steps short (all of them, or those between the short ones that bristles and lags take
+        after samples), in steps of one length past corners, and in those that do not see a line
         vibrate whose tension is asked for: whether a contact with little to spare breaks loose is decided by a finer
         run, where two coarse ones may be wrong alike. A quarter for what jumps at every sample: of what half the steps
         round as the run itself does, they round a quarter otherwise.
@@ -109,7 +110,13 @@ def shorter(journey: Journey, law: Manner) -> float:
         return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
     cornered = fixed and _cornered(journey, {*journey.watch.corner_names})
-    return 0.5 if kept_short(journey) or cornered or unresolved(journey) else 1.0
+    return 0.5 if kept_short(journey) or _flows(journey) or cornered or unresolved(journey) else 1.0
+
+
+def _flows(journey: Journey) -> bool:
+    """Tell whether bristles or lags take short steps after samples, which keep the others: these are then alike."""
+    model = journey.plan.model
+    return journey.plan.feed.sample_time > 0.0 and isinstance(model, Model) and model.motion.flows.size > 0
 
 
 def rattles(journey: Journey) -> bool:
