@@ -271,8 +271,8 @@ class Tension:
     name : str
     line : Rope, Spring, Winch or str
         What is under tension, or its name; a spring that is pressed has a negative one, and in small motion, whose
-        forces are linear, a rope too. Of a rope of several elements that of the first, at its ``start``: with
-        `RopeMass` it lacks 11/24 of that element's weight at the end.
+        forces are linear, a rope too. Of a rope of several elements that of the first, at its ``start``; with
+        `RopeMass` what holds it there bears 11/24 of that element's weight besides.
 
     Raises
     ------
