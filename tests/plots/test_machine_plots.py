@@ -16,6 +16,7 @@ from flexctrl.structure.drives import Drive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.inputs import Input
 from flexctrl.structure.joints import InPlane, Joint
+from flexctrl.structure.lines import RopePiece
 from flexctrl.structure.outputs import Output
 from flexctrl.study.compare import Comparison
 
@@ -68,7 +69,7 @@ def test_every_kind_of_part_and_drive_is_drawn():
     travel = fc.LinearDrive("travel", BAR.start, direction="x", radius=0.1, ratio=2.0, stiffness=50.0, inertia=1.0)
     winch = fc.Winch("winch", BAR.end, BAR.start, EA=1e5, radius=0.1, ratio=2.0, inertia=0.02)
     parts, drives = (BAR, load, body, rope, spring, trolley), (motor, travel, winch)
-    assert {type(part) for part in parts} == kinds(Part)
+    assert {type(part) for part in parts} == kinds(Part) - {RopePiece}  # of ropes with mass, once they are cut
     assert {type(drive) for drive in drives} == kinds(Drive)
 
     def drawn(*parts, drives=()):

@@ -8,7 +8,7 @@ from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import follow, lean, miss, tighten
 from flexctrl.dynamics.march.record import DONE, March
 from flexctrl.dynamics.march.step import blended
-from flexctrl.dynamics.records.absurd import OFTEN, absurd, borne_out, looking, unlooked
+from flexctrl.dynamics.records.absurd import FAR, OFTEN, absurd, borne_out, looking, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
@@ -121,7 +121,7 @@ def looked_at(m: March, lost: float) -> float:
     if borne_out(lost, gap + lost, m.unseen, m.turnover):
         return lost
     told = lost
-    if ended(m, 0.0) or ended(m, 0.5 * m.h):
+    if ended(m, 0.0, 0.0) or ended(m, 0.5 * m.h, lost):
         mix(m, 0.0, 0.0)
         told = min(lost, max(m.h * f.books[2], m.made - gap))
         m.unseen += min(told, lost - told)
@@ -132,14 +132,14 @@ def looked_at(m: March, lost: float) -> float:
 
 
 @seldom
-def ended(m: March, onward: float) -> bool:
-    """Tell whether drag ends within the step what rates have beside a course, whose rates change for so long."""
+def ended(m: March, onward: float, least: float) -> bool:
+    """Tell whether drag ends what rates have beside a course, whose rates change for so long, and takes so much."""
     f = m.flat
     mix(m, 1.0, onward)
     swing = f.books[0]
     drag = f.books[2]
     mix(m, -1.0, onward)
-    return m.h * min(drag, f.books[2]) > swing
+    return m.h * min(drag, f.books[2]) > max(swing, FAR * least)
 
 
 @seldom

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flexctrl.kernels.native import seldom
 
-__all__ = ["ABSURD", "LOOKED_AT", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "borne_out", "looking", "unlooked"]
+__all__ = ["ABSURD", "FAR", "LOOKED_AT", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "borne_out", "looking", "unlooked"]
 
 OFTEN = 32
 """Steps from one balance to the next; at first there is one after each."""
@@ -16,6 +16,8 @@ ROUND_OFF = 1e-6
 """Share of the energy at the start that may be lost in the last digits of places."""
 LOOKED_AT = 4
 """Steps of which the error of one is added up: of more, it could be told from the clock."""
+FAR = 4.0
+"""So many times what quadrature says drag takes of rates that alternate from step to step, accelerations aside."""
 _MUCH, _SLIGHT, _LITTLE = 1e-2, 1e-3, 1e-6
 
 

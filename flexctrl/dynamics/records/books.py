@@ -12,6 +12,7 @@ from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.local import Local
 from flexctrl.dynamics.records.absurd import (
     ABSURD,
+    FAR,
     LOOKED_AT,
     OFTEN,
     ROUND_OFF,
@@ -200,9 +201,9 @@ class Books:
     def _dissipated(self, lost: float, before: State, end: Point) -> float:
         """What a step has dissipated, of which quadrature says so much.
 
-        That goes by rates at the ends. Where drag takes within the step what they have beside the mean rates, or
-        beside these and what accelerations add to them, it is the most; what is lost at the mean rates is the least,
-        and between the two the balance tells.
+        That goes by rates at the ends. Where drag takes within the step what they have beside the mean rates (or much
+        more beside what accelerations add to these, as of noise), it is the most; what is lost at the mean rates is the
+        least, and between the two the balance tells.
         """
         s, after = self.sums, end.state
         if lost <= unlooked(s.entered + 1, s.made, s.unseen, s.turnover):
@@ -214,17 +215,17 @@ class Books:
         h = after.t - before.t
         mean = (after.q - before.q) / h
         beside = after.v - mean
-        if not (self._ended(h, after, beside) or self._ended(h, after, beside - 0.5 * h * end.rate)):
+        if not (self._ended(h, after, beside, 0.0) or self._ended(h, after, beside - 0.5 * h * end.rate, lost)):
             return lost
         least = self._energy(after, mean)[2]
         told = min(lost, max(h * least, s.made - gap))
         s.unseen += min(told, lost - told)
         return told
 
-    def _ended(self, h: float, state: State, beside: np.ndarray) -> bool:
-        """Whether drag ends some rates within a step; what drives one way, as wind does, is no drag."""
+    def _ended(self, h: float, state: State, beside: np.ndarray, least: float) -> bool:
+        """Whether drag ends some rates within a step, and takes so much; what drives one way, as wind does, is none."""
         (swing, _, there), (_, _, back) = (self._energy(state, v) for v in (beside, -beside))
-        return h * min(there, back) > swing
+        return h * min(there, back) > max(swing, FAR * least)
 
     def _energy(self, state: State, v: np.ndarray) -> tuple[float, float, float]:
         return self.model.energy(state.with_(v=v))
