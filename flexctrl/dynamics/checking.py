@@ -24,8 +24,8 @@ _FARTHER = 5.0 / 3.0
 """How far the last one is, in powers: 243 times the tolerance."""
 _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
-_ALIKE = 0.5
-"""A coarser run with more of the steps is much the same, and makes the same errors."""
+_ALIKE, _SAMPLED = 0.7, 0.5
+"""A coarser run with more of the steps, or so many under samples, is much the same, and makes the same errors."""
 _NEARLY = 0.001
 """A thirtieth of what is noted: coarser runs have told of rattling too little by seven times."""
 
@@ -79,7 +79,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if not first or first[0].run.status is Status.INTERRUPTED:
         return told, ()
     other = first[0]
-    if isinstance(method.pace, Controlled) and other.run.report.steps > _ALIKE * run.report.steps:
+    alike = _SAMPLED if journey.plan.feed.sample_time else _ALIKE
+    if isinstance(method.pace, Controlled) and other.run.report.steps > alike * run.report.steps:
         halved, finer = _halved(replace(run, checkpoint=told.checkpoint), journey, method, beginning)
         return (halved, (other, *finer)) if finer else (told, (other,))
     nearer: tuple[Other, ...] = ()

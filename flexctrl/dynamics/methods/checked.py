@@ -106,7 +106,8 @@ class Checked(_Wrapped):
     tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at
     most that of the method: what rattles goes by no power of its steps. A run that has met four corners and more,
     and of which 0.1 % or more is told but nothing noted, is laid beside a finer one too, in half the steps; what that
-    tells counts if it is more. Where the first takes more than half of the steps, a finer one is all that follows.
+    tells counts if it is more. Where the first takes more than 0.7 of the steps (half of them under a sampled law), a
+    finer one is all that follows.
 
     Where nothing of that is told, and dry contacts stick or break loose that slide with less than it takes to break
     them loose, it is run in the same steps with contacts that bear 5 % more (if one has broken loose), and 5 % less: a
