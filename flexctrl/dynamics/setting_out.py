@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -114,7 +115,7 @@ def _begun(
     stops = Stops(plan.feed.sample_time, plan.feed.breaks)
     stops.skip(0.0)
     state, supply, notes = beyond_layers(plan.feed, state, supply, pace, plan.tolerance)
-    size = pace.step if isinstance(pace, Fixed) else _first(plan, pace, state, supply, min(stops.next, plan.until))
+    size = pace.step if isinstance(pace, Fixed) else _first(plan, pace, state, supply, stops.next)
     try:
         point = stepper.start(state, supply, size)
     except SingularMatrixError as error:
@@ -133,7 +134,11 @@ def _begun(
 
 
 def _first(plan: Plan, pace: Controlled, state: State, supply: Supply, span: float) -> float:
-    """The first step, as asked for or from how the machine sets out."""
+    """The first step, as asked for or from how the machine sets out.
+
+    Where the run ends does not count if inputs jump somewhere: it may go on from there.
+    """
+    span = span if math.isfinite(span) else plan.until
     if pace.first is None:
         first = first_step(plan.feed, state, supply, pace, plan.tolerance, span)
         return max(first, SMALLEST * plan.until)

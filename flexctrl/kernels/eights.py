@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 
@@ -38,7 +38,15 @@ def total(a: Eight) -> float:
     return float(np.sum(a))
 
 
-def rounded(a: Eight | float, b: Eight) -> Eight:
+@overload
+def rounded(a: Eight | float, b: Eight) -> Eight: ...
+
+
+@overload
+def rounded(a: float, b: float) -> float: ...
+
+
+def rounded(a: Any, b: Any) -> Any:
     """Return a · b rounded to a double, whatever it is added to afterwards."""
     return a * b
 

@@ -275,8 +275,9 @@ class Expressions:
             self._put(f"store {EIGHT} {self._cast(arguments[1], 'Eight').text}, ptr {a}, align 8")
             return Value(None, "")
         if name in ("rounded", "lost"):
-            one, other = (self._cast(value, "Eight").text for value in arguments)
-            product = self._value("Eight", f"fmul {EIGHT} {one}, {other}")  # without "contract"
+            kind = "Eight" if "Eight" in (arguments[0].type, arguments[1].type) else "float"
+            one, other = (self._cast(value, kind).text for value in arguments)
+            product = self._value(kind, f"fmul {llvm_type(kind)} {one}, {other}")  # without "contract"
             if name == "rounded":
                 return product
             less = self._value("Eight", f"fneg {EIGHT} {product.text}").text

@@ -88,9 +88,26 @@ class Rest:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be said of it: an element that bends by more than a radian, which is too far for one."""
+        """What is to be said of it.
+
+        An element that bends by more than a radian, which is too far for one; and that it does not last, where
+        ``unstable`` tells so and the loads have a potential.
+        """
         said = bent(self.model, [self.state]) if self.model.large else ""
-        return (said,) if said else ()
+        return tuple(note for note in (said, self._fleeting) if note)
+
+    @property
+    def _fleeting(self) -> str:
+        """What is to be said of an equilibrium that the machine leaves by itself."""
+        from flexctrl.model.stability import without_energy
+
+        if without_energy(self.model, self.inputs) or not (ways := self.unstable):
+            return ""
+        return (
+            f"it does not last: the machine would leave it by itself in {ways} independent "
+            f"direction{'s' * (ways > 1)}; if another one was meant, start nearer to that, or bring on what is held in "
+            "parts, from one equilibrium to the next"
+        )
 
     def plot(self) -> Figure:
         """Draw the machine at rest over the machine as drawn; small displacements are enlarged.
@@ -255,16 +272,33 @@ def _searched(balance: Balance, start: State, tolerance: float) -> Found:
     found = soft if soft.done else follow(balance, start, tolerance, strict=False)[0]
     if shift and not (found.done and _is_meant(balance, start, found.state)):
         down = Newton(balance, tolerance, _SOFT_REACH, downhill=True).run(start, 240, shift)
-        lasts = down.done and (not found.done or balance.unstable(down.state) < balance.unstable(found.state))
-        found = down if lasts else found
+        found = _lasting(balance, found, down)
+        if not (found.done and _is_meant(balance, start, found.state)) and balance.astray(start):
+            found = _lasting(balance, found, _led_there(balance, start, shift, tolerance))
     if not found.done:
         raise EquilibriumError(_complaint(balance, found), found.state, found.residual)
     return found
 
 
 def _is_meant(balance: Balance, start: State, found: State) -> bool:
-    """Whether an equilibrium lasts, or the start is near it: elsewhere a machine would not stay with it."""
-    return not balance.unstable(found) or balance.moved(found.q - start.q) < _NEAR
+    """Whether an equilibrium lasts, or the start is near it and lasts no better: else a machine would not stay."""
+    ways = balance.unstable(found)
+    return not ways or (balance.moved(found.q - start.q) < _NEAR and ways <= balance.unstable(start))
+
+
+def _lasting(balance: Balance, one: Found, other: Found) -> Found:
+    """Return the equilibrium that is left in fewer directions, if one of two is one."""
+    lasts = other.done and (not one.done or balance.unstable(other.state) < balance.unstable(one.state))
+    return other if lasts else one
+
+
+def _led_there(balance: Balance, start: State, shift: float, tolerance: float) -> Found:
+    """Where a machine comes to whose held coordinates are brought to their places by and by, under all its loads.
+
+    A cable drawn straight whose end is held nearer is pressed straight by steps that bring the end there at once.
+    """
+    hung = Newton(balance.held_as(start), tolerance, _SOFT_REACH).run(start, 240, shift)
+    return follow(balance, hung.state, tolerance, strict=True, watch=True)[0] if hung.done else hung
 
 
 def _loads_first(balance: Balance, start: State, found: Found, share: float, tolerance: float) -> tuple[Found, float]:

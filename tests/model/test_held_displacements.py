@@ -37,7 +37,7 @@ def test_an_end_held_at_an_angle_bends_the_beam_to_an_arc(elements, angle):
     rest = fc.equilibrium(cantilever(elements), hold={f"b_{elements}_ry": -angle})
     arc = np.array([np.sin(angle), 1.0 - np.cos(angle)]) / angle
     assert list(rest.outputs.values()) == pytest.approx(arc, abs=4e-3 / elements)
-    assert not rest.notes
+    assert bool(rest.notes) == (not rest.stable)  # held so far round, it falls out of its plane
 
 
 @pytest.mark.parametrize(("angle", "told"), [(0.9, False), (1.2, True)])

@@ -7,7 +7,7 @@ import math
 from flexctrl.dynamics.march.record import CONTROLLED, SAMPLED, March
 from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import LOOKED_AT
-from flexctrl.kernels.eights import eight, larger, largest, put
+from flexctrl.kernels.eights import eight, larger, largest, put, rounded
 
 __all__ = ["chosen", "compared", "follow", "growth", "judge", "lean", "miss", "tighten"]
 
@@ -27,21 +27,22 @@ def judge(m: March) -> None:
     for i in range(0, f.padded, 8):
         own = eight(m.algorithmic[i:])
         lead = blended(m, eight(f.rate[i:]), eight(m.rate[i:]), own)
-        local = larger(local, abs(lead - own) * eight(m.weight[i:]))
+        put(m.stray[i:], abs(lead - own) * eight(m.weight[i:]))
+        local = larger(local, eight(m.stray[i:]))
     m.error = largest(local)
 
 
 def compared(m: March) -> float:
-    """Return the error over what is allowed: in every part of the machine by how far that has been."""
+    """Return the error over what is allowed: in every part of the machine by how far that has been.
+
+    Rounded as `Stepper.error` does: whether the march takes a step makes no difference to the next one.
+    """
     scale = abs(m.beta - 1.0 / 6.0) * m.h * m.h
     if m.parts == 1:
-        return scale * (m.error / (m.absolute + m.relative * m.reached))
-    f = m.flat
+        return scale * (m.error / (m.absolute + rounded(m.relative, m.reached)))
     worst = 0.0
-    for i in range(f.n):
-        rate = (1.0 - m.alpha_f) * f.rate[i] + m.alpha_f * m.rate[i] - m.alpha_m * m.algorithmic[i]
-        local = abs(rate * (1.0 / (1.0 - m.alpha_m)) - m.algorithmic[i]) * m.weight[i]
-        worst = max(worst, local / (m.absolute + m.relative * m.farthest[m.part[i]]))
+    for i in range(m.flat.n):
+        worst = max(worst, m.stray[i] / (m.absolute + rounded(m.relative, m.farthest[m.part[i]])))
     return scale * worst
 
 

@@ -113,7 +113,7 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
 def _motion(F: Flattened) -> dict[str, Any]:
     """Where the motion stands, and what turns in it."""
     names = ["v", "left", "own", "rate", "algorithmic", "trend", "pulled", "fresh", "before", "asked", "reach", "first"]
-    names += ["ahead", "swept", "bent", "path"]
+    names += ["ahead", "swept", "bent", "path", "stray"]
     cones = F.plan.position[coning_of(F.model).triples]
     vectors = dict(zip(names, np.zeros((len(names), F.flat.padded)), strict=True))
     return {**vectors, "cones": cones.ravel(), "coning": len(cones), "firmest": firmest(F.model), **_throwing(F)}

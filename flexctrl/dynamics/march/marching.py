@@ -303,7 +303,7 @@ class Marcher(Loops):
     def follow(self, mark: Mark) -> None:
         """Take up how steps of controlled error go on beyond a corner, and how long the last step of one length was."""
         m = self.march
-        m.follow, m.cap, m.led, m.taken = mark.follow, mark.cap, mark.led, mark.taken
+        m.size, m.follow, m.cap, m.led, m.taken = mark.size, mark.follow, mark.cap, mark.led, mark.taken
 
     def watch_no_more(self) -> None:
         """End steps wherever they do."""

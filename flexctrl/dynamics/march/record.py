@@ -240,6 +240,8 @@ class March:
         Largest distance of each degree of freedom from where it was first.
     ahead, swept, bent, path : Reals
         Sums of local errors of some of the steps; see `flexctrl.dynamics.records.books.Sums`.
+    stray : Reals
+        By how much the method's own acceleration changes in the step about to be judged, over yardsticks.
     rows : Reals
         Time and outputs after each step.
     states : Reals
@@ -284,6 +286,7 @@ class March:
     swept: Reals
     bent: Reals
     path: Reals
+    stray: Reals
     rows: Reals
     states: Reals
     parts: int

@@ -18,7 +18,7 @@ from flexctrl.dynamics.march.lagging import CHANGED, lag_share, lagged
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
 from flexctrl.dynamics.swift.stiff_lines import SHORT, STIFF, SURE, TURNING
-from flexctrl.kernels.eights import Eight, eight, larger, largest, put, total
+from flexctrl.kernels.eights import Eight, eight, larger, largest, put, rounded, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
 from flexctrl.model.flat.fronts import factor, whose
@@ -141,8 +141,11 @@ def cone(m: March, spins: Reals, share: float) -> None:
 
 
 def blended(m: March, rate: Eight, before: Eight, own: Eight) -> Eight:
-    """Return the method's own acceleration after a step, from the true ones at both ends and its own before."""
-    return ((1.0 - m.alpha_f) * rate + m.alpha_f * before - m.alpha_m * own) * (1.0 / (1.0 - m.alpha_m))
+    """Return the method's own acceleration after a step, from the true ones at both ends and its own before.
+
+    Rounded, as it is kept: what errors go by is the same number wherever it is worked out.
+    """
+    return rounded(1.0 / (1.0 - m.alpha_m), (1.0 - m.alpha_f) * rate + m.alpha_f * before - m.alpha_m * own)
 
 
 def newton(m: March) -> int:

@@ -81,9 +81,13 @@ def drifted(journey: Journey) -> Drift:
     shares = np.maximum(lags, ran)
     worst = int(np.argmax(shares))
     share, freedom = float(shares[worst]), model.coordinates[worst]
-    return Drift(
-        share, freedom, _note(journey, share, freedom) if share > _TOLD else "", shares * most, float(ran.max())
-    )
+    note = _note(journey, share, freedom) if share > _TOLD else ""
+    return Drift(share, freedom, note, shares * _judged(most), float(ran.max()))
+
+
+def _judged(yard: np.ndarray) -> np.ndarray:
+    """Yardsticks, 0 for inner freedoms, which are told by the motion that they bring about."""
+    return np.where(np.isfinite(yard), yard, 0.0)
 
 
 def _width(swept: np.ndarray, bent: np.ndarray, path: np.ndarray) -> np.ndarray:
@@ -107,7 +111,7 @@ def _run_off(journey: Journey) -> np.ndarray:
         return np.zeros_like(way)
     rounds = np.where(way > 1.0, 0.5 * way, 0.0)
     swings = np.where(way < 2.0 * math.pi, np.minimum(np.tan(0.25 * way) ** 2 / 8.0, _MOST) * sums.path / yard, 0.0)
-    return np.asarray(yard * np.minimum(abs(sums.made) / sums.turnover * np.maximum(rounds, swings), way))
+    return np.asarray(_judged(yard) * np.minimum(abs(sums.made) / sums.turnover * np.maximum(rounds, swings), way))
 
 
 def _note(journey: Journey, share: float, freedom: str) -> str:
