@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Gap", "between", "interpolated"]
 
 _POINTS, _FEW = 4, 1500
-_INSTANTS, _GOLDEN = 16, 0.5 * (5.0**0.5 - 1.0)
+_INSTANTS, _FEWER, _GOLDEN = 16, 8, 0.5 * (5.0**0.5 - 1.0)
 
 
 @frozen
@@ -74,17 +74,21 @@ def between(run: Run, other: Run, journey: Journey, taken: int) -> Gap:
     -------
     Gap
     """
-    kept = not journey.plan.feed.sample_time and taken <= _FEW and run.track.stretches and other.track.stretches
-    return (_of_tracks if kept else _of_rows)(run, other, journey)
+    model, kept = journey.plan.model, run.track.stretches and other.track.stretches
+    assert isinstance(model, Model)
+    instants = _INSTANTS if taken <= _FEW else 0 if placed(model) else _FEWER  # rows of rates tell nothing of places
+    if kept and instants and not journey.plan.feed.sample_time:
+        return _of_tracks(run, other, journey, instants)
+    return _of_rows(run, other, journey)
 
 
-def _of_tracks(run: Run, other: Run, journey: Journey) -> Gap:
+def _of_tracks(run: Run, other: Run, journey: Journey, instants: int) -> Gap:
     """Places and turns of nodes and angles of motors, in yardsticks, at instants of no rhythm."""
     model, begin = journey.plan.model, max(run.track.starts[0], other.track.starts[0])
     end = min(run.final.t, other.final.t)
     assert isinstance(model, Model)
-    k = np.arange(1, _INSTANTS)
-    t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / _INSTANTS, end)
+    k = np.arange(1, instants)
+    t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / instants, end)
     pairs = [(run.track.state(s)[0], other.track.state(s)[0]) for s in t]
     apart = np.array([_apart(model, one, other) for one, other in pairs])
     worst = _names(model)[int(np.argmax(apart.max(axis=0)))]
