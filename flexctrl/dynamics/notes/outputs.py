@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reach", "seen", "ways"]
 
 _TOLD, _SEEN, _BESIDE = 0.05, 1.0, 2.0
+_ROUND_OFF = 1e-12
+"""Of sizes and radians: less is the last digits of places."""
 _NAMED = 3
 _LEFT = 16.0 / 9.0
 """Two runs that lag by φ and φ/4 behind a vibration ±a are ¾ φ a apart; what is extrapolated is off by ½ φ² a."""
@@ -143,7 +145,7 @@ def _seen(journey: Journey, y: np.ndarray, sight: sp.csr_matrix) -> tuple[np.nda
     model, tolerance = journey.plan.model, journey.plan.tolerance
     assert isinstance(model, Model)
     yards = yardsticks(model)
-    least = _SEEN * tolerance.absolute * (sight @ np.where(np.isfinite(yards), yards, 0.0))
+    least = _SEEN * max(tolerance.absolute, _ROUND_OFF) * (sight @ np.where(np.isfinite(yards), yards, 0.0))
     way = ways(journey, y)
     return way, [i for i in placed(model) if way[i] > least[i]]
 
