@@ -185,7 +185,7 @@ def most_resident() -> float:
 
 
 def closed_loop(folder: str, kind: str, until: str) -> None:
-    """A closed loop at 1 kHz; prints times and resident memory [MB] on the way, and the most there was."""
+    """A closed loop at 1 kHz; prints times and resident memory [MB] three times on the way, and the most there was."""
     kept = fc.CsvStream(Path(folder) / "rows.csv") if kind == "streamed" else fc.InMemory(states=1e6)
     marks: list[tuple[float, float]] = []
     end = float(until)
@@ -193,8 +193,8 @@ def closed_loop(folder: str, kind: str, until: str) -> None:
         arm(), Servo(), until=end, method=FIXED, every=0.1, record=kept,
         progress=lambda share: marks.append((share * end, resident())),
     )  # fmt: skip
-    half = next(m for m in marks if m[0] > 0.4 * end)
-    print(run.status.name, *half, *marks[-1], most_resident())
+    early, late = (next(m for m in marks if m[0] > share * end) for share in (0.4, 0.7))
+    print(run.status.name, *early, *late, *marks[-1], most_resident())
 
 
 def chain(folder: str, elements: str) -> None:
