@@ -131,7 +131,7 @@ def _first_jump(journey: Journey, course: _Course) -> float:
 def _course(journey: Journey, span: float) -> _Course:
     """Ask the law over a span from here; closely only if that shows what is passed over otherwise."""
     course = _asked(journey, span, _FEWEST)
-    closely = math.ceil(_OF_RUN * span / journey.plan.until)
+    closely = math.ceil(_OF_RUN * min(span / journey.plan.until, 1.0))
     if closely > _FEWEST and not course.steep and course.bends(len(course.times) - 1) <= _BENT:
         swings = journey.mark.swings
         closer = _asked(journey, span, closely)

@@ -213,3 +213,28 @@ def test_a_law_that_knows_nothing_beyond_the_end_is_not_asked_in_earnest_there()
     run = fc.simulate(cart(), OpenLoop({"force": known}), until=1.0)
     assert run.status is fc.Status.FINISHED
     assert run["v"][-1] == pytest.approx((1.0 - np.cos(2.1)) / 2.1, abs=1e-3)
+
+
+def test_the_shortest_runs_look_at_their_functions_as_often_as_others():
+    """A run of a microsecond in steps of 10 ms asked for forty million values."""
+    block = fc.PointMass("block", (0, 0, 0), 1.0)
+    pull = fc.Force("pull", block.node, "x")
+    model = fc.assemble(fc.Structure([block], [fc.Support(block.node, "v w")], inputs=[pull]), [fc.LargeRotation()])
+    for method in (None, fc.GeneralizedAlpha(0.01), fc.ConservingMidpoint(0.01)):
+        asked = []
+        law = fc.OpenLoop({"pull": lambda t, asked=asked: asked.append(t) or 1.0 + t})
+        run = fc.simulate(model, law, until=1e-6, method=method)
+        assert run.status is fc.Status.FINISHED
+        assert len(asked) < 50_000
+
+
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(0.01), fc.ExplicitRungeKutta()])
+def test_what_cannot_move_is_pushed_to_no_avail(method):
+    """All is held: a force that jumps found no freedom to set going."""
+    beam = fc.Beam("beam", (0, 0, 0), (1, 0, 0), fc.Section.tube(fc.STEEL, 0.02, 0.001))
+    push, place = fc.Force("push", beam.end, "x"), fc.Position("x", beam.end, "x")
+    structure = fc.Structure([beam], [fc.Support(beam.start)], [], [push], [place])
+    law = fc.OpenLoop({"push": fc.design.Step(1.0, at=0.05)})
+    run = fc.simulate(fc.assemble(structure, [fc.LargeRotation()]), law, until=0.1, method=method)
+    assert run.status is fc.Status.FINISHED
+    assert (run["x"] == 1.0).all()

@@ -73,7 +73,7 @@ def holding_inputs(model: Plant) -> tuple[float, float]:
 
 
 def _holding(model: Plant) -> np.ndarray:
-    if not (may_throw(model) and model.inputs):
+    if not (may_throw(model) and model.inputs and model.n):
         return np.zeros(2)
     if model.kinks.names:
         return np.full(2, np.inf)
