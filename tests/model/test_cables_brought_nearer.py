@@ -68,3 +68,14 @@ def test_what_does_not_last_is_said():
     assert rest.unstable == 2
     [note] = rest.notes
     assert note.startswith("it does not last: the machine would leave it by itself in 2 independent directions")
+
+
+def test_so_is_flutter():
+    """Beck's column beyond 20.05 EI/L² (Beck 1952): its load follows the tip."""
+    mast = fc.Beam("mast", (0, 0, 0), (0, 0, 1), fc.Section.tube(fc.STEEL, 0.01, 0.001), elements=6)
+    push = fc.FollowerForce("push", mast.end, "-z")
+    model = fc.assemble(fc.Structure([mast], [fc.Support(mast.start)], [], [push]), [fc.Flexible(), fc.LargeRotation()])
+    bending = float(mast.section.EI_y)
+    calm, fluttering = (fc.equilibrium(model, inputs={"push": share * bending}) for share in (19.0, 22.0))
+    assert not calm.notes
+    assert "it does not last" in fluttering.notes[0]

@@ -1,4 +1,4 @@
-"""How a sampled law answers to what it has read: in proportion, with limits, or by jumps that a hair decides."""
+"""How a sampled law answers to what it has read: in proportion or not, with limits, or by jumps that a hair decides."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ _JUMP = 5e-3
 """Encoders of an arm or a crane step by 1e-5 of their way; what moves a run by percents steps by a hundredth."""
 _BENT, _AT_ONCE = 0.05, 0.4
 """How much slopes change along the line, of the largest, and which share of it at one place where that is a limit."""
+_LEVEL, _OFTEN = 0.1, 8
+"""How much less steep a law is where it is saturated, and how many times an input turns where a loop hunts."""
 
 Answer = Callable[[float], np.ndarray]
 
@@ -30,6 +32,7 @@ class Manner(Enum):
     """What a law's answers look like along a line of measurements."""
 
     SMOOTH = "smooth"
+    HUNTING = "level in most places and steep in few, to and fro"
     LIMITED = "with a corner"
     ABRUPT = "with a jump"
 
@@ -61,18 +64,26 @@ def answers(run: Run, journey: Journey, feed: Feed | None) -> Manner:
         return np.concatenate(feed.told(end.state.t, end.supply.x, low + share * (high - low)))
 
     try:
-        return _kind(answer)
+        return _kind(answer, _hunts(run.u))
     except (FlexctrlError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
         return Manner.SMOOTH
 
 
-def _kind(answer: Answer) -> Manner:
+def _hunts(u: np.ndarray) -> bool:
+    """Whether some input goes from one side of what it goes through to the other again and again."""
+    middle = 0.5 * (u.max(axis=0) + u.min(axis=0))
+    return bool((np.diff(u > middle, axis=0).sum(axis=0) > _OFTEN).any())
+
+
+def _kind(answer: Answer, hunts: bool) -> Manner:
     places = np.linspace(0.0, 1.0, _PLACES)
     said = np.array([answer(share) for share in places])
     changes, whole = np.diff(said, axis=0), np.ptp(said, axis=0)
     moving, steepest = np.flatnonzero(whole > 0.0).tolist(), np.argmax(np.abs(changes), axis=0)
     if any(_jump(answer, part, places, int(steepest[part])) > _JUMP * whole[part] for part in moving):
         return Manner.ABRUPT
+    if hunts and any(_saturates(changes[:, part]) for part in moving):
+        return Manner.HUNTING
     return Manner.LIMITED if any(_cornered(changes[:, part]) for part in moving) else Manner.SMOOTH
 
 
@@ -88,6 +99,11 @@ def _jump(answer: Answer, part: int, places: np.ndarray, at: int) -> float:
         else:
             low, below = middle, said
     return float(abs(above - below))
+
+
+def _saturates(changes: np.ndarray) -> bool:
+    """Whether a law is saturated in most places."""
+    return bool(np.median(np.abs(changes)) < _LEVEL * np.abs(changes).max())
 
 
 def _cornered(changes: np.ndarray) -> bool:
