@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -9,7 +11,7 @@ import scipy.linalg as la
 import flexctrl as fc
 from flexctrl.design import MinimumJerk, pd
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.notes.sampled_growth import _answers, _loop
+from flexctrl.dynamics.notes.sampled_growth import _answers, _loop, _missed
 
 NEAR, FAR, OMEGA, ZETA = 1.79, 1.76, 83.46, 0.0057
 SAMPLE, KP, KD = 1.49 / 83.46, 46.2, 13.5
@@ -156,3 +158,20 @@ def test_an_arm_behind_a_gear_is_that_of_its_linear_model(inertia):
     assert wanted.size
     assert len(found) == len(wanted)
     assert all(abs(found - z).min() < 1e-5 * abs(z) for z in wanted)
+
+
+@pytest.mark.parametrize(("seen", "lost"), [(1.45, False), (1.0, True)])
+def test_growth_that_steps_see_and_limits_hold_is_no_failure(seen, lost):
+    """A slewing crane that hunted within its limits was right to 3 %, and FAILED: of e^104 its steps saw e^88."""
+    loop = SimpleNamespace(
+        sample=0.05, poles=lambda growth: np.array([1.6 + 0j]), stepped=lambda rho, count, share: np.array([seen + 0j])
+    )
+    journey = SimpleNamespace(
+        point=SimpleNamespace(state=SimpleNamespace(t=14.0)),
+        origin=SimpleNamespace(state=SimpleNamespace(t=0.0)),
+        plan=SimpleNamespace(method=fc.AdaptiveAlpha()),
+        mark=SimpleNamespace(steps=700),
+    )
+    found = _missed(loop, journey, 0.8)
+    assert "the sampled loop is unstable" in found.said
+    assert found.lost is lost

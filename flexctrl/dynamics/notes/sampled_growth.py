@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 __all__ = ["grows", "of_sampled_loop"]
 
 _MOST = 400
-_GROWN, _LOST, _TURNED = 1.0, 3.0, 0.5
-"""Powers of e over the run: what steps may miss, and beyond which nothing is right; poles that turn together [rad]."""
+_GROWN, _LOST, _BOUNDED, _TURNED = 1.0, 3.0, 20.0, 0.5
+"""Powers of e over the run: what steps may miss, beyond which nothing is right, and what of growth that steps see is
+held by limits that a loop about one place does not have; poles that turn together [rad]."""
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
 _HALVINGS, _ENDS = 10, 2
 _UNEVEN = 0.5
@@ -47,7 +48,8 @@ class Missed(NamedTuple):
 def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     """Return a run with what is to be said of a sampled loop that grows as its steps do not see.
 
-    Linear about the start and about the end: where that is so at both, the run has failed; at one, a note says so.
+    Linear about the start and about the end: where that is so at both, the run has failed; at one, or where limits must
+    have held what steps do see grow by far, a note says so.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ def _missed(loop: SampledLoop, journey: Journey, rho: float) -> Missed | None:
     said = _SAID.format(
         pole=pole, whole=whole, step=loop.sample / count, seen=max(seen, 0.0), finer=loop.sample / (count << fine)
     )
-    return Missed(said, whole - seen > _LOST)
+    return Missed(said, whole - seen > _LOST and seen < _BOUNDED)
 
 
 def _grows(stepped: np.ndarray, pole: complex) -> float:
