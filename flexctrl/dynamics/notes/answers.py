@@ -75,7 +75,7 @@ def _hunts(u: np.ndarray) -> bool:
     return bool((np.diff(u > middle, axis=0).sum(axis=0) > _OFTEN).any())
 
 
-def _kind(answer: Answer, hunts: bool) -> Manner:
+def _kind(answer: Answer, hunts: bool = False) -> Manner:
     places = np.linspace(0.0, 1.0, _PLACES)
     said = np.array([answer(share) for share in places])
     changes, whole = np.diff(said, axis=0), np.ptp(said, axis=0)
