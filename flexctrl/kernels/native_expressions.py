@@ -275,7 +275,7 @@ class Expressions:
             self._put(f"store {EIGHT} {self._cast(arguments[1], 'Eight').text}, ptr {a}, align 8")
             return Value(None, "")
         if name in ("rounded", "lost"):
-            kind = "Eight" if "Eight" in (arguments[0].type, arguments[1].type) else "float"
+            kind = "Eight" if name == "lost" or "Eight" in (arguments[0].type, arguments[1].type) else "float"
             one, other = (self._cast(value, kind).text for value in arguments)
             product = self._value(kind, f"fmul {llvm_type(kind)} {one}, {other}")  # without "contract"
             if name == "rounded":
