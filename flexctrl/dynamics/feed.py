@@ -116,7 +116,8 @@ class Feed:
         if (c := self.controller) is None:
             return "none"
         when = "continuous" if self.continuous else f"sampled every {c.sample_time:.12g} s"
-        return f"{when}: {', '.join(c.inputs) or 'nothing'} to {', '.join(c.outputs)}"
+        aside = getattr(c, "aside", "")
+        return f"{when}{aside}: {', '.join(c.inputs) or 'nothing'} to {', '.join(c.outputs)}"
 
     @cached_property
     def reads(self) -> np.ndarray:

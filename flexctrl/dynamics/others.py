@@ -75,7 +75,7 @@ class Beginning:
         """Return where another run is to begin: where it stood when the run was cut, or where the whole began."""
         if not isinstance(self.start, Checkpoint):
             return self.start
-        kind = repr(other.method), other.tolerance, machine_of(self.feed.model)
+        kind = repr(other.method), other.tolerance, machine_of(self.feed.model), self.feed.told_law
         stood = (saved for saved in self.start.origin.others if _kind(saved) == kind)
         return next(stood, self.start.origin.state)
 
@@ -94,9 +94,9 @@ def _time(start: State | Rest | Checkpoint | None) -> float:
     return start.t if isinstance(start, Checkpoint) else 0.0
 
 
-def _kind(saved: Checkpoint) -> tuple[str, Tolerance, str]:
-    """What run stands there: how it is made, and of which machine."""
-    return saved.method, saved.tolerance, saved.machine
+def _kind(saved: Checkpoint) -> tuple[str, Tolerance, str, str]:
+    """What run stands there: how it is made, of which machine, and under which law."""
+    return saved.method, saved.tolerance, saved.machine, saved.law
 
 
 def _copied(law: Controller | None) -> Controller | None:

@@ -20,6 +20,7 @@ from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
+from flexctrl.dynamics.misreading import misread
 from flexctrl.dynamics.notes.answers import answers
 from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
 from flexctrl.dynamics.notes.leaving import leaves
@@ -175,7 +176,7 @@ def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning |
         asked = always or may_grow(journey, law) or are_asked(run, journey)
         if asked or leaves(run, journey, beginning.again):
             told = laid_beside(run, journey, check, beginning, shorter(journey, law))
-            run = loosened(told, run, journey, beginning)
+            run = loosened(misread(told, run, journey, beginning, law), run, journey, beginning)
     return said_of_rates(ringing(run, journey), journey)
 
 

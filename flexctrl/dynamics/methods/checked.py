@@ -117,9 +117,9 @@ class Checked(_Wrapped):
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so, for corners, for forces and
     rates, and for laws that meet limits; in a quarter of the steps for laws that jump by half a percent of what they
-    say. Nothing is run again for linear models and what is integrated exactly. A sampled law in Python is asked again
-    as a copy of what it was before the run; what goes on from a `Checkpoint` is laid beside what goes on from where
-    the run beside stood.
+    say, and twice more under a law that misreads by as much as it is off, if nothing is told. Nothing is run again for
+    linear models and what is integrated exactly. A sampled law in Python is asked again as a copy of what it was before
+    the run; what goes on from a `Checkpoint` is laid beside what goes on from where the run beside stood.
 
     Parameters
     ----------
