@@ -28,6 +28,7 @@ from flexctrl.structure.ties import tie
 
 _INDEPENDENT, _FELT_ON_RAILS = 1e-9, 1e-3
 _PROBE, _OPENS = 1e-4, 1e-5
+_NAMED = 8
 _HARMLESS = "it is one condition too many, which is harmless: where they can move they do not open it"
 _LOCKS = (
     "it is left free to second order, as parts in line are: a run or an equilibrium that opens it fails. Draw them off "
@@ -230,10 +231,16 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
     labels = [_label(structure, c) for c in ties.closures]
     notes = [f"{labels[i]} is held by rigid parts already; {_LOCKS if opens[i] else _HARMLESS}" for i in spare]
     if chosen:
-        tied = ", ".join(motion.names[i] for i in dependent)
-        notes.append(f"{tied} given by the others through " + ", ".join(labels[i] for i in chosen))
+        tied, through = _first([motion.names[i] for i in dependent]), _first([labels[i] for i in chosen])
+        notes.append(f"{tied} given by the others through {through}")
     closures, left = ([ties.closures[i] for i in some] for some in (chosen, spare))
     return _Loops(tuple(closures), tuple(dependent), tuple(left), tuple(notes))
+
+
+def _first(names: list[str]) -> str:
+    """The first of some names, and how many there are beside them."""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return ", ".join(names[:_NAMED]) + more
 
 
 def _lasting(ties: Ties, count: int) -> np.ndarray:
