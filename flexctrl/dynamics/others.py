@@ -14,7 +14,7 @@ from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.gap import Gap, between
-from flexctrl.dynamics.records.record import InMemory
+from flexctrl.dynamics.records.digest import Digest
 from flexctrl.dynamics.run import Run, Tolerance
 from flexctrl.dynamics.setting_out import travelled
 from flexctrl.errors import FlexctrlError
@@ -165,7 +165,7 @@ def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tu
         spacing = start.every
     try:
         unwatched = replace(changed, until=end, tell=ended, autosave=None)
-        _, other = travelled(unwatched, start, (), InMemory(), spacing)
+        _, other = travelled(unwatched, start, (), Digest(), spacing)
     except (FlexctrlError, KeyboardInterrupt) as fault:
         return noted(run, f"{UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), None
     first = journey.origin.u

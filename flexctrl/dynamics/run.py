@@ -142,8 +142,8 @@ class Report:
         By how much outputs may be off at an instant, each over the range of its own values (1: all of it): a
         deflection of millimetres beside a travel of metres. Forces and rates by other runs laid beside, by how they
         ring after loads that are put on at once, or by how large they get in a finer run (over their largest value),
-        whichever tells more; where none of these is there, nothing is told of them. Empty for linear models and
-        streamed rows; those that move by no more than absolute tolerances are left out.
+        whichever tells more; where none of these is there, nothing is told of them. Empty for linear
+        models; those that move by no more than absolute tolerances are left out.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str

@@ -16,6 +16,7 @@ from flexctrl.dynamics.interrupt import heed
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track, curves_of
+from flexctrl.dynamics.records.digest import watched
 from flexctrl.dynamics.records.record import Record
 from flexctrl.dynamics.records.rows import Rows
 from flexctrl.dynamics.result import result
@@ -41,7 +42,7 @@ def travelled(
     record: Record,
     spacing: float | None,
 ) -> tuple[Journey, Run]:
-    """Return a run from its start to where it ends, and what it leaves.
+    """Return a run from its start to where it ends, and what it leaves: of what is streamed a digest.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ def travelled(
         _check_going_on(plan, start, watch, spacing)
     stepper = plan.method.stepper(model, feed, plan.tolerance)
     curve = curves_of(model, stepper)
-    recorder = record.start((*model.outputs, *model.inputs), start.rows if isinstance(start, Checkpoint) else 0)
+    recorder = watched(record, (*model.outputs, *model.inputs), start.rows if isinstance(start, Checkpoint) else 0)
     try:
         rows = Rows(feed, spacing, plan.until, recorder, curve)
         track = Track(feed, record.states, curve)

@@ -27,7 +27,8 @@ from flexctrl.dynamics.notes.leaving import leaves
 from flexctrl.dynamics.notes.rates import are_asked, said_of_rates
 from flexctrl.dynamics.notes.ringing import ringing
 from flexctrl.dynamics.others import Beginning
-from flexctrl.dynamics.records.record import InMemory, Record
+from flexctrl.dynamics.records.digest import Watched
+from flexctrl.dynamics.records.record import InMemory, Record, Recorder
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
 from flexctrl.dynamics.steps import Fixed, Integrator
@@ -144,18 +145,25 @@ def simulate(
     )
     with Interruption() as kept, np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
         journey, run = travelled(plan, start, events_of(events), record, spacing)
-        looked = run
+        looked, cut = run, False
         try:
             looked = _growing(run, journey, beginning)
             if check and looked.status is not Status.FAILED:
                 looked = _compared(looked, journey, check, beginning, isinstance(method, Checked))
         except KeyboardInterrupt:  # the second one: whatever is known by now
-            return _cut(looked)
+            cut = True
         except Exception:  # what is in other hands may fail by it otherwise
             if not kept.asked:
                 raise
-            return _cut(looked)
-        return _cut(looked) if kept.asked else looked
+        return _held(_cut(looked) if cut or kept.asked else looked, journey.rows.recorder)
+
+
+def _held(run: Run, recorder: Recorder) -> Run:
+    """The run with the rows that it is to hold, of which a stream keeps the first and the last."""
+    if not isinstance(recorder, Watched):
+        return run
+    rows, width = recorder.recorder.table(), 1 + len(run.outputs)
+    return replace(run, t=rows[:, 0], y=rows[:, 1:width], u=rows[:, width:])
 
 
 def _growing(run: Run, journey: Journey, beginning: Beginning | None) -> Run:

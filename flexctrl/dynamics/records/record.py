@@ -14,7 +14,7 @@ from flexctrl.errors import StructureError
 from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_number, check_path, check_seconds
 
-__all__ = ["CsvStream", "InMemory", "Record", "Recorder", "Unwritten", "writing"]
+__all__ = ["CsvStream", "InMemory", "Record", "Recorder", "Table", "Unwritten", "writing"]
 
 
 class Unwritten(Exception):
@@ -89,13 +89,15 @@ class InMemory:
     def every(self) -> None:
         return None
 
-    def start(self, signals: Sequence[str], after: int = 0) -> _Table:
-        return _Table(1 + len(signals))
+    def start(self, signals: Sequence[str], after: int = 0) -> Table:
+        return Table(1 + len(signals))
 
 
 @frozen
 class CsvStream:
     """Curves are written to a file as they come; the run itself holds their first and last rows.
+
+    What is told of errors is told by all rows up to 8 MB of them, and beyond by every second, fourth, … one.
 
     A file that exists is replaced, unless the run goes on from a checkpoint: then lines follow those that were
     written until there, and what was written since is dropped. Lines are on the disk when the run ends, however it
@@ -106,6 +108,8 @@ class CsvStream:
     path : str or Path
     every : float, optional
         Spacing of the rows [s]; default: that of the run.
+    states : float
+        Bytes of states that may be kept in memory, as in `InMemory`.
 
     Raises
     ------
@@ -116,15 +120,13 @@ class CsvStream:
 
     path: str | Path
     every: float | None = None
+    states: float = 32e6
 
     def __post_init__(self) -> None:
         check_path(self.path, "CsvStream")
+        check_number(self.states, "bytes of states", "CsvStream", least=0.0)
         if self.every is not None:
             check_seconds(self.every, "every", "CsvStream", endless=True)
-
-    @property
-    def states(self) -> float:
-        return 0.0
 
     def start(self, signals: Sequence[str], after: int = 0) -> _Stream:
         path, header = Path(self.path), ",".join(["t", *signals]) + "\n"
@@ -151,7 +153,7 @@ class CsvStream:
         return _Stream(file, 1 + len(signals), [[float(number) for number in line.split(",")] for line in ends])
 
 
-class _Table:
+class Table:
     """Rows in one array that grows by half: no object is kept per row."""
 
     def __init__(self, width: int) -> None:
