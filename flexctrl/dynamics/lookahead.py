@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.steps import Controlled
+from flexctrl.dynamics.steps import Controlled, Fixed
 from flexctrl.errors import ControllerError
 
 if TYPE_CHECKING:
@@ -25,8 +25,9 @@ __all__ = ["look_ahead"]
 _FEWEST, _OF_RUN = 32, 4096
 """Instants in a step, and in as much as the whole run."""
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-_BENT, _MISSED = 0.02, 0.5
-"""What steps chosen by their error may leave the line by, and steps of one length: what they would not see at all."""
+_BENT, _MISSED, _CUT = 0.02, 0.1, 0.005
+"""What steps chosen by their error may leave the line by, and steps of one length; if it is more, shorter ones leave it
+by little, as no error of theirs keeps them short."""
 _ENOUGH = 8
 _LEAST, _STEEP = 1e-6, 8.0
 _TOUCH = 1e-9
@@ -78,7 +79,7 @@ def look_ahead(journey: Journey) -> None:
         return  # where it slides, a law jumps with whatever moves, time or places
     chosen = isinstance(plan.method.pace, Controlled)
     span = min(mark.size if chosen else plan.method.pace.step, stops.next - t)  # type: ignore[union-attr]
-    limit = _BENT if chosen else _MISSED
+    limit = _BENT if chosen else _CUT if _cut_lately(journey) else _MISSED
     if min(span, plan.until - t) <= journey.tick:
         return
     try:
@@ -96,8 +97,17 @@ def look_ahead(journey: Journey) -> None:
         journey.horizon = end
 
 
+def _cut_lately(journey: Journey) -> bool:
+    """Whether a step of one length has been ended by what is said in it: so are all that come instead of it."""
+    met, step = journey.plan.feed.met, journey.plan.method.pace.step  # type: ignore[union-attr]
+    return any(0.0 <= journey.point.state.t - t < (1.0 - _TOUCH) * step for t in met)
+
+
 def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
-    """Until when the law may be taken for a line in time, infinity if all along a span; and whether it jumps there."""
+    """Until when the law may be taken for a line in time, infinity if all along a span; and whether it jumps there.
+
+    All along, it may leave the line by a limit; what is cut from a span leaves it by little.
+    """
     t, until = journey.point.state.t, journey.plan.until
     for tried in range(_DEEPEST):
         course = _course(journey, span)
@@ -106,6 +116,7 @@ def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
             return jump, True
         if course.bends(last) <= limit:
             return (float(course.times[last]) if tried else math.inf), False
+        limit = min(limit, _CUT if isinstance(journey.plan.method.pace, Fixed) else _BENT)
         bent = next(end for end in range(2, last + 1) if course.bends(end) > limit)
         if bent > _ENOUGH:
             return float(course.times[bent - 1]), False
