@@ -12,7 +12,7 @@ from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.peaks import peaked
-from flexctrl.dynamics.notes.rates import may_be_lost, rated
+from flexctrl.dynamics.notes.rates import LOST, may_be_lost, rated
 from flexctrl.dynamics.others import UNCHECKED, Beginning, Other, made, noted, standing
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Controlled, Fixed
@@ -26,8 +26,9 @@ _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
 _ALIKE, _SAMPLED = 0.7, 0.5
 """A coarser run with more of the steps, or so many under samples, is much the same, and makes the same errors."""
-_NEARLY = 0.001
-"""A thirtieth of what is noted: coarser runs have told of rattling too little by seven times."""
+_OFF, _NEARLY = 0.01, 0.001
+"""What rates are apart by that counts, as all of it may be the first run's; and a thirtieth of what is noted: coarser
+runs have told of rattling too little by seven times."""
 
 
 def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> Run:
@@ -36,7 +37,7 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     Where it takes nearly as many steps, as something else keeps them short, a finer one has the last word. Where
     they tell little, one far coarser shows how errors grow with the tolerance, and a note says whether it goes
     elsewhere; of steps of one length the others know enough. Where rates may have lost their phase one nearer by is
-    asked.
+    asked, and of steps of one length a finer one: by which power of theirs errors go a single one does not tell.
 
     Parameters
     ----------
@@ -54,7 +55,10 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     """
     told, others = _by_all(run, journey, method, beginning, shorter)
     if others and _may_be_lost(run, journey, method, others):
-        told, nearer = made(told, journey, method.coarser(journey.plan.tolerance, _NEARER), beginning)
+        plan = journey.plan
+        finer = method.finer(plan.tolerance, plan.feed.sample_time, 0.5)
+        nearby = finer if isinstance(method.pace, Fixed) else method.coarser(plan.tolerance, _NEARER)
+        told, nearer = made(told, journey, nearby, beginning)
         others = (*others, nearer) if nearer else others
     return rated(told, [(other.run, other.beside.longer) for other in others], journey)
 
@@ -63,7 +67,8 @@ def _may_be_lost(run: Run, journey: Journey, method: Checked, others: tuple[Othe
     """Tell whether rates may have lost their phase in all coarser runs, where none is nearer by than the first."""
     nearest = min(others, key=lambda other: other.beside.longer)
     first = method.coarser(journey.plan.tolerance).longer
-    return nearest.beside.longer == first and may_be_lost(run, nearest.run, journey)
+    much = _OFF if isinstance(method.pace, Fixed) else LOST
+    return nearest.beside.longer == first and may_be_lost(run, nearest.run, journey, much)
 
 
 _Known = tuple[Run, tuple[Other, ...]]
@@ -73,7 +78,11 @@ _Known = tuple[Run, tuple[Other, ...]]
 def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> _Known:
     tolerance = journey.plan.tolerance
     if shorter < 1.0:
-        return _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)
+        told, others = _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)
+        if not (others and isinstance(method.pace, Fixed) and rattles(journey)):
+            return told, others
+        confirmed, finest = _confirmed(run, told, journey, method, beginning, 0.5 * shorter)
+        return confirmed, (*others, *finest)
     coarser = method.coarser(tolerance)
     told, first = _told(run, journey, coarser, beginning)
     if not first or first[0].run.status is Status.INTERRUPTED:
@@ -110,20 +119,20 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
         return elsewhere(kept, third.gap, journey, farther.said), others
     if not rattles(journey):
         return kept, others
-    confirmed, finer = _confirmed(run, kept, journey, method, beginning)
+    confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
     return confirmed, (*others, *finer)
 
 
-def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
+def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> _Known:
     """The run with what a finer one tells of it, if that is more.
 
-    Where corners come one after another errors go by no power of the steps: what coarser runs make of them may well be
-    too little, if it is not far less than what would be noted.
+    Where corners come one after another errors go by no power of the steps: what others make of them may well be too
+    little, if it is not far less than what would be noted.
     """
     if news(told, run) or max(told.report.error, *told.report.output_errors.values(), 0.0) < _NEARLY:
         return told, ()
     again = replace(run, checkpoint=told.checkpoint)
-    finer, others = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, 0.5), beginning)
+    finer, others = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, shorter), beginning)
     if finer.report.error > told.report.error:
         return _as_much(finer, told), others
     notes = (*told.report.notes, *(note for note in finer.report.notes if note not in run.report.notes))

@@ -21,7 +21,7 @@ from flexctrl.model.model import Model
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
+__all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
 _POINTS, _NEAR = 4, 1e-9
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
@@ -31,7 +31,7 @@ _ALIKE = 0.97
 """A coarser run in more of the steps is the same run: samples may round steps of any length to one."""
 _LEAST = 0.5
 """Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
-_LOST, _SURE = 0.1, 0.25
+LOST, _SURE = 0.1, 0.25
 """From which share of an output's range a gap is no longer one of small lags (all of it from twice that), and by how
 much the order seen may be lower."""
 _SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
@@ -98,7 +98,7 @@ def are_asked(run: Run, journey: Journey) -> bool:
     return bool(_judged(run, journey, _LITTLE))
 
 
-def may_be_lost(run: Run, other: Run, journey: Journey) -> bool:
+def may_be_lost(run: Run, other: Run, journey: Journey, share: float) -> bool:
     """Tell whether some force or rate of another run is so far away that it may have lost its phase.
 
     Parameters
@@ -108,6 +108,8 @@ def may_be_lost(run: Run, other: Run, journey: Journey) -> bool:
         In other steps.
     journey : Journey
         How the first went.
+    share : float
+        Of what the output goes through.
 
     Returns
     -------
@@ -115,7 +117,7 @@ def may_be_lost(run: Run, other: Run, journey: Journey) -> bool:
     """
     way = _judged(run, journey, _LITTLE)
     most = Apart.of(run, other, 2.0).most if way else np.zeros(0)
-    return any(most[i] > _LOST * far for i, far in way.items())
+    return any(most[i] > share * far for i, far in way.items())
 
 
 def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Run:
@@ -171,7 +173,7 @@ def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np
     """By how much each output may be off: by a finer run if there is one, else by the nearest coarser one.
 
     What rings in a coarser run may have lost its phase there: gaps that are a fifth of all that there is go by no power
-    of the steps, if no farther run shows that they do.
+    of the steps, if no farther run shows that they do; nor does a farther one whose gap is that large.
     """
     near, *farther = sorted(apart, key=lambda a: a.longer)
     single = not farther or near.longer == farther[-1].longer
@@ -182,9 +184,11 @@ def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np
     seen = (
         least if single else orders_seen(near.most, farther[-1].most, (near.longer, farther[-1].longer), (least, order))
     )
-    off = near.left(seen)
     with np.errstate(divide="ignore", invalid="ignore"):
-        lost = np.where(ways > 0.0, np.clip(near.most / ways / _LOST - 1.0, 0.0, 1.0), 0.0)
+        if not single and (farther[-1].most > 2.0 * LOST * ways)[ways > 0.0].any():
+            seen = least  # nor does one that has lost its phase show any power
+        off = near.left(seen)
+        lost = np.where(ways > 0.0, np.clip(near.most / ways / LOST - 1.0, 0.0, 1.0), 0.0)
     sure = ~np.full(off.shape, single) & (seen > order - _SURE)
     return np.where(sure, off, off + lost * (near.most - off))
 
