@@ -26,6 +26,7 @@ from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
 from flexctrl.dynamics.notes.leaving import leaves
 from flexctrl.dynamics.notes.rates import are_asked, said_of_rates
 from flexctrl.dynamics.notes.ringing import ringing
+from flexctrl.dynamics.notes.turned_over import turned_over
 from flexctrl.dynamics.others import Beginning
 from flexctrl.dynamics.records.digest import Watched
 from flexctrl.dynamics.records.record import InMemory, Record, Recorder
@@ -185,7 +186,7 @@ def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning |
         if asked or leaves(run, journey, beginning.again):
             told = laid_beside(run, journey, check, beginning, shorter(journey, law))
             run = loosened(misread(told, run, journey, beginning, law), run, journey, beginning)
-    return said_of_rates(ringing(run, journey), journey)
+    return turned_over(said_of_rates(ringing(run, journey), journey), journey)
 
 
 def _cut(run: Run) -> Run:

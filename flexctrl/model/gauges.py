@@ -20,6 +20,7 @@ from flexctrl.model.laws.loose_kinds import loose_spring
 from flexctrl.model.laws.part_kinds import rope_pull, spring_pull
 from flexctrl.model.model import Model
 from flexctrl.model.signals import winch_tension
+from flexctrl.model.turned import angle_went, face, turned
 from flexctrl.structure.drives import Winch
 from flexctrl.structure.lines import Rope, Spring
 from flexctrl.structure.outputs import (
@@ -34,8 +35,6 @@ from flexctrl.structure.outputs import (
 )
 
 __all__ = ["Gauges", "gauges_of", "read", "show"]
-
-_TURN = 2.0 * math.pi
 
 
 @dataclass
@@ -59,8 +58,10 @@ class Gauges:
     turns : Wholes
         Rotations: output, slot of the node's rotation, of the base's, and a sum that grows about as much.
     axes : Reals
-    shown, summed : Reals
-        Rotations, and these sums, when they were last read.
+    shown, summed, faced : Reals
+        Rotations, these sums, and quaternions (4 each) when they were last read.
+    facing : Reals
+        Of one of them, before.
     tensions : Runs
     """
 
@@ -82,6 +83,8 @@ class Gauges:
     axes: Reals
     shown: Reals
     summed: Reals
+    faced: Reals
+    facing: Reals
     tensions: Runs
 
 
@@ -107,31 +110,13 @@ def show(g: Gauges, z: Reals, y: Reals) -> None:
         y[g.angles[3 * k]] = math.atan2(g.sums[g.angles[3 * k + 1]], g.sums[g.angles[3 * k + 2]])
     for k in range(g.turning):
         at = g.turns[4 * k :]
-        about = g.shown[k] + g.sums[at[3]] - g.summed[k]
-        g.shown[k] = turned(z[at[1] :], z[at[2] :], g.axes[3 * k :], about)
+        for i in range(4):
+            g.facing[i] = g.faced[4 * k + i]
+        face(z[at[1] :], z[at[2] :], g.faced[4 * k :])
+        swept = angle_went(g.facing, g.faced[4 * k :], g.axes[3 * k :], g.sums[at[3]] - g.summed[k])
+        g.shown[k] = turned(z[at[1] :], z[at[2] :], g.axes[3 * k :], g.shown[k] + swept)
         g.summed[k] = g.sums[at[3]]
         y[at[0]] = g.shown[k]
-
-
-def turned(R: Reals, base: Reals, axis: Reals, about: float) -> float:
-    """Return the angle about an axis that is left of a rotation when the tilt of the axis is undone."""
-    sine = 0.0
-    cosine = 0.0
-    for i in range(3):
-        j = i + 1 if i < 2 else 0
-        k = 3 - i - j
-        axial = across(base, R, k, j) - across(base, R, j, k)
-        sine += axis[i] * axial
-        cosine += across(base, R, i, i)
-        for m in range(3):
-            cosine -= axis[i] * axis[m] * across(base, R, i, m)
-    angle = math.atan2(sine, cosine)
-    return angle + _TURN * math.floor((about - angle) / _TURN + 0.5)
-
-
-def across(base: Reals, R: Reals, i: int, j: int) -> float:
-    """Return an entry of baseᵀ R."""
-    return base[i] * R[j] + base[3 + i] * R[3 + j] + base[6 + i] * R[6 + j]
 
 
 def gauges_of(model: Model, q_start: int, position: np.ndarray) -> Gauges:
@@ -236,6 +221,8 @@ class _Builder:
             axes=np.concatenate([empty, *self.axes]),
             shown=np.zeros(len(self.turns)),
             summed=np.zeros(len(self.turns)),
+            faced=np.zeros(4 * len(self.turns)),
+            facing=np.zeros(4),
             tensions=runs,
         )
 

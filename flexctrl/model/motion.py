@@ -74,12 +74,14 @@ class Motion(Coordinates):
             pose = self.linkage.placed(self._pose(state.x, state.R), step[self.linked])
             x[self.nodes] = pose.reshape(-1, 12)[:, :3]
             R[self.nodes] = orthonormal(pose.reshape(-1, 4, 3)[:, 1:])
-        shown = self.shown(state.shown, step, R)
+        shown = self.shown(state, step, R)
         return State(x, R, state.q + step, v, self.unwound(x, R, self.wound(state, step)), t, state.dry, shown)
 
-    def shown(self, before: np.ndarray, step: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """Return the angles of outputs after a step to rotations R, from those before."""
-        return self.twists.next_to(before + self.winding @ step, R) if len(self.twists) else before
+    def shown(self, before: State, step: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Return the angles of outputs after a step to rotations R."""
+        if not len(self.twists):
+            return before.shown
+        return self.twists.next_to(before.shown + self.twists.swept(before.R, R, self.winding @ step), R)
 
     def counted(self, state: State) -> State:
         """Return a state made elsewhere with the angles of outputs next to those it shows, or else to its sums."""

@@ -108,8 +108,9 @@ class Rotation:
 
     Where the axis keeps its direction it is the plain angle of rotation, the integral of the angular
     velocity; it is followed from step to step and does not wrap after a turn. Where the axis tilts, it
-    is the twist that is left when the tilt is undone. Across a `Hinge` or drive it is measured about
-    the axis as the ``minus`` side carries it.
+    is the twist that is left when the tilt is undone; that is not defined where the axis has turned to its
+    opposite, and goes by a turn where it passes near: a run notes if its errors decide on which side. Across a
+    `Hinge` or drive it is measured about the axis as the ``minus`` side carries it.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flexctrl as fc
+from flexctrl.design import OpenLoop, Table, Together, pd
 
 ARM, RATIO, MOTOR, DAMPING, AREA, ANGLE, UNTIL = 1.287, -0.967, 2.04e-3, 0.0387, 0.408, -1.187, 0.1
 METHODS = {
@@ -169,3 +170,28 @@ def test_what_is_at_rest_in_the_wind_stays_so():
     run = fc.simulate(model, until=0.1, start=fc.equilibrium(model), method=fc.GeneralizedAlpha(1e-3))
     assert np.ptp(run["sway"]) < 1e-9
     assert not any("set out" in note for note in run.report.notes)
+
+
+@pytest.mark.parametrize("mass", [1e-3, 1e-5, 1e-7])
+def test_a_law_that_reads_how_they_set_out_is_laid_beside_others(mass):
+    """Its first command hangs on the steps: it was taken for a law with a memory, and nothing told of forces."""
+    cart, line = fc.PointMass("cart", (0, 0, 0), 5.0), fc.Spring("line", (0, 0, 0), (0, 0, -1.0), 50.0)
+    vane = fc.PointMass("vane", line.end, mass)
+    machine = fc.Structure(
+        [cart, line, vane],
+        [
+            fc.Support(cart.node, "v w"),
+            fc.Pin(cart.node, line.start),
+            fc.Pin(line.end, vane.node),
+            fc.Support(vane.node, "v"),
+        ],
+        [],
+        [fc.Force("push", cart.node, "x"), fc.WindSpeed("gust", "x")],
+        [fc.Position("x", cart.node, "x"), fc.Velocity("v", vane.node, "x"), fc.Tension("tension", line)],
+    )
+    model = fc.assemble(machine, [fc.Gravity(), fc.LargeRotation(), fc.Wind({"vane": 1.0})])
+    gust = OpenLoop({"gust": Table((0.0, 1.0, 2.0, 5.0), (3.0, 8.0, 2.0, 2.0))})
+    law = Together(pd(20.0, 8.0, measured="x", rate="v", command="push"), gust)
+    run = fc.simulate(model, law, until=2.0, every=0.02)
+    assert not any("keep memory" in note for note in run.report.notes)
+    assert set(run.report.output_errors) == {"x", "v", "tension"}

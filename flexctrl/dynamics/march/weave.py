@@ -9,10 +9,11 @@ from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.flat import Flat, clear, drive, place
 from flexctrl.model.gauges import Gauges, read
 from flexctrl.model.laws.kinds import NODE_SLOT
+from flexctrl.model.turned import face
 
 __all__ = ["Weave", "weave"]
 
-_POSE = 12
+_POSE, _PLACE = 12, 3
 _SPIN = 15
 _STRAIGHT = 1e-3
 _ALIGNED = 1e-6
@@ -151,9 +152,13 @@ def span(w: Weave, before: Reals, after: Reals) -> None:
 
 
 def recall_angles(w: Weave, shown: Reals) -> None:
-    """Take up the angles that outputs showed, and the sums that tell their whole turns."""
+    """Take up the angles that outputs showed, and what tells their whole turns."""
     g = w.gauges
+    pose = w.flat.pose
     for k in range(g.turning):
+        at = _POSE * ((g.turns[4 * k + 1] - _PLACE) // NODE_SLOT) + _PLACE
+        base = _POSE * ((g.turns[4 * k + 2] - _PLACE) // NODE_SLOT) + _PLACE
+        face(pose[at:], pose[base:], g.faced[4 * k :])
         i = g.turns[4 * k + 3]
         total = 0.0
         for j in range(g.starts[i], g.starts[i + 1]):

@@ -73,6 +73,7 @@ class Flattened:
         f.q[:], f.driven[:] = self.ordered(state.q), state.driven
         if self.gauges.turning:
             self.gauges.shown[:], self.gauges.summed[:] = state.shown, self.model.motion.winding @ state.q
+            self.gauges.faced[:] = np.ravel(self.model.motion.twists.quaternions(state.R))
         f.step[:], f.v[:], f.rate[:] = 0.0, self.ordered(state.v), 0.0
 
     @property

@@ -144,7 +144,14 @@ class Layout:
             pressing=int(self.entire.pressing),
         )
         shown, summed = np.zeros((2, self._gauges.turning))
-        gauges = replace(self._gauges, sums=np.zeros(self._gauges.rows), shown=shown, summed=summed)
+        gauges = replace(
+            self._gauges,
+            sums=np.zeros(self._gauges.rows),
+            shown=shown,
+            summed=summed,
+            faced=np.zeros(4 * len(shown)),
+            facing=np.zeros(4),
+        )
         return Flattened(self.model, flat, gauges, self._axes, self.plan, self.pattern[:2], self.constants, self.entire)
 
     @property

@@ -59,6 +59,8 @@ def small_gauges(layout: Layout) -> Gauges:
         axes=empty,
         shown=empty,
         summed=empty,
+        faced=empty,
+        facing=empty,
         tensions=(),
     )
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from flexctrl.frozen import frozen
+from flexctrl.model.turned import angle_went, face
 from flexctrl.structure.outputs import Rotation
 from flexctrl.structure.structure import Structure
 
@@ -62,3 +65,54 @@ class Twists:
         along = np.einsum("ki,kij,kj->k", self.axes, Q, self.axes)
         angle = np.arctan2((axial * self.axes).sum(axis=1), np.trace(Q, axis1=1, axis2=2) - along)
         return angle + 2.0 * np.pi * np.rint((expected - angle) / (2.0 * np.pi))
+
+    def swept(self, before: np.ndarray, R: np.ndarray, about: np.ndarray) -> np.ndarray:
+        """Return how far the angles go from one pose to another.
+
+        Parameters
+        ----------
+        before, R : numpy.ndarray, shape (nodes + 1, 3, 3)
+        about : numpy.ndarray, shape (angles,)
+            About how far, for those that go farther than half a turn.
+
+        Returns
+        -------
+        numpy.ndarray, shape (angles,)
+        """
+        pairs: Any = zip(self.quaternions(before), self.quaternions(R), self.axes.tolist(), about.tolist(), strict=True)
+        return np.array([angle_went(*pair) for pair in pairs])
+
+    def quaternions(self, R: np.ndarray) -> list[list[float]]:
+        """Return those of the nodes against their bases, of any length, scalars first.
+
+        Parameters
+        ----------
+        R : numpy.ndarray, shape (nodes + 1, 3, 3)
+
+        Returns
+        -------
+        list of list of float
+        """
+        found: list[Any] = [[0.0] * 4 for _ in self.at]
+        for at, base, q in zip(
+            R[self.at].reshape(-1, 9).tolist(), R[self.base].reshape(-1, 9).tolist(), found, strict=True
+        ):
+            face(at, base, q)
+        return found
+
+    def short_of_opposite(self, number: int, R: np.ndarray) -> float:
+        """Return by how much an axis is short of pointing the other way, where its angle is not defined [rad].
+
+        Parameters
+        ----------
+        number : int
+            Of the angle.
+        R : numpy.ndarray, shape (nodes + 1, 3, 3)
+
+        Returns
+        -------
+        float
+        """
+        axis, at, base = self.axes[number], self.at[number], self.base[number]
+        tilted = R[base].T @ R[at] @ axis
+        return float(np.arctan2(np.linalg.norm(np.cross(axis, tilted)), -axis @ tilted))
