@@ -25,10 +25,10 @@ __all__ = ["look_ahead"]
 _FEWEST, _OF_RUN = 32, 4096
 """Instants in a step, and in as much as the whole run."""
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-_BENT, _MISSED, _CUT = 0.02, 0.1, 0.005
-"""What steps chosen by their error may leave the line by, and steps of one length; if it is more, shorter ones leave it
-by little, as no error of theirs keeps them short."""
-_ENOUGH = 8
+_BENT, _CUT = 0.02, 0.005
+"""What steps may leave the line by; where those of one length do not, shorter ones leave it by little, as no error of
+theirs keeps them short."""
+_ENOUGH, _AHEAD = 8, 8.0
 _LEAST, _STEEP = 1e-6, 8.0
 _TOUCH = 1e-9
 _DEEPEST, _SMALLEST = 40, 1e-12
@@ -79,7 +79,7 @@ def look_ahead(journey: Journey) -> None:
         return  # where it slides, a law jumps with whatever moves, time or places
     chosen = isinstance(plan.method.pace, Controlled)
     span = min(mark.size if chosen else plan.method.pace.step, stops.next - t)  # type: ignore[union-attr]
-    limit = _BENT if chosen else _CUT if _cut_lately(journey) else _MISSED
+    limit = _CUT if not chosen and _cut_lately(journey) else _BENT
     if min(span, plan.until - t) <= journey.tick:
         return
     try:
@@ -108,15 +108,17 @@ def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
 
     All along, it may leave the line by a limit; what is cut from a span leaves it by little.
     """
-    t, until = journey.point.state.t, journey.plan.until
+    t, until, steady = journey.point.state.t, journey.plan.until, isinstance(journey.plan.method.pace, Fixed)
     for tried in range(_DEEPEST):
         course = _course(journey, span)
         last = len(course.times) - 1
+        if not tried and steady and limit == _BENT and course.bends(last) > limit:
+            course = course._replace(swings=_swings_ahead(journey, span))
         if course.steep and (jump := _first_jump(journey, course)) < math.inf:
             return jump, True
         if course.bends(last) <= limit:
             return (float(course.times[last]) if tried else math.inf), False
-        limit = min(limit, _CUT if isinstance(journey.plan.method.pace, Fixed) else _BENT)
+        limit = _CUT if steady else _BENT
         bent = next(end for end in range(2, last + 1) if course.bends(end) > limit)
         if bent > _ENOUGH:
             return float(course.times[bent - 1]), False
@@ -150,6 +152,14 @@ def _course(journey: Journey, span: float) -> _Course:
             return closer
         journey.mark.swings = swings  # how long the run is has no say in what it does
     return course
+
+
+def _swings_ahead(journey: Journey, span: float) -> np.ndarray:
+    """The swings that count in steps of one length: those of some steps to come, too, as what sets out gently bends."""
+    try:
+        return _asked(journey, _AHEAD * span, _FEWEST).swings
+    except ControllerError:
+        return _asked(journey, span, _FEWEST).swings
 
 
 def _asked(journey: Journey, span: float, count: int) -> _Course:
