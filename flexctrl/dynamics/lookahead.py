@@ -20,9 +20,9 @@ from flexctrl.errors import ControllerError
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["look_ahead"]
+__all__ = ["OF_RUN", "look_ahead"]
 
-_FEWEST, _OF_RUN = 32, 4096
+_FEWEST, OF_RUN = 32, 4096
 """Instants in a step, and in as much as the whole run."""
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _BENT, _CUT = 0.02, 0.005
@@ -144,7 +144,7 @@ def _first_jump(journey: Journey, course: _Course) -> float:
 def _course(journey: Journey, span: float) -> _Course:
     """Ask the law over a span from here; closely only if that shows what is passed over otherwise."""
     course = _asked(journey, span, _FEWEST)
-    closely = math.ceil(_OF_RUN * min(span / journey.plan.until, 1.0))
+    closely = math.ceil(OF_RUN * min(span / journey.plan.until, 1.0))
     if closely > _FEWEST and not course.steep and course.bends(len(course.times) - 1) <= _BENT:
         swings = journey.mark.swings
         closer = _asked(journey, span, closely)

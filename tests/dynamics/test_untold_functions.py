@@ -259,3 +259,20 @@ def test_what_bends_little_in_steps_of_one_length_ends_none():
     for method in (fc.GeneralizedAlpha(0.05), fc.ConservingMidpoint(0.05)):
         run = fc.simulate(cart(), OpenLoop({"force": lambda t: np.sin(10.0 * t)}), until=5.0, method=method)
         assert run.report.steps == 100
+
+
+@pytest.mark.parametrize(("middle", "width"), [(33.3, 0.0003), (33.3, 2.0)])
+def test_a_run_of_few_steps_says_how_closely_it_has_looked(middle, width):
+    def bump(t: float) -> float:
+        return 50.0 * np.exp(-(((t - middle) / width) ** 2))
+
+    run = fc.simulate(cart(), OpenLoop({"force": bump}), until=50.0)
+    felt = run["v"][-1] == pytest.approx(50.0 * width * np.sqrt(np.pi), rel=0.01)
+    assert felt or any("looked at every 0.01 s" in note for note in run.report.notes)
+    assert felt == (width > 1.0)
+
+
+def test_what_tells_its_instants_is_not_passed_over():
+    run = fc.simulate(cart(), OpenLoop({"force": Step(3.0, 10.0)}), until=50.0)
+    assert run["v"][-1] == pytest.approx(120.0)
+    assert not run.report.notes
