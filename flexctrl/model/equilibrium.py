@@ -25,7 +25,7 @@ from flexctrl.structure.freedoms import check_finite, check_number
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SOFT_REACH, _NEAR = 0.3, 0.1
+_SOFT_REACH, _NEAR = (0.3, 0.1, 0.03), 0.1
 _IN_PLACE, _ASTRAY = 1e-15, 1e-12
 
 
@@ -270,15 +270,26 @@ def _searched(balance: Balance, start: State, tolerance: float) -> Found:
     force = balance.force(start)
     load = max(float(np.abs(force / balance.lever[balance.free]).max(initial=0.0)), 1e-300)
     shift = 10.0 * load / (balance.heaviest * balance.size) if force.size else 0.0
-    soft = Newton(balance, tolerance, _SOFT_REACH).run(start, 240, shift)
-    found = soft if soft.done else follow(balance, start, tolerance, strict=False)[0]
+    found = _softly(balance, start, shift, tolerance)
+    if not found.done:
+        found = follow(balance, start, tolerance, strict=False)[0]
     if shift and not (found.done and _is_meant(balance, start, found.state)):
-        down = Newton(balance, tolerance, _SOFT_REACH, downhill=True).run(start, 240, shift)
+        down = Newton(balance, tolerance, _SOFT_REACH[0], downhill=True).run(start, 240, shift)
         found = _lasting(balance, found, down)
         if not (found.done and _is_meant(balance, start, found.state)) and balance.astray(start):
             found = _lasting(balance, found, _led_there(balance, start, shift, tolerance))
     if not found.done:
         raise EquilibriumError(_complaint(balance, found), found.state, found.residual)
+    return found
+
+
+def _softly(balance: Balance, start: State, shift: float, tolerance: float) -> Found:
+    """Where masses that fade lead to; by shorter steps where a slack cable, say, overshoots by several lengths."""
+    found = Newton(balance, tolerance, _SOFT_REACH[0]).run(start, 240, shift)
+    for reach in _SOFT_REACH[1:] if shift else ():
+        if found.done:
+            break
+        found = Newton(balance, tolerance, reach).run(start, 480, shift)
     return found
 
 
@@ -299,7 +310,7 @@ def _led_there(balance: Balance, start: State, shift: float, tolerance: float) -
 
     A cable drawn straight whose end is held nearer is pressed straight by steps that bring the end there at once.
     """
-    hung = Newton(balance.held_as(start), tolerance, _SOFT_REACH).run(start, 240, shift)
+    hung = Newton(balance.held_as(start), tolerance, _SOFT_REACH[0]).run(start, 240, shift)
     return follow(balance, hung.state, tolerance, strict=True, watch=True)[0] if hung.done else hung
 
 

@@ -158,7 +158,7 @@ class _Search:
         force, there = balance.force(start), balance.astray(start) == 0.0
         self.scale = max(balance.scale(start), 0.0 if there else _DUST_OF * balance.called_forth(start))
         self.newton, self.balance = newton, balance
-        self.shift, self.floor = shift, 1e-7 * shift
+        self.shift, self.floor, self.most = shift, 1e-7 * shift, _FASTEST * shift
         # what is not yet in its place calls forth what no force at the start tells of
         all_left = float(not there and (watched or not balance.loaded))
         self.best, self.least = start, max(balance.relative(force, self.scale), all_left)
@@ -192,13 +192,13 @@ class _Search:
 
     def _hold_uphill(self, K: sp.csr_matrix) -> None:
         """Add masses until they and K resist every displacement."""
-        inertia, most = sp.diags(self.balance.inertia), _FASTEST * self.shift
-        while self.shift < most and not self.balance.holds(self.here.state, (K + self.shift * inertia).tocsr()):
+        inertia = sp.diags(self.balance.inertia)
+        while self.shift < self.most and not self.balance.holds(self.here.state, (K + self.shift * inertia).tocsr()):
             self._held_faster()
 
     def _held_faster(self) -> bool:
         self.shift = 10.0 * max(self.shift, self.floor)
-        return self.shift > 0.0
+        return 0.0 < self.shift < self.most
 
     def _moved(self, there: _Iterate, size: float, share: float) -> bool:
         """Take stock after a step; return whether another one may help."""

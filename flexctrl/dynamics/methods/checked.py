@@ -114,7 +114,9 @@ class Checked(_Wrapped):
     note says which contact it hangs on if such a run is a fifth of the motion away, of the machine's or of an output's
     own. All runs in other steps may be wrong alike there.
 
-    Steps of one length are checked where it has gone so far twelve times, to and fro. Where samples keep nearly all
+    Steps of one length are checked where it has gone so far twelve times, to and fro. Where forces or rates are then a
+    hundredth of their range apart, one in half the steps tells of these; what has met four corners is confirmed by one
+    in a quarter of the steps, as what is told past corners comes from one in half. Where samples keep nearly all
     steps short the other run is a finer one, in half the steps, for what has turned so, for corners, for forces and
     rates, and for laws that meet limits; in a quarter of the steps for laws that jump by half a percent of what they
     say, and twice more under a law that misreads by as much as it is off, if nothing is told. Nothing is run again for
