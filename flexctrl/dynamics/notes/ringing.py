@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from flexctrl.dynamics.methods.extrapolation import Richardson
-from flexctrl.dynamics.notes.fading import fading
+from flexctrl.dynamics.notes.fading import fading, radius
 from flexctrl.dynamics.notes.outputs import Fast, placed
 from flexctrl.dynamics.notes.rates import is_named
 from flexctrl.dynamics.notes.shocks import Swing, shocks
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ringing"]
 
-_SEEN, _LITTLE, _STEADY, _RESOLVED = 1.0, 0.05, 0.01, 0.2
-"""Radians in a step; what counts, of what an output goes through and of its largest; a step that sees all."""
+_SEEN, _SEEN_BY_MANY, _LITTLE, _STEADY, _RESOLVED = 1.0, 2.0, 0.05, 0.01, 0.2
+"""Radians in a step, and in one of many stages; what counts, of what an output goes through and of its largest; a step
+that sees all."""
 _LAG = 0.3
 """Radians by which two runs part in phase from where on an extrapolation of them is larger than either."""
 _TOLD, _DUST = 1e-3, 1e-9
@@ -142,7 +144,7 @@ def _told(method: Integrator, swing: Swing, of: _Ringing) -> tuple[float, str]:
     """How far off a vibration may have an output, and what is to be said of it; nothing where that is little."""
     turned, angle = of.step * swing.frequency, of.lasts * swing.frequency
     said = {"name": of.name, "swing": swing.size, "since": of.since}
-    if turned > _SEEN:
+    if turned > (_SEEN_BY_MANY if math.isnan(radius(method)) else _SEEN):
         return swing.size, _SAID.format(**said, turned=turned, finer=_RESOLVED / swing.frequency)
     if isinstance(method, Richardson):
         lag = 0.75 * angle * turned**2 / 12.0
