@@ -110,11 +110,11 @@ def test_rows_that_are_no_numbers_tell_nothing():
 
 
 def test_what_has_lost_its_phase_goes_by_no_power():
-    """Of a gap that is a third of an output's range all may be the run's own, unless a farther run shows otherwise."""
+    """Of a gap all may be the run's own where it is a third of the output's range, or a farther run's is a fifth."""
     from flexctrl.dynamics.notes.rates import _off
 
     gap = np.array([0.3])
     assert _off([Apart(2.0, 1.0, gap)], np.ones(1), 2.0, steady=True)[0] == pytest.approx(0.3)
-    second, saturated = (Apart(6.0, 1.0, gap * grown) for grown in (35.0 / 8.0, 1.5))
-    assert _off([Apart(3.0, 1.0, gap), second], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.3 / 8.0)
-    assert _off([Apart(3.0, 1.0, gap), saturated], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.3)
+    for size, grown, left in ((0.03, 35.0 / 8.0, 0.03 / 8.0), (0.06, 35.0 / 8.0, 0.06), (0.3, 1.5, 0.3)):
+        pair = [Apart(3.0, 1.0, np.array([size])), Apart(6.0, 1.0, np.array([size * grown]))]
+        assert _off(pair, np.ones(1), 2.0, steady=False)[0] == pytest.approx(left)
