@@ -60,7 +60,7 @@ def instant(note: str) -> float:
 
 @pytest.mark.parametrize(("model", "speed", "method", "tolerance", "when"), COARSE, ids=["late", "chosen"])
 def test_what_no_other_steps_tell_contacts_that_bear_a_little_more_or_less_do(model, speed, method, tolerance, when):
-    """Runs that are off by 0.4 of the motion of `a`: of one a run in a quarter of the steps tells, of the other none."""
+    """Runs that are off by 0.4 of the motion of `a`: of one a run in quarter steps tells, of the other none."""
     how = {"until": 0.8, "start": model.drawn.with_(v=np.array([0.0, speed])), "every": 0.005}
     true = fc.simulate(model, method=fc.Unchecked(fc.ExplicitRungeKutta()), tolerance=fc.Tolerance(1e-8, 1e-11), **how)
     run = fc.simulate(model, method=method, tolerance=tolerance, **how)
