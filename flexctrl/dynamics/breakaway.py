@@ -16,7 +16,7 @@ from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.beside import PARTED, agreeing
 from flexctrl.dynamics.notes.outputs import seen
-from flexctrl.dynamics.others import Beginning, Other, made
+from flexctrl.dynamics.others import Beginning, Other, made, noted
 from flexctrl.dynamics.run import Run
 from flexctrl.effects.coulomb_friction import Coulomb, CoulombFriction
 from flexctrl.effects.effect import Effect
@@ -86,7 +86,7 @@ def _with(run: Run, journey: Journey, beginning: Beginning, share: float) -> Run
     alike = Beside(plan.method, plan.tolerance, 1.0, "in the same steps")
     standing, other = made(run, journey, alike, replace(beginning, feed=feed))
     note = "" if other is None else _note(run, other, journey, beginning.t, share)
-    return replace(standing, report=replace(standing.report, notes=standing.report.notes + (note,) * bool(note)))
+    return noted(standing, note) if note else standing
 
 
 def _bearing(model: Model, share: float) -> Model:

@@ -55,9 +55,9 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     """
     told, others = _by_all(run, journey, method, beginning, shorter)
     if others and _may_be_lost(run, journey, method, others):
-        plan = journey.plan
-        finer = method.finer(plan.tolerance, plan.feed.sample_time, 0.5)
-        nearby = finer if isinstance(method.pace, Fixed) else method.coarser(plan.tolerance, _NEARER)
+        tolerance, sample = journey.plan.tolerance, journey.plan.feed.sample_time
+        steady = isinstance(method.pace, Fixed)
+        nearby = method.finer(tolerance, sample, 0.5) if steady else method.coarser(tolerance, _NEARER)
         told, nearer = made(told, journey, nearby, beginning)
         others = (*others, nearer) if nearer else others
     return rated(told, [(other.run, other.beside.longer) for other in others], journey)

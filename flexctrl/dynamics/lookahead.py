@@ -113,7 +113,7 @@ def _clear(journey: Journey, span: float, limit: float) -> tuple[float, bool]:
         course = _course(journey, span)
         last = len(course.times) - 1
         if not tried and steady and limit == _BENT and course.bends(last) > limit:
-            course = course._replace(swings=_swings_ahead(journey, span))
+            course = course._replace(swings=_swings_ahead(journey, span, course))
         if course.steep and (jump := _first_jump(journey, course)) < math.inf:
             return jump, True
         if course.bends(last) <= limit:
@@ -154,12 +154,12 @@ def _course(journey: Journey, span: float) -> _Course:
     return course
 
 
-def _swings_ahead(journey: Journey, span: float) -> np.ndarray:
+def _swings_ahead(journey: Journey, span: float, course: _Course) -> np.ndarray:
     """The swings that count in steps of one length: those of some steps to come, too, as what sets out gently bends."""
     try:
         return _asked(journey, _AHEAD * span, _FEWEST).swings
-    except ControllerError:
-        return _asked(journey, span, _FEWEST).swings
+    except ControllerError:  # it may say nothing there
+        return course.swings
 
 
 def _asked(journey: Journey, span: float, count: int) -> _Course:

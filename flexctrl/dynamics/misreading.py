@@ -18,7 +18,7 @@ from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.outputs import fast, seen, ways
 from flexctrl.dynamics.notes.rates import Apart
-from flexctrl.dynamics.others import Beginning, made
+from flexctrl.dynamics.others import Beginning, made, noted
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.frozen import frozen
@@ -114,7 +114,7 @@ def _with(run: Run, journey: Journey, beginning: Beginning, off: np.ndarray) -> 
     alike = Beside(journey.plan.method, journey.plan.tolerance, 1.0, "in the same steps")
     standing, other = made(run, journey, alike, _misread(beginning, off))
     note = "" if other is None else _note(run, other.run, journey, off)
-    return replace(standing, report=replace(standing.report, notes=standing.report.notes + (note,) * bool(note)))
+    return noted(standing, note) if note else standing
 
 
 def _misread(beginning: Beginning, off: np.ndarray) -> Beginning:

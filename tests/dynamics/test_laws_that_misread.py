@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
-from scipy.linalg import expm
+from shafts import machine, speeds
 
 import flexctrl as fc
 from flexctrl.design import Quantised, Sampled, pd
@@ -14,7 +12,7 @@ from flexctrl.design.lowering import lowered
 from flexctrl.design.wrapping import Wrapper
 from flexctrl.dynamics.misreading import Misreading
 
-LOAD, ROTOR, UNTIL = 1.0, 0.3, 3.0
+UNTIL = 3.0
 
 
 class Relay:
@@ -34,41 +32,6 @@ class Relay:
 
     def update(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return x
-
-
-def shaft(frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """Stiffness and damping of a shaft between the rotor and its load."""
-    stiffness = frequency**2 * LOAD * ROTOR / (LOAD + ROTOR)
-    return stiffness, 2.0 * damping_ratio * stiffness / frequency
-
-
-def speeds(frequency: float, damping_ratio: float, law: Relay) -> np.ndarray:
-    """The motor's speed at all samples, by the exact map between them."""
-    k, d = shaft(frequency, damping_ratio)
-    A = np.zeros((5, 5))
-    A[:2, 2:4] = np.eye(2)
-    A[2, :4] = np.array([-k, k, -d, d]) / LOAD
-    A[3] = np.array([k, -k, d, -d, 1.0]) / ROTOR
-    E, s, found = expm(A * law.sample_time), np.zeros(4), [0.0]
-    for _ in range(round(UNTIL / law.sample_time)):
-        s = E[:4, :4] @ s + E[:4, 4] * law.command(0.0, np.zeros(0), s[[1, 3]])
-        found.append(s[3])
-    return np.array(found)
-
-
-@cache
-def machine(frequency: float, damping_ratio: float) -> fc.Model:
-    stiffness, damping = shaft(frequency, damping_ratio)
-    disc = fc.RigidBody("disc", (0, 0, 0), 1.0, (LOAD,) * 3)
-    motor = fc.RotaryDrive("motor", disc.node, axis="z", stiffness=stiffness, inertia=ROTOR, damping=damping)
-    structure = fc.Structure(
-        [disc],
-        [fc.Support(disc.node, "u v w rx ry")],
-        [motor],
-        [fc.MotorTorque("torque", motor)],
-        [fc.DriveAngle("angle", motor), fc.DriveSpeed("speed", motor)],
-    )
-    return fc.assemble(structure, [fc.Flexible(), fc.LargeRotation()])
 
 
 SILENT = [
@@ -98,7 +61,7 @@ def test_no_relay_is_silently_wrong(frequency, ratio, sample, dead, way):
     law = Relay(dead, sample)
     method = fc.GeneralizedAlpha(0.25 * sample) if way == "steps of one length" else None
     run = fc.simulate(machine(frequency, ratio), law, until=UNTIL, every=sample, method=method, tolerance=WAYS[way])
-    true = speeds(frequency, ratio, law)
+    true = speeds(frequency, ratio, lambda y: law.command(0.0, np.zeros(0), y), sample, UNTIL)
     off = np.abs(run["speed"] - true).max() / np.ptp(true)
     assert run.status is fc.Status.FINISHED
     assert run.report.output_errors["speed"] > 0.33 * off or off < 0.02 or run.report.notes

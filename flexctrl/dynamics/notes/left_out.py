@@ -53,10 +53,10 @@ def passed_over(journey: Journey) -> tuple[str, ...]:
     -------
     tuple of str
     """
-    t, feed = journey.point.state.t, journey.plan.feed
-    if not feed.untold or journey.mark.steps >= _FEW:
+    plan = journey.plan
+    if not plan.feed.untold or journey.mark.steps >= _FEW:
         return ()
     return (
-        f"functions of time were looked at every {t / OF_RUN:.1g} s, as steps are long: what they do within less may "
-        "have been passed over; give it as Step or Table, which tell when, or the method a largest_step",
+        f"functions of time were looked at every {plan.until / OF_RUN:.1g} s, as steps are long: what they do within "
+        "less may have been passed over; give it as Step or Table, which tell when, or the method a largest_step",
     )
