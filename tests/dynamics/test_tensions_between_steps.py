@@ -63,3 +63,13 @@ def test_what_steps_resolve_is_interpolated_as_all_else():
     coarse = fc.simulate(model, until=2.0, method=fc.GeneralizedAlpha(0.02), every=0.005)
     fine = fc.simulate(model, until=2.0, method=fc.GeneralizedAlpha(0.005), every=0.005)
     assert np.abs(coarse["tension"] - fine["tension"]).max() < 0.01 * np.ptp(fine["tension"])
+
+
+@pytest.mark.parametrize("turn", [1.5, 2.5])
+@pytest.mark.parametrize("stiffness", [1e5, 1e6], ids="{:.0e}".format)
+def test_a_polynomial_of_many_stages_follows_more_than_a_radian(stiffness, turn):
+    """Straight lines between the ends of its steps were off by 0.4 to 11 % of the range."""
+    model, step = pendulum(stiffness), turn / np.sqrt(stiffness / LENGTH / MASS)
+    fine = fc.ExplicitRungeKutta(0.2 * step)
+    coarse, right = (fc.simulate(model, until=3.0, method=m, every=0.003) for m in (fc.ExplicitRungeKutta(step), fine))
+    assert np.abs(coarse["tension"] - right["tension"]).max() < 1e-3 * np.ptp(right["tension"])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -329,6 +329,7 @@ class _Curve:
     stepper: ExactStepper
     before: ModalPoint
     after: ModalPoint
+    seen: ClassVar[float] = math.inf
 
     def at(self, t: float) -> State:
         """Return the state at a time of the step."""

@@ -11,6 +11,7 @@ from flexctrl.dynamics.events.watch import Crossing, Watch
 from flexctrl.dynamics.events.watching import TOGETHER
 from flexctrl.dynamics.march.record import TURN, TURNED
 from flexctrl.dynamics.records.dense import Dense
+from flexctrl.dynamics.records.tensions import Span
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.march.marching import Pacing
@@ -44,9 +45,10 @@ def looked_at(ride: Ride, before: Any, pacing: float | Pacing) -> tuple[int, int
         watch.settle(after)
     except EventError:
         return status, done, False
+    span = Span(before.state, after.state, curve.seen)
     for crossing, state in told:
         watch.cross(crossing)
-        j.happens(crossing, state, before.supply.u, (before.state, after.state))
+        j.happens(crossing, state, before.supply.u, span)
     count = len(watch.events)
     j.watch.sides[:count], j.watch.sizes[:count] = watch.sides, watch.sizes
     return status, done, True

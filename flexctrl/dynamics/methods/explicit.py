@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -249,6 +250,7 @@ class _Curve:
     stepper: _Stepper
     before: _Point
     after: _Point
+    seen: ClassVar[float] = 3.0
 
     @cached_property
     def _parts(self) -> tuple[np.ndarray, list[np.ndarray]]:

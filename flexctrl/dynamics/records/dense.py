@@ -6,13 +6,13 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.methods.local import Local
-from flexctrl.dynamics.records.tensions import Tensions
+from flexctrl.dynamics.records.tensions import Span, Tensions
 from flexctrl.dynamics.steps import Point, Stepper
 from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
@@ -23,6 +23,10 @@ __all__ = ["Booked", "Curve", "Dense", "Hermite", "Track", "curves_of"]
 
 class Curve(Protocol):
     """The motion over one step."""
+
+    @property
+    def seen(self) -> float:
+        """Radians of a vibration in the step up to which it is followed."""
 
     def at(self, t: float) -> State:
         """Return the state at a time of the step."""
@@ -52,6 +56,7 @@ class Hermite:
     local: Local
     start: State
     end: State
+    seen: ClassVar[float] = 1.0
 
     @cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -208,21 +213,22 @@ class Track:
 
     def moment(self, t: float) -> tuple[State, np.ndarray, np.ndarray]:
         """Return the state, the outputs and the inputs at a time."""
-        state, u, ends = self._found(t)
-        outputs = self.tensions.within(state, *ends) if ends else self.feed.model.measure(state)
+        state, u, span = self._found(t)
+        outputs = self.tensions.within(state, span) if span else self.feed.model.measure(state)
         return state, outputs, u
 
-    def _found(self, t: float) -> tuple[State, np.ndarray, tuple[State, State] | None]:
-        """The state and the inputs, and the ends of the step that it is within."""
+    def _found(self, t: float) -> tuple[State, np.ndarray, Span | None]:
+        """The state and the inputs, and the step that it is within."""
         before, after = self._ends(t)
         for end in (after, before):
             if t == end.state.t:
                 return end.state, end.supply.u, None
         h = after.state.t - before.state.t
-        state = self.curve(before, after).at(t)
+        curve = self.curve(before, after)
+        state = curve.at(t)
         share = ((t - before.state.t) / h, h)
         u = self.feed.between(before.supply, after.supply, share, state).u
-        return state, u, (before.state, after.state)
+        return state, u, Span(before.state, after.state, curve.seen)
 
     def step(self, t: float) -> float:
         """Return how long the step at a time is [s]."""

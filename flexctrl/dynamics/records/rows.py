@@ -11,10 +11,10 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.inputs import Inputs
 from flexctrl.dynamics.march.weaving import Weaver
-from flexctrl.dynamics.records.dense import Curve
+from flexctrl.dynamics.records.dense import Curve, Hermite
 from flexctrl.dynamics.records.frames import Frames, Later
 from flexctrl.dynamics.records.record import Recorder
-from flexctrl.dynamics.records.tensions import Tensions
+from flexctrl.dynamics.records.tensions import Span, Tensions
 from flexctrl.dynamics.steps import Fixed, Pace, Point
 from flexctrl.model.state import State
 
@@ -65,7 +65,7 @@ class Rows:
             state = curve.at(row)
             share = ((row - before.state.t) / h, h)
             u = self.feed.between(before.supply, after.supply, share, state).u
-            self._write_between(state, before.state, after.state, u)
+            self._write_between(state, Span(before.state, after.state, curve.seen), u)
         if not to_jump:
             self.here(after, near)
 
@@ -78,7 +78,8 @@ class Rows:
             state = states[i]
             if abs(times[i] - row) > near:
                 before, after = (Point(end, np.zeros(0), supply) for end in (states[i - 1] if i else start, state))
-                self._write_between(self.curve(before, after).at(row), before.state, state, supply.u)
+                curve = self.curve(before, after)
+                self._write_between(curve.at(row), Span(before.state, state, curve.seen), supply.u)
                 continue
             if i >= kept:
                 return
@@ -120,12 +121,13 @@ class Rows:
     ) -> None:
         """Put tensions of stiff lines right in rows within steps."""
         h = np.diff(table[:, 0], prepend=weaver.t)
-        if ends.all() or not self.tensions.stiff(float(h.max())):
+        if ends.all() or not self.tensions.stiff(float(h.max()), Hermite.seen):
             return
         start = np.array([weaver.t, *weaver.reading(0, weaver.t)])
         at, t, before = steps[~ends], rows[~ends, 0], np.vstack([start, table[:-1]])
         share = (t - before[at, 0]) / h[at]
-        rows[~ends, 1:] = self.tensions.straight(rows[~ends, 1:], (before[at, 1:], table[at, 1:]), share, h[at])
+        within = before[at, 1:], table[at, 1:]
+        rows[~ends, 1:] = self.tensions.straight(rows[~ends, 1:], within, share, h[at], Hermite.seen)
 
     @cached_property
     def tensions(self) -> Tensions:
@@ -205,9 +207,9 @@ class Rows:
         self.recorder.row(state.t, self.feed.model.measure(state), u)
         self.frame(state)
 
-    def _write_between(self, state: State, before: State, after: State, u: np.ndarray) -> None:
+    def _write_between(self, state: State, span: Span, u: np.ndarray) -> None:
         self.count += 1
-        self.recorder.row(state.t, self.tensions.within(state, before, after), u)
+        self.recorder.row(state.t, self.tensions.within(state, span), u)
         self.frame(state)
 
     def frame(self, state: State) -> None:

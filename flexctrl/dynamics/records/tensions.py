@@ -13,10 +13,24 @@ from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.outputs import Tension
 
-__all__ = ["Tensions"]
+__all__ = ["Span", "Tensions"]
 
-_STIFF = 1.0
-"""Radians of a line's vibration in a step from which on interpolated places tell nothing of its length."""
+
+@frozen(eq=False)
+class Span:
+    """The step that a state is within.
+
+    Attributes
+    ----------
+    before, after : State
+        At its start and at its end.
+    seen : float
+        Radians of a line's vibration in it from which on interpolated places tell nothing of its length.
+    """
+
+    before: State
+    after: State
+    seen: float
 
 
 @frozen
@@ -44,28 +58,21 @@ class Tensions:
         found = [(i, frequency) for i, frequency in found if frequency > 0.0]
         return np.array([i for i, _ in found], dtype=int), np.array([frequency for _, frequency in found])
 
-    def stiff(self, h: float) -> bool:
-        """Tell whether some line is stiff in a step of a length [s]."""
-        return bool((h * self._lines[1] > _STIFF).any())
+    def stiff(self, h: float, seen: float) -> bool:
+        """Tell whether some line turns by more than what is seen [rad] in a step of a length [s]."""
+        return bool((h * self._lines[1] > seen).any())
 
-    def within(self, state: State, before: State, after: State) -> np.ndarray:
-        """Return the outputs of a state within a step, shape (outputs,).
-
-        Parameters
-        ----------
-        state : State
-            Interpolated.
-        before, after : State
-            At the start and at the end of the step.
-        """
-        values, h = self.model.measure(state), after.t - before.t
-        if not (h > 0.0 and self.stiff(h)):
+    def within(self, state: State, span: Span) -> np.ndarray:
+        """Return the outputs of a state that is interpolated within a step, shape (outputs,)."""
+        values, before, after = self.model.measure(state), span.before, span.after
+        h = after.t - before.t
+        if not (h > 0.0 and self.stiff(h, span.seen)):
             return values
         ends = self.model.measure(before)[None], self.model.measure(after)[None]
-        return self.straight(values[None], ends, np.array([(state.t - before.t) / h]), np.array([h]))[0]
+        return self.straight(values[None], ends, np.array([(state.t - before.t) / h]), np.array([h]), span.seen)[0]
 
     def straight(
-        self, values: np.ndarray, ends: tuple[np.ndarray, np.ndarray], share: np.ndarray, h: np.ndarray
+        self, values: np.ndarray, ends: tuple[np.ndarray, np.ndarray], share: np.ndarray, h: np.ndarray, seen: float
     ) -> np.ndarray:
         """Return outputs within steps with the tensions of stiff lines between those at the ends.
 
@@ -77,6 +84,8 @@ class Tensions:
             At the start and at the end of the step that each is in.
         share, h : numpy.ndarray, shape (rows,)
             What of the step is done, and its length [s].
+        seen : float
+            As in `Span`.
 
         Returns
         -------
@@ -88,5 +97,5 @@ class Tensions:
         first, last = (end[:, columns] for end in ends)
         found = values.copy()
         line = first + share[:, None] * (last - first)
-        found[:, columns] = np.where(h[:, None] * frequencies > _STIFF, line, values[:, columns])
+        found[:, columns] = np.where(h[:, None] * frequencies > seen, line, values[:, columns])
         return found
