@@ -1,4 +1,4 @@
-"""Machines with a share of the stiffness of some shafts."""
+"""Machines with a share of the stiffness of some shafts or ropes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ import scipy.sparse as sp
 
 from flexctrl.model.laws.families import Family
 from flexctrl.model.laws.loose_kinds import LOOSE_DRIVES
-from flexctrl.model.laws.part_kinds import LINEAR_DRIVE, ROTARY_DRIVE
+from flexctrl.model.laws.part_kinds import HEAVY_ROPE, LINEAR_DRIVE, ROPE, ROTARY_DRIVE
 from flexctrl.model.model import Model
 from flexctrl.structure.drives import LinearDrive, RotaryDrive
+from flexctrl.structure.lines import Rope
 
-__all__ = ["shafts_of", "softened"]
+__all__ = ["ropes_of", "shafts_of", "softened"]
 
-_KINDS = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES)
+_SHAFTS, _ROPES = (ROTARY_DRIVE, LINEAR_DRIVE, *LOOSE_DRIVES), (ROPE, HEAVY_ROPE)
 
 
 def shafts_of(model: Model) -> dict[int, str]:
@@ -35,15 +36,30 @@ def shafts_of(model: Model) -> dict[int, str]:
     return {i: name for i, name in shafts if i < model.n}
 
 
+def ropes_of(model: Model) -> dict[str, float]:
+    """Return the stiffness EA of ropes that turn and stretch [N], by name; small motion has none.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    dict of str to float
+    """
+    ropes = [p for p in model.structure.elements if isinstance(p, Rope)] if model.large else []
+    return {rope.name: rope.EA for rope in ropes if model.bends(rope)}
+
+
 def softened(model: Model, shares: Mapping[str, float]) -> Model:
-    """Return a machine with a share of the stiffness and damping of the shafts of some drives.
+    """Return a machine with a share of the stiffness and damping of the shafts of some drives, or of that of ropes.
 
     Parameters
     ----------
     model : Model
         Of no small motion about an equilibrium (`GeometricStiffness`).
     shares : mapping of str to float
-        By the names of drives.
+        By the names of drives and ropes.
 
     Returns
     -------
@@ -58,10 +74,9 @@ def softened(model: Model, shares: Mapping[str, float]) -> Model:
 
 
 def _soft(family: Family, shares: Mapping[str, float]) -> Family:
-    if family.kernels.kind not in _KINDS:
-        return family
+    columns = 2 if family.kernels.kind in _SHAFTS else 1 if family.kernels.kind in _ROPES else 0
     parameters = family.parameters.copy()
-    parameters[:, :2] *= np.array([shares.get(name, 1.0) for name in family.parts])[:, None]
+    parameters[:, :columns] *= np.array([shares.get(name, 1.0) for name in family.parts])[:, None]
     return replace(family, parameters=parameters)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.model.balance import Balance
-from flexctrl.model.equilibrium import _pushed_freely
+from flexctrl.model.seeking import _pushed_freely
 
 
 def cable(EA: float, EI: float, elements: int = 10) -> fc.Model:

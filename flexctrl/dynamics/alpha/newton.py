@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-__all__ = ["ASTRAY", "ITERATIONS", "POOR", "small_enough", "wanted"]
+from collections.abc import Sequence
+
+__all__ = ["ASTRAY", "ITERATIONS", "POOR", "circling", "small_enough", "wanted"]
 
 ITERATIONS = 12
 POOR = 0.25
@@ -11,6 +13,7 @@ ASTRAY = 1.5
 """What steps turn beyond what was foreseen leads to another root [rad]."""
 _ROUND_OFF = 1e-13
 """Corrections below this that do not shrink any more are round-off."""
+_ALIKE = 1e-4
 
 
 def small_enough(size: float, contraction: float, tolerance: float, exact: bool) -> bool:
@@ -22,3 +25,9 @@ def small_enough(size: float, contraction: float, tolerance: float, exact: bool)
 def wanted(tolerance: float, exact: bool) -> float:
     """Return the size of the last correction; exact steps end near stiff flanks, whose force is felt in last digits."""
     return min(tolerance, _ROUND_OFF) if exact else tolerance
+
+
+def circling(sizes: Sequence[float]) -> bool:
+    """Tell whether the last corrections are of one size: from one side of a jump of forces to the other and back."""
+    last = sizes[-3:]
+    return len(last) == 3 and max(last) - min(last) <= _ALIKE * max(last)

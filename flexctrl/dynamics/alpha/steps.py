@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics.alpha.coning import coning_of
-from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough, wanted
+from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, circling, small_enough, wanted
 from flexctrl.dynamics.alpha.outset import join, lengthen, renew, start
 from flexctrl.dynamics.alpha.point import AlphaPoint, Coefficients
 from flexctrl.dynamics.alpha.sliding import jumps, slide
@@ -182,7 +182,7 @@ class Stepper:
         step, v, rate = self._foreseen(point, h)
         foreseen, last, contraction, end = step, np.inf, 0.0, later(now.t, h)
         wary = h * self.firmest > STIFF
-        caution, across = Caution(min(self.tolerance, SURE), self._exact), False
+        caution, across, sizes = Caution(min(self.tolerance, SURE), self._exact), False, list[float]()
         for iteration in range(ITERATIONS):
             state = self.model.advance(now, step, v, end)
             supply = self.feed.at(state, point.supply, h)
@@ -197,8 +197,9 @@ class Stepper:
             step = step + correction + self.coning(h, now.v, to_v * correction)
             v, rate = v + to_v * correction, rate + to_rate * correction
             contraction = size / last if 0.0 < last < np.inf else 0.0
-            worse = contraction > 2.0 and iteration > 3 and not wary
-            if not np.isfinite(size) or worse or self._astray(step - foreseen):
+            sizes.append(size)
+            hopeless = not wary and ((contraction > 2.0 and iteration > 3) or circling(sizes))
+            if not np.isfinite(size) or hopeless or self._astray(step - foreseen):
                 break
             if caution.over(size, contraction, iteration) if wary else self._solved(size, contraction):
                 across = self._across(now, step, v)

@@ -120,7 +120,7 @@ def _short_of(journey: Journey, before: Point, after: Point, crossing: Crossing)
         found, when, last, back = after, end + (max(off, 0.0) if off < math.inf else 0.0), (end, above), lead
         if near_enough(off * above / left, h, lead, missed):
             break
-        at = inside(bracket, end + on - lead)
+        at = inside(bracket, end + (off if missed else on) - lead)
     if found is not before and when - found.state.t > ASTRAY * h:
         name = watch.corner_names[gauge - len(watch.events) - len(watch.names)]
         why = f"the longest step that ends short of the corner of {name} leaves {when - found.state.t:.1e} s to it"

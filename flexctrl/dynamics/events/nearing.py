@@ -55,8 +55,9 @@ def narrow(b: Bracket, at: float, left: float) -> None:
     """Take a time for one of the two."""
     b.count += 1
     if left > 0.0:
-        b.low = at
-        b.ahead = left
+        if at >= b.low:  # where a step ends short of what was asked, another may have come nearer
+            b.low = at
+            b.ahead = left
     else:
         b.high = at
         b.behind = left

@@ -147,7 +147,7 @@ def short_of(m: March, guess: float, h: float) -> bool:
             c.when = max(off, 0.0) if off < math.inf else 0.0
             if near_enough(off * above / (above + dust), h, lead, missed):
                 return True
-            at = inside(b, end + on - lead)
+            at = inside(b, end + (off if missed else on) - lead)
         else:
             last = at
             back = 4.0 * back
