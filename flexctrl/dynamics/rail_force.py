@@ -10,7 +10,7 @@ from flexctrl.dynamics.alpha.point import Coefficients
 from flexctrl.dynamics.alpha.steps import Stepper
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.errors import StructureError, did_you_mean
-from flexctrl.model.consistent import check_state
+from flexctrl.model.consistent import admitted
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.trolleys import Trolley
@@ -55,7 +55,7 @@ def rail_force(
         raise StructureError(f"rail_force: there is no trolley {name!r}{did_you_mean(str(name), trolleys)}")
     if not model.large:
         raise StructureError("rail_force: the model is one of small motion; give it LargeRotation()")
-    check_state(model, state, "rail_force: state")
+    state = admitted(model, state, "rail_force: state")
     feed = feed_of(model, None, model.input_vector(inputs or {}))
     point = Stepper(model, feed, Coefficients.of(1.0), _TIGHT).start(state, feed.first(state), _AT_ONCE)
     motion, now = model.motion, point.state

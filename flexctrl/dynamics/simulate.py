@@ -36,7 +36,7 @@ from flexctrl.dynamics.steps import Fixed, Integrator
 from flexctrl.dynamics.swift.light_motors import giving_way
 from flexctrl.errors import StructureError
 from flexctrl.linear.model import LinearModel
-from flexctrl.model.consistent import check_state
+from flexctrl.model.consistent import admitted
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
@@ -130,7 +130,7 @@ def simulate(
     else:
         plant = giving_way(model)
         if isinstance(start, State) and model.__dict__.get("_begun") is not start:
-            check_state(model, start, "simulate: start")
+            start = admitted(model, start, "simulate: start")
             model.__dict__["_begun"] = start
     feed = feed_of(plant, controller, _base(plant, start, inputs))
     beginning = Beginning.of(start, spacing, feed) if check else None

@@ -9,13 +9,13 @@ import numpy as np
 
 from flexctrl.errors import StructureError
 from flexctrl.model.motion import Motion
-from flexctrl.model.state import State
+from flexctrl.model.state import Dry, State
 from flexctrl.structure.relations import Copy, Turn
 
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
 
-__all__ = ["Breach", "breaches", "check_state", "extent", "off_rails"]
+__all__ = ["Breach", "admitted", "breaches", "extent", "off_rails"]
 
 _FAR = 1e15
 _ALLOWED = 1e-8
@@ -28,8 +28,8 @@ class Breach(NamedTuple):
     what: str
 
 
-def check_state(model: Model, state: State, owner: str) -> None:
-    """Raise unless a machine can be in a state.
+def admitted(model: Model, state: State, owner: str) -> State:
+    """Return a state if a machine can be in it, with the dry contacts that the machine has.
 
     Parameters
     ----------
@@ -37,6 +37,11 @@ def check_state(model: Model, state: State, owner: str) -> None:
     state : State
     owner : str
         Who asks, for the message.
+
+    Returns
+    -------
+    State
+        A brake that the state knows nothing of is loose in it: what it does is found as a run begins.
 
     Raises
     ------
@@ -64,6 +69,8 @@ def check_state(model: Model, state: State, owner: str) -> None:
             f"{owner}: the machine cannot be in this state: {worst.what}; flexctrl.project(model, state) gives the "
             "nearest state it can be in and says what that changes"
         )
+    count = model.rest.dry.phase.size
+    return state if state.dry.phase.size == count else state.with_(dry=Dry.loose(count))
 
 
 def _shapes(model: Model) -> dict[str, tuple[int, ...]]:

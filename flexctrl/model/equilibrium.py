@@ -12,7 +12,7 @@ import numpy as np
 from flexctrl.errors import EquilibriumError, LinearizationError, MechanismError, StructureError, shortened
 from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
-from flexctrl.model.consistent import check_state, off_rails
+from flexctrl.model.consistent import admitted, off_rails
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import bent, displaced_beyond, overturned
 from flexctrl.model.places import wandered
@@ -168,7 +168,7 @@ def equilibrium(
     if start is not None:
         if not isinstance(start, State):
             raise StructureError(f"equilibrium: start = {shortened(start)}; expected a State (rest.state, run.final)")
-        check_state(model, start, "equilibrium: start")
+        start = admitted(model, start, "equilibrium: start")
     begin = (start or model.rest).loose
     held |= {i: float(begin.q[i]) for i in model.motion.frozen}
     return settled(Balance(model, model.input_vector(inputs or {}), held), begin, tolerance)

@@ -15,7 +15,7 @@ from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
 from flexctrl.model.braked import balance_of, bearing
 from flexctrl.model.certify import certify, taylor_slope
-from flexctrl.model.consistent import check_state
+from flexctrl.model.consistent import admitted
 from flexctrl.model.eased import eased
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.modal_region import beyond_modes
@@ -75,9 +75,9 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
         )
     rest = equilibrium(model, inputs=inputs) if at is None else at
     u = rest.inputs if isinstance(rest, Rest) and inputs is None else model.input_vector(inputs or {})
-    state = (rest.state if isinstance(rest, Rest) else rest).loose
+    state = rest.state if isinstance(rest, Rest) else rest
     _refuse_spins(model, () if not isinstance(rest, Rest) else rest.held)
-    check_state(model, state, "linearize: at")
+    state = admitted(model, state, "linearize: at").loose
     if isinstance(rest, Rest):
         return _about(balance_of(replace(rest, model=model, inputs=u)), state)
     return _about(Balance(model, u, _frozen(model, state)), state)

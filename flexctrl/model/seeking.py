@@ -1,4 +1,4 @@
-"""The search for an equilibrium: straight on, load by load, by masses that fade, behind softer shafts and ropes."""
+"""The search for an equilibrium: straight on, load by load, by masses that fade, by ropes that stretch more."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from flexctrl.model.balance import Balance
 from flexctrl.model.eased import Eased, eased
 from flexctrl.model.overturned import overturned
 from flexctrl.model.search import SMALLEST_PART, Found, Newton, follow
-from flexctrl.model.softened import ropes_of, softened
+from flexctrl.model.softened import stiffest, stretching
 from flexctrl.model.state import State
 
 __all__ = ["found"]
 
 _SOFT_REACH, _NEAR = (0.3, 0.1, 0.03), 0.1
 _IN_PLACE, _ASTRAY = 1e-15, 1e-12
-_TAUT, _STIFFER = 30.0, 10.0
+_TAUT, _STIFFER = 300.0, 10.0
 
 
 def found(balance: Balance, start: State, tolerance: float) -> Found:
@@ -66,30 +66,27 @@ def _behind(ease: Eased, start: State, tolerance: float) -> Found:
 
 
 def _searched(balance: Balance, start: State, tolerance: float) -> Found:
-    """The search, at last by ropes that are softer at first."""
+    """The search, at last by ropes and beams that stretch more at first."""
     try:
         return _sought(balance, start, tolerance)
     except EquilibriumError as failure:
-        ways = list(_with_softer_ropes(balance, start))
+        ways = list(_ever_stiffer(balance, start))
         if ways:
             with suppress(EquilibriumError):
-                return _stiffened(ways, start, tolerance)
+                return _stiffened([*ways, balance], start, tolerance)
         raise failure
 
 
-def _with_softer_ropes(balance: Balance, start: State) -> Iterator[Balance]:
-    """Balances of machines whose ropes stretch, then ever less, to the one they have at last; none without ropes.
+def _ever_stiffer(balance: Balance, start: State) -> Iterator[Balance]:
+    """Balances of machines whose ropes and beams stretch, and then ever less.
 
-    A cable hundred thousand times as stiff as it is heavy leaves its catenary by waves of slack pieces, which no
-    step gets out of; what it does with a thousandth of that stiffness is nearly where it comes to.
+    A cable a hundred thousand times as stiff as it is heavy leaves its catenary by waves of slack pieces, which no
+    step gets out of; where it hangs with a thousandth of that stiffness is near where it comes to.
     """
-    ropes, force = ropes_of(balance.model), balance.force(start)
-    share = _TAUT * float(np.abs(force / balance.lever[balance.free]).sum()) / max(ropes.values(), default=np.inf)
-    while ropes and 0.0 < share < 1.0:
-        yield replace(balance, model=softened(balance.model, dict.fromkeys(ropes, share)))
-        share *= _STIFFER
-    if ropes:
-        yield balance
+    EA, limit = _TAUT * float(np.abs(balance.force(start) / balance.lever[balance.free]).sum()), stiffest(balance.model)
+    while 0.0 < EA < limit:
+        yield replace(balance, model=stretching(balance.model, EA))
+        EA *= _STIFFER
 
 
 def _stiffened(ways: list[Balance], start: State, tolerance: float) -> Found:

@@ -1,0 +1,36 @@
+"""An emergency stop as a second run: the state that one machine has come to is the start of the same with a brake."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+
+def table(*effects: fc.Effect) -> fc.Model:
+    """A disc turned by a motor through a gear, as one inertia of 3 kg m²."""
+    disc = fc.RigidBody("disc", (0, 0, 0), 10.0, (1.0, 1.0, 2.0))
+    motor = fc.RotaryDrive("motor", disc.node, axis="z", stiffness=500.0, ratio=10.0, inertia=0.01, damping=0.1)
+    outputs = [fc.Rotation("angle", disc.node, axis="z")]
+    joints = [fc.Support(disc.node, "u v w rx ry")]
+    plan = fc.Structure([disc], joints, [motor], [fc.MotorTorque("torque", motor)], outputs)
+    return fc.assemble(plan, [fc.LargeRotation(), *effects])
+
+
+def test_a_run_is_braked_from_where_it_has_come():
+    """10 N m for a second, then 20 N m against it; it was a ValueError of numpy."""
+    run = fc.simulate(table(), until=2.0, inputs={"torque": 1.0})
+    speed = 10.0 / 3.0 * 2.0
+    braked = table(fc.CoulombFriction({"motor": 2.0}))
+    stopped = fc.simulate(braked, until=2.0, start=run.final)
+    assert stopped["angle"][-1] - run["angle"][-1] == pytest.approx(speed**2 / (2.0 * 20.0 / 3.0), rel=1e-6)
+    assert np.abs(stopped.final.v).max() < 1e-12
+    again = fc.simulate(table(), until=1.0, start=stopped.final)
+    assert again["angle"][-1] == pytest.approx(stopped["angle"][-1])
+
+
+def test_an_equilibrium_is_sought_from_a_state_without_a_brake():
+    run = fc.simulate(table(), until=0.1, inputs={"torque": 1.0})
+    rest = fc.equilibrium(table(fc.CoulombFriction({"motor": 2.0})), start=run.final)
+    assert rest.state.dry.phase.size == 1
