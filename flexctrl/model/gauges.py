@@ -152,7 +152,7 @@ class _Builder:
         self.axes: list[np.ndarray] = []
         self.gaps = gaps_of(model.effects)
         self.winches: list[tuple[int, Winch]] = []
-        self.lines: dict[tuple[type, bool], list[tuple[int, Rope | Spring]]] = {}
+        self.lines: dict[tuple[bool, bool], list[tuple[int, Rope | Spring]]] = {}
         self.moving = False
 
     def add(self, i: int, output: Output) -> None:
@@ -171,7 +171,8 @@ class _Builder:
                 self.winches.append((i, line))
             else:
                 assert isinstance(line, Rope | Spring)
-                self.lines.setdefault((type(line), self.gaps.get(line.name, 0.0) > 0.0), []).append((i, line))
+                kind = isinstance(line, Rope), self.gaps.get(line.name, 0.0) > 0.0
+                self.lines.setdefault(kind, []).append((i, line))
         elif isinstance(output, Rotation):
             self._rotation(i, output)
         else:
@@ -200,7 +201,7 @@ class _Builder:
 
     def made(self) -> Gauges:
         empty = np.zeros(0)
-        runs = tuple(self._tensions(of, loose, lines) for (of, loose), lines in self.lines.items())
+        runs = tuple(self._tensions(slack, loose, lines) for (slack, loose), lines in self.lines.items())
         runs += (self._hoists(),) if self.winches else ()
         return Gauges(
             outputs=len(self.s.outputs),
@@ -238,12 +239,12 @@ class _Builder:
         kernel = _hoist(self.model.effects)
         return self.model.backend.bind(kernel, np.array(gather), np.array(parameters), scatter)
 
-    def _tensions(self, of: type, loose: bool, lines: list[tuple[int, Rope | Spring]]) -> Run:
+    def _tensions(self, slack: bool, loose: bool, lines: list[tuple[int, Rope | Spring]]) -> Run:
         slots = [(NODE_SLOT * self.s.number(line.end), NODE_SLOT * self.s.number(line.start)) for _, line in lines]
         gather = [np.concatenate([k + np.arange(3) for k in (a, b, a + 12, b + 12)]) for a, b in slots]
         gaps = [[self.gaps[line.name]] if loose else [] for _, line in lines]
         parameters = [[p.stiffness, p.length, p.damping, *gap] for (_, p), gap in zip(lines, gaps, strict=True)]
-        kernel = _pull(of, loose, self.model.effects)
+        kernel = _pull(slack, loose, self.model.effects)
         scatter = np.array([[i] for i, _ in lines])
         return self.model.backend.bind(kernel, np.array(gather), np.array(parameters), scatter)
 
@@ -256,8 +257,8 @@ def _hoist(effects: tuple[Effect, ...]) -> Kernel:
     return Kernel("hoist", z, p, ca.fmax(winch_tension(effects)(z, p)[0], 0.0))
 
 
-def _pull(of: type, loose: bool, effects: tuple[Effect, ...]) -> Kernel:
-    """Tension from places and velocities of end and start (12)."""
+def _pull(slack: bool, loose: bool, effects: tuple[Effect, ...]) -> Kernel:
+    """Tension from places and velocities of end and start (12), of what goes slack or not, with play or without."""
     import casadi as ca
 
     z, p, still = ca.SX.sym("z", 12), ca.SX.sym("p", len(LINE_PARAMETERS) + loose), ca.SX(3, 1)
@@ -265,5 +266,5 @@ def _pull(of: type, loose: bool, effects: tuple[Effect, ...]) -> Kernel:
     if loose:
         return Kernel("tension", z, p, loose_spring(effects, start, end, p)[1])
     m = line_motion(start, end, p)
-    tension = ca.fmax(rope_pull(effects, m), 0.0) if of is Rope else spring_pull(effects, m)
+    tension = ca.fmax(rope_pull(effects, m), 0.0) if slack else spring_pull(effects, m)
     return Kernel("tension", z, p, tension)

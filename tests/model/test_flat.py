@@ -95,6 +95,41 @@ def test_flat_models_do_what_models_do(name, bending, compiled):
         close(m.entries[flattened.plan.places(slope.row, slope.col)], slope.data)
 
 
+def lines() -> fc.Structure:
+    """All that bears a tension, each from a place of its own to a load of its own."""
+    made = [
+        fc.Rope("light", (0, 0, 0), (0, 0, -1), EA=3000.0, damping=10.0),
+        fc.Rope("heavy", (1, 0, 0), (1, 0, -1), EA=3000.0, damping=10.0, rhoA=2.0),
+        fc.Rope("pieces", (2, 0, 0), (2, 0, -1), EA=3000.0, damping=10.0, rhoA=2.0, elements=4),
+        fc.Spring("spring", (3, 0, 0), (3, 0, -1), stiffness=3000.0, damping=10.0),
+        fc.Spring("loose", (4, 0, 0), (4, 0, -1), stiffness=3000.0, damping=10.0),
+    ]
+    loads = [fc.PointMass(f"load_of_{line.name}", line.end, 5.0) for line in made]
+    hoisted, trolley = fc.PointMass("hoisted", (5, 0, -1), 5.0), fc.PointMass("trolley", (5, 0, 0), 5.0)
+    winch = fc.Winch("winch", hoisted.node, trolley.node, EA=3000.0, damping=10.0, radius=0.2, ratio=10.0, inertia=0.1)
+    tensions = [fc.Tension(f"{line.name}_tension", line) for line in [*made, winch]]
+    joints = [
+        *(fc.Support(node) for node in (*(line.start for line in made), trolley.node)),
+        *(fc.Pin(line.end, load.node) for line, load in zip(made, loads, strict=True)),
+    ]
+    return fc.Structure([*made, *loads, hoisted, trolley], joints, [winch], outputs=tensions)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("seed", range(6))
+def test_tensions_of_slack_and_taut_lines(seed, compiled):
+    """A heavy rope of several pieces was measured by compiled loops as a spring that pushes."""
+    effects = [fc.Gravity(), fc.LargeRotation(), fc.Flexible(), fc.RopeMass(), fc.Backlash({"loose": 0.05})]
+    model = fc.assemble(lines(), effects)
+    rng = np.random.default_rng(seed)
+    v0, v, a, step = 0.3 * rng.normal(size=(4, model.n))
+    start = model.displace(0.05 * rng.normal(size=model.n)).with_(v=v0)
+    m, _ = evaluated(model, start, 0.1 * step, v, a, np.zeros(0), compiled)
+    end = model.advance(start, 0.1 * step, v, start.t)
+    close(m.y, model.measure(end))
+    assert m.y[[name not in ("spring_tension", "loose_tension") for name in model.outputs]].min() >= 0.0
+
+
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("turn", [1e-9, 0.3, 0.799, 0.801, 2.5, 9.0, 300.0])
 def test_steps_turn_nodes_by_any_angle(turn, compiled):
