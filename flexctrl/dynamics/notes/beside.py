@@ -101,7 +101,7 @@ def shorter(journey: Journey, law: Manner) -> float:
     -------
     float
         A half where samples keep steps short (all of them, or those between the short ones that bristles and lags take
-        after samples), in steps of one length past corners, and in those that do not see a line vibrate whose tension
+        after samples), in steps of one length past corners, which a law of one's own may have, and in those that do not see a line vibrate whose tension
         is asked for: whether a contact with little to spare breaks loose is decided by a finer run, where two coarse
         ones may be wrong alike. A quarter for what jumps at every sample: of what half the steps round as the run
         itself does, they round a quarter otherwise. So it is under a law that hunts between its limits, as it does in
@@ -110,7 +110,7 @@ def shorter(journey: Journey, law: Manner) -> float:
     if law in (Manner.ABRUPT, Manner.HUNTING):
         return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
-    cornered = fixed and _cornered(journey, {*journey.watch.corner_names})
+    cornered = fixed and (journey.plan.feed.reacting or _cornered(journey, {*journey.watch.corner_names}))
     return 0.5 if kept_short(journey) or _flows(journey) or cornered or unresolved(journey) else 1.0
 
 

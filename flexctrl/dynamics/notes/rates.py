@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
 _POINTS, _NEAR = 4, 1e-9
+_STEEP, _MOST = 0.1, 24
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
 """What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
@@ -74,12 +75,32 @@ class Apart:
             low, high = _between(run, other.t[within], near)
             y = other.y[within]
             most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
+            most = np.maximum(most, _where_steep(run, other))
         return cls(longer, min(max(free, _LEAST), 1.0), most)
 
     def left(self, order: np.ndarray) -> np.ndarray:
         """What of a gap is the first run's own, if errors go by powers of the steps."""
         least = _LEAST if self.longer < 1.0 else 1.0
         return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), least)
+
+
+def _where_steep(run: Run, other: Run) -> np.ndarray:
+    """How far outputs of another run are from a run's own where these change most from row to row: there, and between.
+
+    What a run does between two such rows may be anything, as far as rows tell. Samples make rows of their own.
+    """
+    found = np.zeros(run.y.shape[1])
+    if not (run.track.stretches and other.track.stretches) or run.track.feed.sample_time:
+        return found
+    way = np.ptp(run.y, axis=0)
+    steep = (np.abs(np.diff(run.y, axis=0)) / np.where(way > 0.0, way, np.inf)).max(axis=1)
+    most = np.argsort(-steep)[:_MOST]
+    most = most[steep[most] > _STEEP]
+    begin, end = max(run.track.starts[0], other.track.starts[0]), min(run.final.t, other.final.t)
+    for t in np.unique([run.t[most], run.t[most + 1], 0.5 * (run.t[most] + run.t[most + 1])]).tolist():
+        if begin < t < end:
+            found = np.fmax(found, np.abs(other.track.moment(t)[1] - run.track.moment(t)[1]))
+    return found
 
 
 def are_asked(run: Run, journey: Journey) -> bool:
