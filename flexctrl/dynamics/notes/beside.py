@@ -103,9 +103,9 @@ def shorter(journey: Journey, law: Manner) -> float:
         A half where samples keep steps short (all of them, or those between the short ones that bristles and lags take
         after samples), in steps of one length past corners, which a law of one's own may have, too, and in those that
         do not see a line vibrate whose tension is asked for: whether a contact with little to spare breaks loose is
-        decided by a finer run, where two coarse ones may be wrong alike. A quarter for what jumps at every sample: of what half the steps round as the run
-        itself does, they round a quarter otherwise. So it is under a law that hunts between its limits, as it does in
-        another phase in runs that are not far finer.
+        decided by a finer run, where two coarse ones may be wrong alike. A quarter for what jumps at every sample: of
+        what half the steps round as the run itself does, they round a quarter otherwise. So it is under a law that
+        hunts between its limits, as it does in another phase in runs that are not far finer.
     """
     if law in (Manner.ABRUPT, Manner.HUNTING):
         return 0.25
