@@ -38,6 +38,8 @@ from flexctrl.structure.trolleys import Trolley
 
 _SAME = 1e-6
 """Shares of its length to which a rope may be drawn at another: digits that drawings leave out."""
+_FAR = 2e5
+"""Times its size from the origin: at five times that, the last digits of places made steps an eighth as long."""
 
 
 def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend | None = None) -> Model:
@@ -89,6 +91,7 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
         notes=motion.notes
         + left_out
         + stretched
+        + _far_away(structure, parts)
         + idle_gusts(structure, parts)
         + tuple(note for e in parts for note in e.left_out(structure, parts)),
     )
@@ -96,6 +99,22 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
     model = Model(structure, parts, motion, runs, empty)
     modal = [p for p in parts if isinstance(p, ModalDamping) and np.any(p.ratios)]
     return _modally_damped(model, modal[0]) if modal else model
+
+
+def _far_away(structure: Structure, effects: Sequence[Effect]) -> tuple[str, ...]:
+    """What is to be said of a machine that moves far and is drawn so far away that its places lose digits by that."""
+    travels = [part.travel for part in structure.elements if isinstance(part, Trolley)]
+    places = np.array([node.position for node in structure.nodes if node not in travels])
+    low, high = places.min(axis=0), places.max(axis=0)
+    far = float(np.maximum(np.abs(low), np.abs(high)).max())
+    if not any(isinstance(e, LargeRotation) for e in effects) or far <= _FAR * structure.size:
+        return ()
+    middle = ", ".join(f"{x:.6g}" for x in 0.5 * (low + high))
+    return (
+        f"the machine is drawn {far:.2g} m from the origin, {far / structure.size:.2g} times its size: its places are "
+        f"known to {np.spacing(far):.1g} m, and steps that feel this as noise get far shorter; draw it about an origin "
+        f"of its own, ({middle}) for one",
+    )
 
 
 def checked_effects(structure: Structure, effects: Sequence[Effect]) -> tuple[Effect, ...]:

@@ -21,7 +21,7 @@ from flexctrl.structure.nodes import Node, check_node
 from flexctrl.structure.outputs import Output
 from flexctrl.structure.relations import Group, Track
 from flexctrl.structure.soundness import COINCIDE, check_sound
-from flexctrl.structure.trolleys import tracks_of
+from flexctrl.structure.trolleys import Trolley, tracks_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -201,8 +201,10 @@ class Structure:
 
     @cached_property
     def _extent(self) -> float:
-        """How far nodes are apart along the axes at most; 0 where that is but rounding."""
-        lows, highs = zip(*((min(c), max(c)) for c in zip(*(n.position for n in self.nodes), strict=True)), strict=True)
+        """How far nodes are apart along the axes at most; 0 where that is but rounding. Travels are at no place."""
+        travels = [part.travel for part in self.elements if isinstance(part, Trolley)]
+        places = zip(*(node.position for node in self.nodes if node not in travels), strict=True)
+        lows, highs = zip(*((min(c), max(c)) for c in places), strict=True)
         extent = max(b - a for a, b in zip(lows, highs, strict=True))
         return extent if extent > 1e-12 * max(map(abs, (*lows, *highs))) else 0.0
 
