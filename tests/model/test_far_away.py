@@ -31,8 +31,8 @@ def test_what_travels_has_no_place_that_machines_are_measured_by(origin):
 
     Errors of rates were not told then, and notes were wrong.
     """
-    at = np.array(origin)
-    girder = fc.Beam("girder", tuple(at), tuple(at + np.array((50, 0, 0))), fc.Section.box(fc.STEEL, 1.0, 1.5, 0.012, 0.02))
+    at, box = np.array(origin), fc.Section.box(fc.STEEL, 1.0, 1.5, 0.012, 0.02)
+    girder = fc.Beam("girder", tuple(at), tuple(at + np.array((50, 0, 0))), box)
     trolley = fc.Trolley("trolley", girder, at=10.0, mass=2e4)
     load = fc.PointMass("load", tuple(at + np.array((10, 0, -30))), 3e4)
     rope = fc.Rope("rope", trolley.node.position, load.node, EA=5e7, damping=3e4)
