@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial, reduce
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,7 +22,8 @@ __all__ = ["found"]
 
 _SOFT_REACH, _NEAR = (0.3, 0.1, 0.03), 0.1
 _IN_PLACE, _ASTRAY = 1e-15, 1e-12
-_TAUT, _STIFFER = 300.0, 10.0
+_TAUT, _STIFFER = (300.0, 30.0, 3000.0), 10.0
+"""How stiff ropes and beams are at first, over all loads; what they are stiffened by from search to search."""
 
 
 def found(balance: Balance, start: State, tolerance: float) -> Found:
@@ -66,27 +68,34 @@ def _behind(ease: Eased, start: State, tolerance: float) -> Found:
 
 
 def _searched(balance: Balance, start: State, tolerance: float) -> Found:
-    """The search, at last by ropes and beams that stretch more at first."""
+    """The search, at last by ropes and beams that stretch more at first: to what lasts, if any of it does."""
     try:
         return _sought(balance, start, tolerance)
     except EquilibriumError as failure:
-        ways = list(_ever_stiffer(balance, start))
-        if ways:
+        led = []
+        for taut in _TAUT:
             with suppress(EquilibriumError):
-                return _stiffened([*ways, balance], start, tolerance)
+                led += [_stiffened(ways, start, tolerance) for ways in _ever_stiffer(balance, start, taut)]
+            if led and not balance.unstable(led[-1].state):
+                return led[-1]
+        if led:
+            return reduce(partial(_lasting, balance), led)
         raise failure
 
 
-def _ever_stiffer(balance: Balance, start: State) -> Iterator[Balance]:
-    """Balances of machines whose ropes and beams stretch, and then ever less.
+def _ever_stiffer(balance: Balance, start: State, taut: float) -> Iterator[list[Balance]]:
+    """Balances of machines whose ropes and beams stretch, and then ever less, to the one that is asked for, if any do.
 
     A cable a hundred thousand times as stiff as it is heavy leaves its catenary by waves of slack pieces, which no
     step gets out of; where it hangs with a thousandth of that stiffness is near where it comes to.
     """
-    EA, limit = _TAUT * float(np.abs(balance.force(start) / balance.lever[balance.free]).sum()), stiffest(balance.model)
+    EA = taut * float(np.abs(balance.force(start) / balance.lever[balance.free]).sum())
+    limit, ways = stiffest(balance.model), []
     while 0.0 < EA < limit:
-        yield replace(balance, model=stretching(balance.model, EA))
+        ways.append(replace(balance, model=stretching(balance.model, EA)))
         EA *= _STIFFER
+    if ways:
+        yield [*ways, balance]
 
 
 def _stiffened(ways: list[Balance], start: State, tolerance: float) -> Found:
