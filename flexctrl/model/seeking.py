@@ -68,9 +68,11 @@ def _behind(ease: Eased, start: State, tolerance: float) -> Found:
 
 
 def _searched(balance: Balance, start: State, tolerance: float) -> Found:
-    """The search, at last by ropes and beams that stretch more at first: to what lasts, if any of it does."""
+    """The search: straight on from a shape that stands by itself, else by masses, at last by what stretches more."""
+    if _stands(balance, start):
+        return _loaded(balance, start, tolerance)
     try:
-        return _sought(balance, start, tolerance)
+        return _hung(balance, start, tolerance)
     except EquilibriumError as failure:
         led = []
         for taut in _TAUT:
@@ -102,25 +104,28 @@ def _stiffened(ways: list[Balance], start: State, tolerance: float) -> Found:
     """Where balances lead to, each from the equilibrium of the one before."""
     there, iterations = start, 0
     for balance in ways:
-        step = _sought(balance, there, tolerance)
+        step = (_loaded if _stands(balance, there) else _hung)(balance, there, tolerance)
         there, iterations = step.state, iterations + step.iterations
     return replace(step, iterations=iterations)
 
 
-def _sought(balance: Balance, start: State, tolerance: float) -> Found:
-    """The search: straight on from a shape that stands by itself, else by masses."""
-    if _stands(balance, start):
-        straight = Newton(balance, tolerance).run(start, 60, watch=True)
-        if straight.done and straight.steady:
-            return straight
-        followed, share = follow(balance, start, tolerance, strict=True, watch=True)
-        if not followed.done and balance.astray(start):
-            followed, share = _loads_first(balance, start, followed, share, tolerance)
-        if not followed.done:  # it gives way, or stays where it is and is left by itself from there on
-            followed, share = follow(balance, start, tolerance, strict=True)
-        if not followed.done:
-            raise EquilibriumError(_gave_way(balance, followed, share), followed.state, followed.residual)
-        return followed
+def _loaded(balance: Balance, start: State, tolerance: float) -> Found:
+    """Where a shape that stands by itself is brought by loads."""
+    straight = Newton(balance, tolerance).run(start, 60, watch=True)
+    if straight.done and straight.steady:
+        return straight
+    followed, share = follow(balance, start, tolerance, strict=True, watch=True)
+    if not followed.done and balance.astray(start):
+        followed, share = _loads_first(balance, start, followed, share, tolerance)
+    if not followed.done:  # it gives way, or stays where it is and is left by itself from there on
+        followed, share = follow(balance, start, tolerance, strict=True)
+    if not followed.done:
+        raise EquilibriumError(_gave_way(balance, followed, share), followed.state, followed.residual)
+    return followed
+
+
+def _hung(balance: Balance, start: State, tolerance: float) -> Found:
+    """Where masses lead a shape to that does not stand by itself."""
     force = balance.force(start)
     load = max(float(np.abs(force / balance.lever[balance.free]).max(initial=0.0)), 1e-300)
     shift = 10.0 * load / (balance.heaviest * balance.size) if force.size else 0.0
