@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
 _POINTS, _NEAR = 4, 1e-9
-_STEEP, _MOST = 0.1, 24
+_STEEP, _MOST, _JUMP = 0.1, 8, 0.05
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
 """What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
@@ -36,6 +36,7 @@ LOST, _SURE = 0.1, 0.25
 """From which share of an output's range a gap is no longer one of small lags (all of it from twice that), and by how
 much the order seen may be lower."""
 _SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
+_STRUCK = "{name} may jump by {far:.2g} % of its range at events: rows at their very instants are of one side of that"
 _LINEAR = (
     "what errors of steps do to single outputs is not told of a linear model: the method Exact makes none, and is its "
     "default"
@@ -55,11 +56,14 @@ class Apart:
         The share of steps that are.
     most : numpy.ndarray, shape (outputs,)
         In rows, in units of the outputs.
+    struck : numpy.ndarray, shape (outputs,)
+        In rows at the very instants of events, where forces may jump.
     """
 
     longer: float
     free: float
     most: np.ndarray
+    struck: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, run: Run, other: Run, longer: float) -> Apart:
@@ -69,14 +73,15 @@ class Apart:
         that has failed need be no numbers: they tell nothing.
         """
         fewer, near = other.report.steps / max(run.report.steps, 1), _NEAR * run.final.t
-        free, most = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros(run.y.shape[1])
+        free, (most, struck) = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros((2, run.y.shape[1]))
         if len(run.t) >= _POINTS:
             within = (other.t >= run.t[0] - near) & (other.t <= run.t[-1] + near) & np.isfinite(other.y).all(axis=1)
             low, high = _between(run, other.t[within], near)
             y = other.y[within]
             most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
-            most = np.maximum(most, _where_steep(run, other))
-        return cls(longer, min(max(free, _LEAST), 1.0), most)
+            steep, struck = _where_steep(run, other, near)
+            most = np.maximum(most, steep)
+        return cls(longer, min(max(free, _LEAST), 1.0), most, struck)
 
     def left(self, order: np.ndarray) -> np.ndarray:
         """What of a gap is the first run's own, if errors go by powers of the steps."""
@@ -84,23 +89,28 @@ class Apart:
         return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), least)
 
 
-def _where_steep(run: Run, other: Run) -> np.ndarray:
+def _where_steep(run: Run, other: Run, near: float) -> tuple[np.ndarray, np.ndarray]:
     """How far outputs of another run are from a run's own where these change most from row to row: there, and between.
 
-    What a run does between two such rows may be anything, as far as rows tell. Samples make rows of their own.
+    What a run does between two such rows may be anything, as far as rows tell: all that another one is off by may lie
+    between them. Samples make rows of their own. Last is how far they are apart in rows at the very instants of events.
     """
-    found = np.zeros(run.y.shape[1])
+    found, struck = np.zeros((2, run.y.shape[1]))
     if not (run.track.stretches and other.track.stretches) or run.track.feed.sample_time:
-        return found
+        return found, struck
     way = np.ptp(run.y, axis=0)
     steep = (np.abs(np.diff(run.y, axis=0)) / np.where(way > 0.0, way, np.inf)).max(axis=1)
     most = np.argsort(-steep)[:_MOST]
-    most = most[steep[most] > _STEEP]
     begin, end = max(run.track.starts[0], other.track.starts[0]), min(run.final.t, other.final.t)
-    for t in np.unique([run.t[most], run.t[most + 1], 0.5 * (run.t[most] + run.t[most + 1])]).tolist():
-        if begin < t < end:
-            found = np.fmax(found, np.abs(other.track.moment(t)[1] - run.track.moment(t)[1]))
-    return found
+    at = np.unique([most, most + 1]).tolist()
+    own = [(run.t[k], run.y[k]) for k in at if begin < run.t[k] < end and np.abs(other.t - run.t[k]).min() > near]
+    between = 0.5 * (run.t[most] + run.t[most + 1])[steep[most] > _STEEP]
+    events = np.array([event.t for event in run.events] or [np.inf])
+    for t, y in [*own, *((t, run.track.moment(t)[1]) for t in between if begin < t < end)]:
+        apart = np.nan_to_num(np.abs(other.track.moment(t)[1] - y))
+        kind = struck if np.abs(events - t).min() <= near else found
+        np.maximum(kind, apart, out=kind)
+    return found, struck
 
 
 def are_asked(run: Run, journey: Journey) -> bool:
@@ -170,7 +180,19 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     off, known = _off(apart, ways(journey, run.y), run.report.order, steady), run.report.output_errors
     found = {run.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in way}
     shares = {name: max(share, known.get(name, 0.0)) for name, share in found.items()}
-    return replace(run, report=replace(run.report, output_errors={**known, **shares}))
+    notes = (*run.report.notes, *_jumps(run, way, shares, min(apart, key=lambda a: a.longer).struck))
+    return replace(run, report=replace(run.report, output_errors={**known, **shares}, notes=notes))
+
+
+def _jumps(run: Run, way: dict[int, float], shares: Mapping[str, float], struck: np.ndarray) -> tuple[str, ...]:
+    """What is to be said of outputs that jump at events by more than all that is told of them."""
+    jumps = {run.outputs[i]: float(struck[i] / far) for i, far in way.items()}
+    much = {name: jump for name, jump in jumps.items() if jump > max(_JUMP, _BESIDE * shares[name])}
+    if not much:
+        return ()
+    worst, *others = sorted(much, key=lambda name: -much[name])
+    note = _STRUCK.format(name=worst, far=100.0 * min(much[worst], 1.0))
+    return (note + (f"; so may {', '.join(others[:_NAMED])}" if others else ""),)
 
 
 def _judged(run: Run, journey: Journey, little: float) -> dict[int, float]:
