@@ -24,7 +24,7 @@ from flexctrl.model.state import State
 
 __all__ = ["UNCHECKED", "Beginning", "Other", "made", "noted", "standing"]
 
-_LONGER, _SECONDS, _ALIKE = 2.0, 0.2, 0.01
+_LONGER, _SECONDS, _ALIKE = 2.0, 2.0, 0.01
 UNCHECKED = "how far small differences have grown is not told by another run"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,6 +37,7 @@ def result(journey: Journey) -> Run:
     assert checkpoint is not None
     if abs(state.t - plan.until) <= 1e-9 * plan.until:
         state = state.with_(t=plan.until)
+    state = replace(state, freedoms=plan.model.coordinates)
     try:
         rows = journey.rows.finish(state, supply.u)
         journey.rows.recorder.flush()

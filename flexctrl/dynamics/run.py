@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -314,6 +314,7 @@ class Run:
             raise StructureError(f"run.at({t}): expected a time from {first:.6g} to {last:.6g} s")
         state, outputs, u = track.moment(min(max(t, first), last))
         values = (*outputs.tolist(), *u.tolist())
+        state = replace(state, freedoms=self.final.freedoms)
         return Moment(state.t, state, dict(zip((*self.outputs, *self.inputs), values, strict=True)))
 
     def plot(self, signals: tuple[str, ...] | None = None) -> Figure:

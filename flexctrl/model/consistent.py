@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, shortened
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import Dry, State
 from flexctrl.structure.relations import Copy, Turn
@@ -63,6 +63,12 @@ def admitted(model: Model, state: State, owner: str) -> State:
                 f"{owner}: the state's {name} holds {largest:.3g}, outside any sensible range: numbers have 16 digits, "
                 f"so nothing else of the machine would be seen beside it; expected values below {_FAR:g}"
             )
+    if state.freedoms and state.freedoms != model.coordinates:
+        apart = shortened(sorted({*state.freedoms} ^ {*model.coordinates}) or ["their order"])
+        raise StructureError(
+            f"{owner}: the state's degrees of freedom are not this machine's ({apart} differ): it is of another "
+            "machine, or of the same under other effects"
+        )
     worst = max(breaches(model, state), default=Breach(0.0, ""))
     if worst.gap > _ALLOWED:
         raise StructureError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -221,4 +221,5 @@ def rest_of(balance: Balance, found: Found) -> Rest:
         beyond = overturned(model, found.state)
     if apart := beyond or model.apart(found.state) or wandered(model, found.state):
         raise EquilibriumError(f"no equilibrium found: {apart}", found.state, residual)
-    return Rest(found.state, residual, outputs, balance.u, found.iterations, model, held)
+    state = replace(found.state, freedoms=model.coordinates)
+    return Rest(state, residual, outputs, balance.u, found.iterations, model, held)

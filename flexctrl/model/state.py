@@ -54,6 +54,8 @@ class State:
         What dry contacts do.
     shown : numpy.ndarray, shape (angles,)
         What each `Rotation` output shows, turns included [rad]; empty in small motion, where ``q`` tells.
+    freedoms : tuple of str
+        Names of the degrees of freedom; empty where a state has not come out of a run or a search.
     """
 
     x: np.ndarray
@@ -64,6 +66,7 @@ class State:
     t: float = 0.0
     dry: Dry = field(default_factory=lambda: Dry.loose(0))
     shown: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    freedoms: tuple[str, ...] = ()
 
     def with_(self, *, v: np.ndarray | None = None, t: float | None = None, dry: Dry | None = None) -> State:
         """Return a copy at another time, with other rates or other contacts.

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.errors import StructureError
 
 
 def table(*effects: fc.Effect) -> fc.Model:
-    """A disc turned by a motor through a gear, as one inertia of 3 kg m²."""
+    """A disc turned by a motor through a gear: one inertia of 3 kg m² where the shaft does not bend."""
     disc = fc.RigidBody("disc", (0, 0, 0), 10.0, (1.0, 1.0, 2.0))
     motor = fc.RotaryDrive("motor", disc.node, axis="z", stiffness=500.0, ratio=10.0, inertia=0.01, damping=0.1)
     outputs = [fc.Rotation("angle", disc.node, axis="z")]
@@ -34,3 +35,20 @@ def test_an_equilibrium_is_sought_from_a_state_without_a_brake():
     run = fc.simulate(table(), until=0.1, inputs={"torque": 1.0})
     rest = fc.equilibrium(table(fc.CoulombFriction({"motor": 2.0})), start=run.final)
     assert rest.state.dry.phase.size == 1
+
+
+def test_a_state_under_other_effects_is_refused_by_name():
+    """With as many freedoms, a lag's torque was taken for a motor's angle."""
+    lagging, bending = (table(fc.Flexible()) if bends else rigid_with_lag() for bends in (False, True))
+    run = fc.simulate(lagging, until=1.0, inputs={"torque": 0.3})
+    assert run.final.q.size == bending.n
+    for begin in (run.final, run.at(0.5).state):
+        with pytest.raises(StructureError, match=r"motor_lag.*under other effects"):
+            fc.simulate(bending, until=1.0, start=begin)
+    assert fc.simulate(lagging, until=2.0, start=run.final).status is fc.Status.FINISHED
+
+
+def rigid_with_lag() -> fc.Model:
+    model = table(fc.MotorLag({"motor": 0.1}))
+    assert "motor_lag" in model.coordinates
+    return model
