@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
 _POINTS, _NEAR = 4, 1e-9
-_STEEP, _MOST, _JUMP = 0.1, 8, 0.05
+_STEEP, _MOST, _JUMP, _SHARED = 0.1, 8, 0.05, 0.3
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
 """What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
@@ -93,7 +93,8 @@ def _where_steep(run: Run, other: Run, near: float) -> tuple[np.ndarray, np.ndar
     """How far outputs of another run are from a run's own where these change most from row to row: there, and between.
 
     What a run does between two such rows may be anything, as far as rows tell: all that another one is off by may lie
-    between them. Samples make rows of their own. Last is how far they are apart in rows at the very instants of events.
+    between them. It does not where both have many rows at the same times, as samples make them. Last is how far they
+    are apart in rows at the very instants of events.
     """
     found, struck = np.zeros((2, run.y.shape[1]))
     if not (run.track.stretches and other.track.stretches) or run.track.feed.sample_time:
@@ -102,8 +103,9 @@ def _where_steep(run: Run, other: Run, near: float) -> tuple[np.ndarray, np.ndar
     steep = (np.abs(np.diff(run.y, axis=0)) / np.where(way > 0.0, way, np.inf)).max(axis=1)
     most = np.argsort(-steep)[:_MOST]
     begin, end = max(run.track.starts[0], other.track.starts[0]), min(run.final.t, other.final.t)
-    at = np.unique([most, most + 1]).tolist()
-    own = [(run.t[k], run.y[k]) for k in at if begin < run.t[k] < end and np.abs(other.t - run.t[k]).min() > near]
+    shared = np.abs(other.t[np.clip(np.searchsorted(other.t, run.t - near), 0, len(other.t) - 1)] - run.t) <= near
+    at = np.unique([most, most + 1]).tolist() if shared.mean() < _SHARED else []
+    own = [(run.t[k], run.y[k]) for k in at if begin < run.t[k] < end and not shared[k]]
     between = 0.5 * (run.t[most] + run.t[most + 1])[steep[most] > _STEEP]
     events = np.array([event.t for event in run.events] or [np.inf])
     for t, y in [*own, *((t, run.track.moment(t)[1]) for t in between if begin < t < end)]:
