@@ -97,7 +97,7 @@ def _where_steep(run: Run, other: Run, near: float) -> tuple[np.ndarray, np.ndar
     are apart in rows at the very instants of events.
     """
     found, struck = np.zeros((2, run.y.shape[1]))
-    if not (run.track.stretches and other.track.stretches) or run.track.feed.sample_time:
+    if not (run.track.stretches and other.track.stretches and len(other.t)) or run.track.feed.sample_time:
         return found, struck
     way = np.ptp(run.y, axis=0)
     steep = (np.abs(np.diff(run.y, axis=0)) / np.where(way > 0.0, way, np.inf)).max(axis=1)
