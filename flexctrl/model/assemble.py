@@ -103,13 +103,11 @@ def assemble(structure: Structure, effects: Sequence[Effect], backend: Backend |
 
 def _far_away(structure: Structure, effects: Sequence[Effect]) -> tuple[str, ...]:
     """What is to be said of a machine that moves far and is drawn so far away that its places lose digits by that."""
-    travels = [part.travel for part in structure.elements if isinstance(part, Trolley)]
-    places = np.array([node.position for node in structure.nodes if node not in travels])
-    low, high = places.min(axis=0), places.max(axis=0)
-    far = float(np.maximum(np.abs(low), np.abs(high)).max())
+    low, high = structure.box
+    far = max(map(abs, (*low, *high)))
     if not any(isinstance(e, LargeRotation) for e in effects) or far <= _FAR * structure.size:
         return ()
-    middle = ", ".join(f"{x:.6g}" for x in 0.5 * (low + high))
+    middle = ", ".join(f"{0.5 * (a + b):.6g}" for a, b in zip(low, high, strict=True))
     return (
         f"the machine is drawn {far:.2g} m from the origin, {far / structure.size:.2g} times its size: its places are "
         f"known to {np.spacing(far):.1g} m, and steps that feel this as noise get far shorter; draw it about an origin "

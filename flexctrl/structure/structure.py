@@ -200,11 +200,16 @@ class Structure:
         return (self._extent or self._own_length) > 0.0
 
     @cached_property
-    def _extent(self) -> float:
-        """How far nodes are apart along the axes at most; 0 where that is but rounding. Travels are at no place."""
+    def box(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The least and the greatest coordinates that parts are drawn at [m]; travels are at no place."""
         travels = [part.travel for part in self.elements if isinstance(part, Trolley)]
-        places = zip(*(node.position for node in self.nodes if node not in travels), strict=True)
-        lows, highs = zip(*((min(c), max(c)) for c in places), strict=True)
+        along = list(zip(*(node.position for node in self.nodes if node not in travels), strict=True))
+        return tuple(map(min, along)), tuple(map(max, along))
+
+    @cached_property
+    def _extent(self) -> float:
+        """How far nodes are apart along the axes at most; 0 where that is but rounding."""
+        lows, highs = self.box
         extent = max(b - a for a, b in zip(lows, highs, strict=True))
         return extent if extent > 1e-12 * max(map(abs, (*lows, *highs))) else 0.0
 
