@@ -129,9 +129,7 @@ def simulate(
         plant = _plant(model, chosen)
     else:
         plant = giving_way(model)
-        if isinstance(start, State) and model.__dict__.get("_begun") is not start:
-            start = admitted(model, start, "simulate: start")
-            model.__dict__["_begun"] = start
+        start = _admitted(model, start)
     feed = feed_of(plant, controller, _base(plant, start, inputs))
     beginning = Beginning.of(start, spacing, feed) if check else None
     plan = Plan(
@@ -174,6 +172,15 @@ def _growing(run: Run, journey: Journey, beginning: Beginning | None) -> Run:
     from flexctrl.dynamics.notes.sampled_growth import of_sampled_loop  # brings all that modes need
 
     return of_sampled_loop(run, journey, beginning.again)
+
+
+def _admitted(model: Model, start: State | Rest | Checkpoint | None) -> State | Rest | Checkpoint | None:
+    """A start that a machine can be in, with the dry contacts that it has; one that it has begun in is not checked."""
+    if isinstance(start, Rest):
+        return replace(start, state=admitted(model, start.state, "simulate: start"))
+    if isinstance(start, State) and model.__dict__.get("_begun") is not start:
+        start = model.__dict__["_begun"] = admitted(model, start, "simulate: start")
+    return start
 
 
 def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning | None, always: bool) -> Run:

@@ -15,7 +15,7 @@ from flexctrl.structure.relations import Copy, Turn
 if TYPE_CHECKING:
     from flexctrl.model.model import Model
 
-__all__ = ["Breach", "admitted", "breaches", "extent", "off_rails"]
+__all__ = ["Breach", "admitted", "breaches", "extent", "off_rails", "same_freedoms"]
 
 _FAR = 1e15
 _ALLOWED = 1e-8
@@ -63,12 +63,7 @@ def admitted(model: Model, state: State, owner: str) -> State:
                 f"{owner}: the state's {name} holds {largest:.3g}, outside any sensible range: numbers have 16 digits, "
                 f"so nothing else of the machine would be seen beside it; expected values below {_FAR:g}"
             )
-    if state.freedoms and state.freedoms != model.coordinates:
-        apart = shortened(sorted({*state.freedoms} ^ {*model.coordinates}) or ["their order"])
-        raise StructureError(
-            f"{owner}: the state's degrees of freedom are not this machine's ({apart} differ): it is of another "
-            "machine, or of the same under other effects"
-        )
+    same_freedoms(model, state, owner)
     worst = max(breaches(model, state), default=Breach(0.0, ""))
     if worst.gap > _ALLOWED:
         raise StructureError(
@@ -77,6 +72,28 @@ def admitted(model: Model, state: State, owner: str) -> State:
         )
     count = model.rest.dry.phase.size
     return state if state.dry.phase.size == count else state.with_(dry=Dry.loose(count))
+
+
+def same_freedoms(model: Model, state: State, owner: str) -> None:
+    """Raise where a state is known to have other degrees of freedom than a machine, be they as many.
+
+    Parameters
+    ----------
+    model : Model
+    state : State
+    owner : str
+        Who asks, for the message.
+
+    Raises
+    ------
+    StructureError
+    """
+    if state.freedoms and state.freedoms != model.coordinates:
+        apart = shortened(sorted({*state.freedoms} ^ {*model.coordinates}) or ["their order"])
+        raise StructureError(
+            f"{owner}: the state's degrees of freedom are not this machine's ({apart} differ): it is of another "
+            "machine, or of the same under other effects"
+        )
 
 
 def _shapes(model: Model) -> dict[str, tuple[int, ...]]:

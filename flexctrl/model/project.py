@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from flexctrl.errors import StructureError, check_kind
 from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import logarithm
-from flexctrl.model.consistent import extent
+from flexctrl.model.consistent import extent, same_freedoms
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import parse_point
 from flexctrl.structure.nodes import Node
@@ -173,6 +173,7 @@ def _asked(model: Model, wish: State | Mapping[Node, Sequence[float]]) -> _Wish:
                 f"project: the state has {len(np.atleast_1d(wish.x))} nodes and {np.size(wish.q)} degrees of freedom, "
                 f"the machine {len(model.rest.x)} and {model.n}"
             )
+        same_freedoms(model, wish, "project")
         numbers = np.arange(len(model.structure.nodes))
         own = np.unique(model.motion.cells[model.motion.source_base :])
         own = own[own < model.n]

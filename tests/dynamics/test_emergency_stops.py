@@ -48,6 +48,17 @@ def test_a_state_under_other_effects_is_refused_by_name():
     assert fc.simulate(lagging, until=2.0, start=run.final).status is fc.Status.FINISHED
 
 
+def test_an_equilibrium_is_a_start_as_its_state_is():
+    """A Rest went unchecked but for the number of its freedoms."""
+    braked, bending = table(fc.CoulombFriction({"motor": 2.0})), table(fc.Flexible())
+    assert fc.simulate(braked, until=0.5, start=fc.equilibrium(table())).status is fc.Status.FINISHED
+    lagging = fc.equilibrium(rigid_with_lag(), hold={"disc_0_rz": 0.3})
+    with pytest.raises(StructureError, match=r"motor_lag.*under other effects"):
+        fc.simulate(bending, until=0.5, start=lagging)
+    with pytest.raises(StructureError, match=r"motor_lag.*under other effects"):
+        fc.project(bending, lagging.state)
+
+
 def rigid_with_lag() -> fc.Model:
     model = table(fc.MotorLag({"motor": 0.1}))
     assert "motor_lag" in model.coordinates

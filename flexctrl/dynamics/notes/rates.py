@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
 _POINTS, _NEAR = 4, 1e-9
-_STEEP, _MOST, _JUMP, _SHARED = 0.1, 8, 0.05, 0.3
+_STEEP, _MOST, _JUMP, _SHARED, _BEYOND = 0.1, 8, 0.01, 0.3, 1e-3
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
 """What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
@@ -104,15 +104,26 @@ def _where_steep(run: Run, other: Run, near: float) -> tuple[np.ndarray, np.ndar
     most = np.argsort(-steep)[:_MOST]
     begin, end = max(run.track.starts[0], other.track.starts[0]), min(run.final.t, other.final.t)
     shared = np.abs(other.t[np.clip(np.searchsorted(other.t, run.t - near), 0, len(other.t) - 1)] - run.t) <= near
-    at = np.unique([most, most + 1]).tolist() if shared.mean() < _SHARED else []
-    own = [(run.t[k], run.y[k]) for k in at if begin < run.t[k] < end and not shared[k]]
+    met, rows = _at_events(run), np.unique([most, most + 1])
+    rows = rows[~shared[rows] & ~np.isin(rows, met)] if shared.mean() < _SHARED else rows[:0]
     between = 0.5 * (run.t[most] + run.t[most + 1])[steep[most] > _STEEP]
-    events = np.array([event.t for event in run.events] or [np.inf])
-    for t, y in [*own, *((t, run.track.moment(t)[1]) for t in between if begin < t < end)]:
-        apart = np.nan_to_num(np.abs(other.track.moment(t)[1] - y))
-        kind = struck if np.abs(events - t).min() <= near else found
-        np.maximum(kind, apart, out=kind)
+    own = [(run.t[k], run.y[k]) for k in rows] + [(t, run.track.moment(t)[1]) for t in between if begin < t < end]
+    for t, y in own:
+        if begin < t < end:
+            found = np.fmax(found, np.abs(other.track.moment(t)[1] - y))
+    for k in met[(begin < run.t[met]) & (run.t[met] < end)][:_MOST]:
+        beyond = run.track.moment(run.t[k] + _BEYOND * (run.t[k + 1] - run.t[k]))[1]
+        struck = np.fmax(struck, np.abs([beyond - run.y[k], other.track.moment(run.t[k])[1] - run.y[k]]).max(axis=0))
     return found, struck
+
+
+def _at_events(run: Run) -> np.ndarray:
+    """The rows at the instants of events, or so near that another run may well be past them; without the last."""
+    events = np.array([event.t for event in run.events])
+    rows = np.clip(np.searchsorted(run.t, events), 1, len(run.t) - 1)
+    rows = rows - (events - run.t[rows - 1] < run.t[rows] - events)
+    off, step = np.abs(run.t[rows] - events), np.diff(run.t, append=run.t[-1])[rows]
+    return np.unique(rows[off < _BEYOND * step])
 
 
 def are_asked(run: Run, journey: Journey) -> bool:
