@@ -58,18 +58,11 @@ def check_arguments(given: Mapping[str, object]) -> None:
 
 
 def _check_of(model: object, start: object) -> None:
-    """An equilibrium of another machine, its rigid twin's say, is no start of this one; a linear model has its own."""
-    if not isinstance(start, Rest):
-        return
-    if isinstance(model, LinearModel):
+    """A linear model begins at its own equilibrium; whether a machine can be in another's is seen with all states."""
+    if isinstance(start, Rest) and isinstance(model, LinearModel):
         raise StructureError(
             "simulate: start = a Rest; a linear model's state counts from where it was made and is zero there: leave "
-            "start out to begin there, or give a State"
-        )
-    if isinstance(model, Model) and start.state.q.size != model.n:
-        raise StructureError(
-            f"simulate: start = a Rest with {start.state.q.size} degrees of freedom, the model has {model.n}: it is of "
-            "another machine, or of the same under other effects; give what equilibrium(model) returns"
+            "start out to begin there, or give a State of what it is off from there, as model.displace makes it"
         )
 
 

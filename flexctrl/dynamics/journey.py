@@ -31,7 +31,7 @@ from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track
 from flexctrl.dynamics.records.record import Unwritten, writing
 from flexctrl.dynamics.records.rows import Rows
-from flexctrl.dynamics.records.tensions import Span
+from flexctrl.dynamics.records.tensions import Interval
 from flexctrl.dynamics.renewing import renew
 from flexctrl.dynamics.run import Status, Tolerance
 from flexctrl.dynamics.steps import (
@@ -395,10 +395,10 @@ class Journey:
         """Tell whether an event asked for has been told, or is beyond the end."""
         return crossing.gauge < len(self.watch.events) and crossing.t <= self.told
 
-    def happens(self, crossing: Crossing, state: State, u: np.ndarray, span: Span | None = None) -> None:
+    def happens(self, crossing: Crossing, state: State, u: np.ndarray, interval: Interval | None = None) -> None:
         """Note an event, unless that has been done, in a state that may be within a step."""
         if crossing.t > self.told:
-            self.events.append(self.watch.occurrence(crossing, state, u, span))
+            self.events.append(self.watch.occurrence(crossing, state, u, interval))
 
     def tell(self, event: Occurrence) -> None:
         """Note what has happened on the way of many steps, unless that has been done."""

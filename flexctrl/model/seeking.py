@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial, reduce
@@ -76,8 +75,9 @@ def _searched(balance: Balance, start: State, tolerance: float) -> Found:
     except EquilibriumError as failure:
         led = []
         for taut in _TAUT:
+            softer = _ever_stiffer(balance, start, taut)
             with suppress(EquilibriumError):
-                led += [_stiffened(ways, start, tolerance) for ways in _ever_stiffer(balance, start, taut)]
+                led += [_stiffened([*softer, balance], start, tolerance)] if softer else []
             if led and not balance.unstable(led[-1].state):
                 return led[-1]
         if led:
@@ -85,19 +85,18 @@ def _searched(balance: Balance, start: State, tolerance: float) -> Found:
         raise failure
 
 
-def _ever_stiffer(balance: Balance, start: State, taut: float) -> Iterator[list[Balance]]:
-    """Balances of machines whose ropes and beams stretch, and then ever less, to the one that is asked for, if any do.
+def _ever_stiffer(balance: Balance, start: State, taut: float) -> list[Balance]:
+    """Balances of machines whose ropes and beams stretch, and then ever less; none where all stretch as much already.
 
     A cable a hundred thousand times as stiff as it is heavy leaves its catenary by waves of slack pieces, which no
     step gets out of; where it hangs with a thousandth of that stiffness is near where it comes to.
     """
     EA = taut * float(np.abs(balance.force(start) / balance.lever[balance.free]).sum())
-    limit, ways = stiffest(balance.model), []
+    limit, softer = stiffest(balance.model), list[Balance]()
     while 0.0 < EA < limit:
-        ways.append(replace(balance, model=stretching(balance.model, EA)))
+        softer.append(replace(balance, model=stretching(balance.model, EA)))
         EA *= _STIFFER
-    if ways:
-        yield [*ways, balance]
+    return softer
 
 
 def _stiffened(ways: list[Balance], start: State, tolerance: float) -> Found:

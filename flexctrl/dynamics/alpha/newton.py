@@ -28,6 +28,9 @@ def wanted(tolerance: float, exact: bool) -> float:
 
 
 def circling(sizes: Sequence[float]) -> bool:
-    """Tell whether the last corrections are of one size: from one side of a jump of forces to the other and back."""
+    """Tell whether the last corrections are of one size: from one side of a jump of forces to the other and back.
+
+    It spares plain steps, each of whose corrections takes milliseconds, the rest of them; loops go through them all.
+    """
     last = sizes[-3:]
     return len(last) == 3 and max(last) - min(last) <= _ALIKE * max(last)

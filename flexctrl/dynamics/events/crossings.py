@@ -14,7 +14,7 @@ from flexctrl.dynamics.events.roots import comes_back, nearly, root
 from flexctrl.dynamics.events.watch import Crossing, Watch
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.records.dense import Curve, Hermite
-from flexctrl.dynamics.records.tensions import Span
+from flexctrl.dynamics.records.tensions import Interval
 from flexctrl.dynamics.scales import once, turning, yardsticks
 from flexctrl.dynamics.steps import Point
 from flexctrl.frozen import frozen
@@ -169,7 +169,7 @@ class _Along:
         return self._asked(self.curve.at(t))
 
     def _asked(self, state: State) -> list[float]:
-        outputs = self.watch.tensions.within(state, Span(self.before.state, self.after.state, self.curve.seen))
+        outputs = self.watch.tensions.within(state, Interval(self.before.state, self.after.state, self.curve.seen))
         signals = self.watch.named_signals(outputs, self.supply(state).u)
         return [event.value(signals) for event in self.watch.events]
 

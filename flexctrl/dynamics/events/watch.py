@@ -12,7 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.events.event import Direction, Event, Occurrence
 from flexctrl.dynamics.feed import Feed
-from flexctrl.dynamics.records.tensions import Span, Tensions
+from flexctrl.dynamics.records.tensions import Interval, Tensions
 from flexctrl.dynamics.steps import Point
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.frozen import frozen
@@ -238,9 +238,11 @@ class Watch:
         """Note that a gauge has crossed, though its value may still be on either side of zero by round-off."""
         self.sides[crossing.gauge] = 1.0 if crossing.rising else -1.0
 
-    def occurrence(self, crossing: Crossing, state: State, u: np.ndarray, span: Span | None = None) -> Occurrence:
+    def occurrence(
+        self, crossing: Crossing, state: State, u: np.ndarray, interval: Interval | None = None
+    ) -> Occurrence:
         """Return what is told of a crossing, by a state that may be within a step."""
-        outputs = self.tensions.within(state, span) if span else self.feed.model.measure(state)
+        outputs = self.tensions.within(state, interval) if interval else self.feed.model.measure(state)
         return self.named(crossing, outputs, u)
 
     def named(self, crossing: Crossing, outputs: np.ndarray, u: np.ndarray) -> Occurrence:

@@ -13,7 +13,7 @@ from flexctrl.dynamics.events.landing import Missed, landed
 from flexctrl.dynamics.events.switching import anew, is_brief, withheld
 from flexctrl.dynamics.events.watch import Crossing
 from flexctrl.dynamics.records.dense import Curve
-from flexctrl.dynamics.records.tensions import Span
+from flexctrl.dynamics.records.tensions import Interval
 from flexctrl.dynamics.steps import Point, StepError
 from flexctrl.model.laws.friction_kinds import STUCK
 
@@ -129,7 +129,7 @@ def _switched(journey: Journey, at: Point, landing: Crossing, switch: int, brief
 
 def _note(journey: Journey, met: Sequence[Crossing], curve: Curve, ends: tuple[Point, Point]) -> None:
     before, after = ends
-    span = Span(before.state, after.state, curve.seen)
+    interval = Interval(before.state, after.state, curve.seen)
     for c in met:
         journey.watch.cross(c)
-        journey.happens(c, curve.at(c.t), before.supply.u, span)
+        journey.happens(c, curve.at(c.t), before.supply.u, interval)

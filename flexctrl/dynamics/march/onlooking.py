@@ -11,7 +11,7 @@ from flexctrl.dynamics.events.watch import Crossing, Watch
 from flexctrl.dynamics.events.watching import TOGETHER
 from flexctrl.dynamics.march.record import TURN, TURNED
 from flexctrl.dynamics.records.dense import Dense
-from flexctrl.dynamics.records.tensions import Span
+from flexctrl.dynamics.records.tensions import Interval
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.march.marching import Pacing
@@ -45,10 +45,10 @@ def looked_at(ride: Ride, before: Any, pacing: float | Pacing) -> tuple[int, int
         watch.settle(after)
     except EventError:
         return status, done, False
-    span = Span(before.state, after.state, curve.seen)
+    interval = Interval(before.state, after.state, curve.seen)
     for crossing, state in told:
         watch.cross(crossing)
-        j.happens(crossing, state, before.supply.u, span)
+        j.happens(crossing, state, before.supply.u, interval)
     count = len(watch.events)
     j.watch.sides[:count], j.watch.sizes[:count] = watch.sides, watch.sizes
     return status, done, True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -79,8 +80,8 @@ class Apart:
             low, high = _between(run, other.t[within], near)
             y = other.y[within]
             most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
-            steep, struck = _where_steep(run, other, near)
-            most = np.maximum(most, steep)
+            if run.track.stretches and other.track.stretches and len(other.t) and not run.track.feed.sample_time:
+                most, struck = np.maximum(most, _where_steep(run, other, near)), _struck(run, other)
         return cls(longer, min(max(free, _LEAST), 1.0), most, struck)
 
     def left(self, order: np.ndarray) -> np.ndarray:
@@ -89,32 +90,37 @@ class Apart:
         return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), least)
 
 
-def _where_steep(run: Run, other: Run, near: float) -> tuple[np.ndarray, np.ndarray]:
+def _where_steep(run: Run, other: Run, near: float) -> np.ndarray:
     """How far outputs of another run are from a run's own where these change most from row to row: there, and between.
 
     What a run does between two such rows may be anything, as far as rows tell: all that another one is off by may lie
-    between them. It does not where both have many rows at the same times, as samples make them. Last is how far they
-    are apart in rows at the very instants of events.
+    between them. It does not where both have many rows at the same times, as samples make them.
     """
-    found, struck = np.zeros((2, run.y.shape[1]))
-    if not (run.track.stretches and other.track.stretches and len(other.t)) or run.track.feed.sample_time:
-        return found, struck
     way = np.ptp(run.y, axis=0)
     steep = (np.abs(np.diff(run.y, axis=0)) / np.where(way > 0.0, way, np.inf)).max(axis=1)
     most = np.argsort(-steep)[:_MOST]
-    begin, end = max(run.track.starts[0], other.track.starts[0]), min(run.final.t, other.final.t)
     shared = np.abs(other.t[np.clip(np.searchsorted(other.t, run.t - near), 0, len(other.t) - 1)] - run.t) <= near
-    met, rows = _at_events(run), np.unique([most, most + 1])
-    rows = rows[~shared[rows] & ~np.isin(rows, met)] if shared.mean() < _SHARED else rows[:0]
+    rows = np.unique([most, most + 1])
+    rows = rows[~shared[rows] & ~np.isin(rows, _at_events(run))] if shared.mean() < _SHARED else rows[:0]
     between = 0.5 * (run.t[most] + run.t[most + 1])[steep[most] > _STEEP]
-    own = [(run.t[k], run.y[k]) for k in rows] + [(t, run.track.moment(t)[1]) for t in between if begin < t < end]
-    for t, y in own:
-        if begin < t < end:
-            found = np.fmax(found, np.abs(other.track.moment(t)[1] - y))
-    for k in met[(begin < run.t[met]) & (run.t[met] < end)][:_MOST]:
-        beyond = run.track.moment(run.t[k] + _BEYOND * (run.t[k + 1] - run.t[k]))[1]
-        struck = np.fmax(struck, np.abs([beyond - run.y[k], other.track.moment(run.t[k])[1] - run.y[k]]).max(axis=0))
-    return found, struck
+    own = [(run.t[k], run.y[k]) for k in rows if _in_both(run, other, run.t[k])]
+    own += [(t, run.track.moment(t)[1]) for t in between if _in_both(run, other, t)]
+    apart = (np.abs(other.track.moment(t)[1] - y) for t, y in own)
+    return reduce(np.fmax, apart, np.zeros(run.y.shape[1]))
+
+
+def _struck(run: Run, other: Run) -> np.ndarray:
+    """How far outputs jump in rows at the instants of events: just beyond, or as another run is there."""
+    jumps = []
+    for k in [k for k in _at_events(run) if _in_both(run, other, run.t[k])][:_MOST]:
+        beyond = run.t[k] + _BEYOND * (run.t[k + 1] - run.t[k])
+        jumps += [np.abs(moment[1] - run.y[k]) for moment in (run.track.moment(beyond), other.track.moment(run.t[k]))]
+    return reduce(np.fmax, jumps, np.zeros(run.y.shape[1]))
+
+
+def _in_both(run: Run, other: Run, t: float) -> bool:
+    """Tell whether a time is within what two runs have kept of their steps."""
+    return bool(max(run.track.starts[0], other.track.starts[0]) < t < min(run.final.t, other.final.t))
 
 
 def _at_events(run: Run) -> np.ndarray:

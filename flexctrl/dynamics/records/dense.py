@@ -12,7 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.methods.local import Local
-from flexctrl.dynamics.records.tensions import Span, Tensions
+from flexctrl.dynamics.records.tensions import Interval, Tensions
 from flexctrl.dynamics.steps import Point, Stepper
 from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
@@ -213,11 +213,11 @@ class Track:
 
     def moment(self, t: float) -> tuple[State, np.ndarray, np.ndarray]:
         """Return the state, the outputs and the inputs at a time."""
-        state, u, span = self._found(t)
-        outputs = self.tensions.within(state, span) if span else self.feed.model.measure(state)
+        state, u, interval = self._found(t)
+        outputs = self.tensions.within(state, interval) if interval else self.feed.model.measure(state)
         return state, outputs, u
 
-    def _found(self, t: float) -> tuple[State, np.ndarray, Span | None]:
+    def _found(self, t: float) -> tuple[State, np.ndarray, Interval | None]:
         """The state and the inputs, and the step that it is within."""
         before, after = self._ends(t)
         for end in (after, before):
@@ -228,7 +228,7 @@ class Track:
         state = curve.at(t)
         share = ((t - before.state.t) / h, h)
         u = self.feed.between(before.supply, after.supply, share, state).u
-        return state, u, Span(before.state, after.state, curve.seen)
+        return state, u, Interval(before.state, after.state, curve.seen)
 
     def step(self, t: float) -> float:
         """Return how long the step at a time is [s]."""

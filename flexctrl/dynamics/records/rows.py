@@ -14,7 +14,7 @@ from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.records.dense import Curve, Hermite
 from flexctrl.dynamics.records.frames import Frames, Later
 from flexctrl.dynamics.records.record import Recorder
-from flexctrl.dynamics.records.tensions import Span, Tensions
+from flexctrl.dynamics.records.tensions import Interval, Tensions
 from flexctrl.dynamics.steps import Fixed, Pace, Point
 from flexctrl.model.state import State
 
@@ -65,7 +65,7 @@ class Rows:
             state = curve.at(row)
             share = ((row - before.state.t) / h, h)
             u = self.feed.between(before.supply, after.supply, share, state).u
-            self._write_between(state, Span(before.state, after.state, curve.seen), u)
+            self._write_between(state, Interval(before.state, after.state, curve.seen), u)
         if not to_jump:
             self.here(after, near)
 
@@ -79,7 +79,7 @@ class Rows:
             if abs(times[i] - row) > near:
                 before, after = (Point(end, np.zeros(0), supply) for end in (states[i - 1] if i else start, state))
                 curve = self.curve(before, after)
-                self._write_between(curve.at(row), Span(before.state, state, curve.seen), supply.u)
+                self._write_between(curve.at(row), Interval(before.state, state, curve.seen), supply.u)
                 continue
             if i >= kept:
                 return
@@ -207,9 +207,9 @@ class Rows:
         self.recorder.row(state.t, self.feed.model.measure(state), u)
         self.frame(state)
 
-    def _write_between(self, state: State, span: Span, u: np.ndarray) -> None:
+    def _write_between(self, state: State, interval: Interval, u: np.ndarray) -> None:
         self.count += 1
-        self.recorder.row(state.t, self.tensions.within(state, span), u)
+        self.recorder.row(state.t, self.tensions.within(state, interval), u)
         self.frame(state)
 
     def frame(self, state: State) -> None:

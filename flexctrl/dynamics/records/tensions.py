@@ -13,11 +13,11 @@ from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 from flexctrl.structure.outputs import Tension
 
-__all__ = ["Span", "Tensions"]
+__all__ = ["Interval", "Tensions"]
 
 
 @frozen(eq=False)
-class Span:
+class Interval:
     """The step that a state is within.
 
     Attributes
@@ -62,14 +62,14 @@ class Tensions:
         """Tell whether some line turns by more than what is seen [rad] in a step of a length [s]."""
         return bool((h * self._lines[1] > seen).any())
 
-    def within(self, state: State, span: Span) -> np.ndarray:
+    def within(self, state: State, interval: Interval) -> np.ndarray:
         """Return the outputs of a state that is interpolated within a step, shape (outputs,)."""
-        values, before, after = self.model.measure(state), span.before, span.after
+        values, before, after = self.model.measure(state), interval.before, interval.after
         h = after.t - before.t
-        if not (h > 0.0 and self.stiff(h, span.seen)):
+        if not (h > 0.0 and self.stiff(h, interval.seen)):
             return values
         ends = self.model.measure(before)[None], self.model.measure(after)[None]
-        return self.straight(values[None], ends, np.array([(state.t - before.t) / h]), np.array([h]), span.seen)[0]
+        return self.straight(values[None], ends, np.array([(state.t - before.t) / h]), np.array([h]), interval.seen)[0]
 
     def straight(
         self, values: np.ndarray, ends: tuple[np.ndarray, np.ndarray], share: np.ndarray, h: np.ndarray, seen: float
@@ -85,7 +85,7 @@ class Tensions:
         share, h : numpy.ndarray, shape (rows,)
             What of the step is done, and its length [s].
         seen : float
-            As in `Span`.
+            As in `Interval`.
 
         Returns
         -------
