@@ -115,6 +115,23 @@ class Told(NamedTuple):
         return Leg(supply, t, self.pacing._replace(size=size, stop=stop), int(steps))
 
 
+class Again(NamedTuple):
+    """A leg done again.
+
+    Attributes
+    ----------
+    states : list of State
+    supplies : list of Supply
+        After each step.
+    stands : State
+        Where the next leg starts: beyond the corner, where the last step ended just before one.
+    """
+
+    states: list[State]
+    supplies: list[Supply]
+    stands: State
+
+
 class Opened(NamedTuple):
     """Books and watch as a ride opens them.
 
@@ -186,34 +203,26 @@ class Legs:
         """Where the last leg ends."""
         return self.end
 
-    @property
-    def states(self) -> list[list[State]]:
-        """The states after the steps of each leg."""
-        return [states for states, _ in self._again]
-
-    @property
-    def supplies(self) -> list[list[Supply]]:
-        """The inputs after the steps of each leg."""
-        return [supplies for _, supplies in self._again]
-
     @cached_property
-    def _again(self) -> list[tuple[list[State], list[Supply]]]:
-        again = self.stepper.again()
-        again.marcher.recall(self.memory.march)
-        again.enter(self.start)
-        marcher = again.marcher
+    def again(self) -> list[Again]:
+        """All legs, done again."""
+        stepper = self.stepper.again()
+        stepper.marcher.recall(self.memory.march)
+        stepper.enter(self.start)
+        marcher = stepper.marcher
         marcher.open(self.books.first, self.books.sums.moved, self.books.losing)
         marcher.go_on(self.books.sums)
         marcher.about_to(self.mark.size)
         marcher.watch(self.books.sides, self.start.state)
         marcher.follow(self.mark)
         marcher.keep(all_states=True)
-        before, found = self.start.supply, []
+        before, found = self.start.supply, list[Again]()
         for leg in self.legs:
             marcher.march.t = leg.t
             marcher.resupply(before, leg.supply, leg.pacing)
             before = leg.supply
-            found.append(marcher.travelled(leg.supply, leg.pacing, leg.steps))
+            states, supplies = marcher.travelled(leg.supply, leg.pacing, leg.steps)
+            found.append(Again(states, supplies, marcher.point(leg.supply).state))
         return found
 
 
@@ -227,18 +236,18 @@ class Span:
     @property
     def states(self) -> Sequence[State]:
         """After each step."""
-        return self.ride.states[self.number]
+        return self.ride.again[self.number].states
 
     @property
     def supplies(self) -> Sequence[Supply]:
         """After each step."""
-        return self.ride.supplies[self.number]
+        return self.ride.again[self.number].supplies
 
     @cached_property
     def before(self) -> Point:
         """Where the leg starts."""
         leg = self.ride.legs[self.number]
-        state = self.ride.states[self.number - 1][-1] if self.number else self.ride.start.state
+        state = self.ride.again[self.number - 1].stands if self.number else self.ride.start.state
         return Point(state.with_(t=leg.t), np.zeros(0), leg.supply)
 
     @cached_property
