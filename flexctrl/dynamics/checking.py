@@ -24,6 +24,8 @@ _FARTHER = 5.0 / 3.0
 """How far the last one is, in powers: 243 times the tolerance."""
 _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
+_CHANCE = 2.0 / 3.0
+"""What is nearer than that, of what it would be by its order, is so by chance."""
 _ALIKE, _SAMPLED = 0.7, 0.5
 """A coarser run with more of the steps, or so many under samples, is much the same, and makes the same errors."""
 _OFF, _NEARLY = 0.01, 0.001
@@ -117,7 +119,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
     if astray:
         return elsewhere(kept, third.gap, journey, farther.said), others
-    if not rattles(journey):
+    if not (rattles(journey) or any(_by_chance(near, other, run.report.order) for near in nearer)):
         return kept, others
     confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
     return confirmed, (*others, *finer)
@@ -154,6 +156,12 @@ def _order(near: Other, far: Other, most: float) -> float:
     longer = near.beside.longer, far.beside.longer
     least = np.array([least_order(longer[0], most)])
     return float(orders_seen(np.array([near.gap.most]), np.array([far.gap.most]), longer, (least, most))[0])
+
+
+def _by_chance(near: Other, far: Other, order: float) -> bool:
+    """Tell whether one is nearer than errors of an order are, as one may be that met a corner at the same moment."""
+    least, most = (abs(other.beside.longer**order - 1.0) for other in (near, far))
+    return near.gap.most * most < _CHANCE * far.gap.most * least
 
 
 def _grown(
