@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
+from flexctrl.dynamics.notes.answers import jumps
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.peaks import peaked
@@ -119,7 +120,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
     if astray:
         return elsewhere(kept, third.gap, journey, farther.said), others
-    if not (rattles(journey) or any(_by_chance(near, other, run.report.order) for near in nearer)):
+    by_chance = any(_by_chance(near, other, run.report.order) for near in nearer)
+    if not (by_chance or rattles(journey) or jumps(run, journey, beginning.again)):
         return kept, others
     confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
     return confirmed, (*others, *finer)

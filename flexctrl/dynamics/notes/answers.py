@@ -1,4 +1,4 @@
-"""How a sampled law answers to what it has read: in proportion or not, with limits, or by jumps that a hair decides."""
+"""How a law answers to what it has read: in proportion or not, with limits, or by jumps that a hair decides."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
     from flexctrl.dynamics.run import Run
 
-__all__ = ["Manner", "answers"]
+__all__ = ["Manner", "answers", "jumps"]
 
 _PLACES, _HALVINGS = 17, 16
 _JUMP = 5e-3
@@ -55,16 +55,41 @@ def answers(run: Run, journey: Journey, feed: Feed | None) -> Manner:
     Manner
         Jumps count from half a percent of all that a command, or a state of the law, changes by along that line.
     """
-    if feed is None or not feed.sample_time or not feed.reads.size or not len(run.y):
+    if feed is None or not feed.sample_time:
         return Manner.SMOOTH
-    read, end = run.y[:, feed.reads], journey.point
+    t, x = journey.point.state.t, journey.point.supply.x
+    return _along(run, feed, lambda y: feed.told(t, x, y))
+
+
+def jumps(run: Run, journey: Journey, feed: Feed | None) -> bool:
+    """Tell whether a continuous law jumps along the line from the least to the most of all that it has read.
+
+    Parameters
+    ----------
+    run : Run
+    journey : Journey
+        At its end.
+    feed : Feed or None
+        With a law that may be asked anew; None if there is none.
+
+    Returns
+    -------
+    bool
+    """
+    if feed is None or not feed.reacting:
+        return False
+    t, x = journey.point.state.t, journey.point.supply.x
+    return _along(run, feed, lambda y: feed.answer(t, y, x)) is Manner.ABRUPT
+
+
+def _along(run: Run, feed: Feed, told: Callable[[np.ndarray], tuple[list[float], np.ndarray]]) -> Manner:
+    """How a law answers along that line."""
+    if not feed.reads.size or not len(run.y):
+        return Manner.SMOOTH
+    read = run.y[:, feed.reads]
     low, high = read.min(axis=0), read.max(axis=0)
-
-    def answer(share: float) -> np.ndarray:
-        return np.concatenate(feed.told(end.state.t, end.supply.x, low + share * (high - low)))
-
     try:
-        return _kind(answer, _hunts(run.u))
+        return _kind(lambda share: np.concatenate(told(low + share * (high - low))), _hunts(run.u))
     except (FlexctrlError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
         return Manner.SMOOTH
 
