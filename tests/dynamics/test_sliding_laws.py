@@ -132,6 +132,33 @@ def test_two_that_slide_each_have_their_value_between():
     assert np.abs(run["x1"] + 0.5 + 0.7 * run["v1"])[late].max() < 1e-4
 
 
+def test_a_force_and_its_reaction_stay_opposite():
+    """Dry friction between two carts, beside a relay of a third: only what shakes them moves their centre of mass.
+
+    Each with a value of its own where they stick, the carts of 2 and 1 kg flew off together.
+    """
+
+    def says(t, x, y):
+        rubs = 2.0 * np.sign(y[0] - y[1])
+        return 8.0 * np.sin(3.0 * t) - rubs, rubs, -5.0 * np.sign(y[2] - 1.0 + 0.5 * y[3])
+
+    law = Law(("v0", "v1", "x2", "v2"), ("f0", "f1", "f2"), says)
+    method, tolerance = fc.Unchecked(fc.AdaptiveAlpha()), fc.Tolerance(1e-5, 1e-8)
+    run = fc.simulate(carts(2.0, 1.0, 2.0), law, until=4.0, method=method, tolerance=tolerance, every=0.01)
+    centre = (2.0 * run["x0"] + run["x1"]) / 3.0
+    assert centre == pytest.approx(8.0 / 9.0 * (run.t - np.sin(3.0 * run.t) / 3.0), abs=5e-3)
+    assert run["x2"] == pytest.approx(slid(run.t), abs=2e-3)
+
+    def slope(t, y):
+        rubs = 2.0 * np.clip((y[2] - y[3]) / 1e-6, -1.0, 1.0)
+        return [y[2], y[3], 0.5 * (8.0 * np.sin(3.0 * t) - rubs), rubs]
+
+    truth = solve_ivp(slope, (0.0, 4.0), np.zeros(4), "LSODA", run.t, rtol=1e-8, atol=1e-10, max_step=1e-3).y
+    apart = truth[0] - truth[1]
+    assert np.ptp(apart) > 0.05
+    assert run["x0"] - run["x1"] == pytest.approx(apart, abs=0.02 * np.ptp(apart))
+
+
 def test_surfaces_that_hang_together_and_move_are_slid_along():
     """Two carts whose surfaces share speeds, one of them led by time: as each says once it is reached."""
     law = Law(

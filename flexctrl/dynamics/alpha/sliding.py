@@ -9,6 +9,7 @@ chattering-free implementation of sliding mode systems).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, cast
@@ -68,8 +69,9 @@ def jumps(before: np.ndarray, used: np.ndarray, said: np.ndarray, foretold: np.n
 def slide(stepper: Stepper, point: AlphaPoint, h: float) -> AlphaPoint:
     """Return the point a step later, under inputs between those that the law has on both sides of a jump.
 
-    Of each input the value is sought at which the law, asked at the step's end, turns from more to less. Where it says
-    at the end what it was held at, it does not jump there.
+    Of each input the value is sought at which the law, asked at the step's end, turns from more to less; of inputs that
+    jump at the same place it is the same share of the way from one side to the other, as Filippov has it: a force and
+    its reaction stay opposite. Where a law says at the end what it was held at, it does not jump there.
 
     Parameters
     ----------
@@ -90,26 +92,34 @@ def slide(stepper: Stepper, point: AlphaPoint, h: float) -> AlphaPoint:
     """
     held = replace(stepper, memory=None, _solve=None)
 
+    ends = dict[bytes, _End]()
+
     def end(u: np.ndarray) -> _End:
-        held.feed = cast("Feed", _Held(stepper.feed, u))
-        after = held.exactly(point, h)
-        return _End(after, stepper.feed.at(after.state, point.supply, h))
+        known = u.tobytes()
+        if known not in ends:
+            held.feed = cast("Feed", _Held(stepper.feed, u))
+            after = held.exactly(point, h)
+            ends[known] = _End(after, stepper.feed.at(after.state, point.supply, h))
+        return ends[known]
 
     one = end(point.supply.u).said.u
     found = end(one)
     u, other = one, found.said.u
     apart = _JUMPS * np.maximum(np.abs(one), np.abs(other))
+    turning, groups = np.zeros(0, dtype=int), list[np.ndarray]()
     for _ in range(_SWEEPS):
-        turning = np.flatnonzero(np.abs(other - one) > apart)
+        moving = np.flatnonzero(np.abs(other - one) > apart)
+        if moving.tolist() != turning.tolist():
+            turning, groups = moving, _together(end, u, moving, (one, other))
         before, turns = u, np.zeros(u.size, dtype=bool)
-        for i in turning:
-            u, turns[i] = _between(end, u, int(i), (float(one[i]), float(other[i])))
+        for group in groups:
+            u, turns[group] = _between(end, u, group, (one, other))
         found = end(u) if turning.size else found
         agrees = np.abs(found.said.u - u) <= apart
         settled = np.abs(u - before) <= _SETTLED * np.abs(other - one)
         if agrees.all():
             return replace(found.after, supply=found.said)
-        if (agrees | turns).all() and (turning.size == 1 or settled[turning].all()):
+        if (agrees | turns).all() and (len(groups) == 1 or settled[turning].all()):
             return replace(found.after, supply=replace(found.said, u=u, slid=True))
         one, other = np.where(agrees | turns, one, u), np.where(agrees | turns, other, found.said.u)
     why = f"no inputs agree with a law that jumps at t = {point.state.t + h:.6g} s"
@@ -123,19 +133,58 @@ class _End(NamedTuple):
     said: Supply
 
 
+_Span = tuple[np.ndarray, np.ndarray]
+"""Inputs on both sides of where they jump."""
+
+
 def _between(
-    end: Callable[[np.ndarray], _End], u: np.ndarray, i: int, span: tuple[float, float]
+    end: Callable[[np.ndarray], _End], u: np.ndarray, group: np.ndarray, span: _Span
 ) -> tuple[np.ndarray, bool]:
-    """Inputs of which one is where the law turns from more to less, or what it says; and whether it turns."""
+    """Inputs of which some are where the law turns from more to less, or what it says; and whether it turns."""
+    share = _share(end, u, group, span)
+    if math.isnan(share):
+        changed = u.copy()
+        changed[group] = end(_having(u, group, span, 0.0)).said.u[group]
+        return changed, False
+    return _having(u, group, span, share), True
+
+
+def _having(u: np.ndarray, group: np.ndarray, span: _Span, share: float) -> np.ndarray:
+    """Inputs of which some are at a share of the way from one side to the other."""
+    changed = u.copy()
+    changed[group] = (1.0 - share) * span[0][group] + share * span[1][group]
+    return changed
+
+
+def _share(end: Callable[[np.ndarray], _End], u: np.ndarray, group: np.ndarray, span: _Span) -> float:
+    """The share of the way at which what the law says of the first of some inputs turns; NaN where it does not."""
     from scipy.optimize import brentq
 
-    def having(value: float) -> np.ndarray:
-        return np.concatenate([u[:i], [value], u[i + 1 :]])
+    def more(share: float) -> float:
+        held = _having(u, group, span, share)
+        return float(end(held).said.u[group[0]] - held[group[0]])
 
-    def more(value: float) -> float:
-        return float(end(having(value)).said.u[i]) - value
+    first, last = more(0.0), more(1.0)
+    return float(brentq(more, 0.0, 1.0, xtol=_FINE)) if first * last < 0.0 else math.nan
 
-    first, last = (more(value) for value in span)
-    if first * last >= 0.0:
-        return having(span[0] + first), False
-    return having(brentq(more, *span, xtol=_FINE * abs(span[1] - span[0]))), True
+
+def _together(end: Callable[[np.ndarray], _End], u: np.ndarray, turning: np.ndarray, span: _Span) -> list[np.ndarray]:
+    """Inputs that jump at the same place, found where each jumps if all of them change at once."""
+    groups, left = list[np.ndarray](), turning
+    while left.size:
+        groups.append(left[_with_first(end, u, left, turning, span)] if left.size > 1 else left)
+        left = np.setdiff1d(left, groups[-1])
+    return groups
+
+
+def _with_first(
+    end: Callable[[np.ndarray], _End], u: np.ndarray, left: np.ndarray, turning: np.ndarray, span: _Span
+) -> np.ndarray:
+    """Which of the inputs that are left jump where the first of them does."""
+    first = left == left[0]
+    share = _share(end, u, np.append(left, np.setdiff1d(turning, left)), span)
+    if math.isnan(share):
+        return first
+    sides = (end(_having(u, turning, span, share + s * _FINE)).said.u[left] for s in (-2.0, 2.0))
+    jumped = np.abs(np.subtract(*sides)) > 0.5 * np.abs(span[1] - span[0])[left]
+    return first | jumped
