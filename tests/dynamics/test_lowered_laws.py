@@ -7,6 +7,8 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.design import FilteredRate, MinimumJerk, OpenLoop, Ramp, pid
+from flexctrl.dynamics.march.legs import Told
+from flexctrl.dynamics.march.marching import Pacing
 
 pytest.importorskip("llvmlite")
 
@@ -104,3 +106,15 @@ def test_rigid_and_small_motion_too(monkeypatch):
     small = fc.assemble(fc.cranes.ceiling_crane(), effects)
     for model in (fc.rigid(crane()), small):
         alike(*both(model, monkeypatch, controller=law(), until=0.15, method=PACES["fixed"]))
+
+
+@pytest.mark.parametrize("period", [0.02, 1e-3, 0.1, 1.0 / 3.0])
+@pytest.mark.parametrize("early", [0.0, 1e-11, 1e-9, 1e-7, 0.4])
+def test_legs_end_at_the_next_sample_however_near_it_is(period, early):
+    """A corner 8 ns before a sample began one that went on to the sample after it when it was done again."""
+    starts = period * (np.arange(1, 2000) - early)
+    table = np.column_stack([starts, np.full_like(starts, 0.1 * period), np.ones_like(starts)])
+    pacing = Pacing(0.1 * period, np.inf, 0.0, 1e4, 1e-4, 1e-7)
+    legs = Told(np.zeros(0), table, 0, period, pacing).legs()
+    nearest = period * np.arange(1, 2000)
+    assert [leg.pacing.stop for leg in legs] == [*(nearest if early else period * np.arange(2, 2001))]

@@ -21,8 +21,6 @@ from flexctrl.model.state import State
 
 __all__ = ["Leg", "Legs", "Span", "Told", "same"]
 
-_ON = 1e-6
-
 
 def same(u: np.ndarray, v: np.ndarray) -> bool:
     """Tell whether inputs are the same."""
@@ -111,7 +109,8 @@ class Told(NamedTuple):
         supply = Supply(row[3 : 3 + self.inputs].copy(), row[3 + self.inputs :].copy(), self.rate)
         if self.pacing is None:
             return Leg(supply, t, size, int(steps))
-        stop = (int(t / self.period + _ON) + 1) * self.period
+        near = round(t / self.period)
+        stop = (near if near * self.period > t else near + 1) * self.period  # a corner may be just before a sample
         return Leg(supply, t, self.pacing._replace(size=size, stop=stop), int(steps))
 
 
