@@ -27,7 +27,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "Origin", "check_same", "load_checkpoint", "machine_of"]
 
-_FORMAT = 14
+_FORMAT = 15
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
@@ -79,6 +79,9 @@ class Checkpoint:
         Events up to this time have been told [s].
     balked : bool
         Whether the next step is to be taken by itself.
+    read : numpy.ndarray, shape (outputs,)
+        What compiled loops have read at a sample that is due, which may differ in the last digit from what is read
+        elsewhere; empty if they have not.
     origin : Origin
         Where the whole run began.
     """
@@ -104,6 +107,7 @@ class Checkpoint:
     counts: Counts
     told: float
     balked: bool
+    read: np.ndarray
     origin: Origin
 
     @property

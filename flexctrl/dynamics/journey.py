@@ -61,7 +61,7 @@ from flexctrl.model.state import State
 __all__ = ["Journey", "Plan"]
 
 _SECONDS = 0.1
-_NONE, _NOTHING = Drift(), OutputErrors({})
+_NONE, _NOTHING, _UNREAD = Drift(), OutputErrors({}), np.zeros(0)
 
 
 @frozen
@@ -121,6 +121,8 @@ class Journey:
         Until when the law is known to follow a line, with what it reads held [s]; infinity if nothing is in sight.
     seen : tuple of int and float
         How many steps had been taken when their number was last foreseen, and when that was [s].
+    read : tuple of Point or None and numpy.ndarray
+        Where compiled loops have read outputs last, and these.
     interruption : Interruption
         Whether Ctrl-C has been pressed.
     """
@@ -149,6 +151,7 @@ class Journey:
     horizon: float = math.inf
     seen: tuple[int, float] = (0, 0.0)
     saved: Checkpoint | None = None
+    read: tuple[Any, np.ndarray] = (None, _UNREAD)
     interruption: Interruption = field(default_factory=Interruption)
     _memory: Any = None
     _counts: Counts = field(default_factory=Counts)
@@ -362,8 +365,19 @@ class Journey:
             self._counts,
             self.told,
             self.balked,
+            self.read[1] if self.marched else _UNREAD,
             self.origin,
         )
+
+    @property
+    def marched(self) -> bool:
+        """Whether compiled loops have come where the run stands, to a sample."""
+        return self.read[0] is self.point and self.read[1].size > 0
+
+    @property
+    def outputs_here(self) -> np.ndarray:
+        """The outputs where the run stands, as what has come there has read them."""
+        return self.read[1] if self.marched else self.plan.model.measure(self.point.state)
 
     def end_by(self, crossings: Sequence[Crossing], t: float) -> None:
         """End the run if any of what happens at an instant ends it; say which do."""

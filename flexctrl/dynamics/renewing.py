@@ -21,10 +21,11 @@ __all__ = ["renew"]
 
 def renew(journey: Journey, stop: float) -> None:
     """Give new inputs at a sample instant or break; accelerations jump with them."""
+    marched, y = journey.marched, journey.outputs_here
     if journey.point.state.t != stop:
         journey.point = replace(journey.point, state=journey.point.state.with_(t=stop))
-    feed, before, state = journey.plan.feed, journey.point.supply, journey.point.state
-    fresh = feed.restart(state, before) if feed.continuous else feed.sample(state, before)
+    feed, before = journey.plan.feed, journey.point.supply
+    fresh = feed.renewed(stop, y[feed.reads], before)
     journey.stops.go_by(stop)  # not before the law has answered: a run that it ends goes on by asking it again
     journey.mark.left = 0
     same = np.array_equal(fresh.u, before.u)
@@ -35,7 +36,8 @@ def renew(journey: Journey, stop: float) -> None:
         _jump(journey, fresh, coming(journey, stop))
     if not (journey.watch.idle or same):
         leapt(journey)
-    journey.rows.here(journey.point, 1e-6 * journey.mark.size)
+    row = y if marched else feed.model.measure(journey.point.state)  # as rides have it: before inputs jump
+    journey.rows.here(journey.point, 1e-6 * journey.mark.size, row)
 
 
 def _jump(journey: Journey, fresh: Supply, step: float) -> None:

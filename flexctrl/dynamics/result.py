@@ -39,7 +39,7 @@ def result(journey: Journey) -> Run:
         state = state.with_(t=plan.until)
     state = replace(state, freedoms=plan.model.coordinates)
     try:
-        rows = journey.rows.finish(state, supply.u)
+        rows = journey.rows.finish(state, journey.outputs_here, supply.u)
         journey.rows.recorder.flush()
     except Unwritten as error:
         journey.fail(error)

@@ -130,7 +130,7 @@ def _begun(
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), origin, notes=notes)
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
         journey.notes += (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
-    rows.here(point, 0.0)
+    rows.here(point, 0.0, journey.outputs_here)
     return journey
 
 
@@ -170,6 +170,7 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     stops, mark = _stops(plan, start), replace(start.mark)
     journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, mark, start.origin)
     journey.told, journey.balked = start.told, start.balked
+    journey.read = start.point, start.read
     return journey
 
 

@@ -298,6 +298,8 @@ class Ride:
             return False
         j.balked, j.mark.stuck, j.mark.taken = self.balked, 0, m.taken
         self.legs.end = j.point = self.stepper.leave(self.supply)
+        if m.done and abs(j.stops.next - m.t) <= self.tick:  # as read at this sample by a ride that goes on
+            j.read = j.point, self.marcher.rows[m.done - 1, 1:].copy()
         j.books.sums = self.marcher.books(j.books.sums)
         j.track.remember(self.legs)
         if not self.leapt:

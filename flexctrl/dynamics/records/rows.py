@@ -51,10 +51,10 @@ class Rows:
     count: int = 0
     frames: Frames = field(default_factory=Frames)
 
-    def here(self, point: Point, slack: float) -> None:
-        """Write the row of a point, if one is due within some slack."""
+    def here(self, point: Point, slack: float, y: np.ndarray) -> None:
+        """Write the row of a point with its outputs, if one is due within some slack."""
         if self.every is None or abs(self.count * self.every - point.state.t) <= slack:
-            self._write(point.state, point.supply.u)
+            self._write(point.state, y, point.supply.u)
 
     def within(self, before: Point, after: Point, to_jump: bool) -> None:
         """Write the rows within a step, and the one at its end unless inputs are about to jump there."""
@@ -67,7 +67,7 @@ class Rows:
             u = self.feed.between(before.supply, after.supply, share, state).u
             self._write_between(state, Interval(before.state, after.state, curve.seen), u)
         if not to_jump:
-            self.here(after, near)
+            self.here(after, near, self.feed.model.measure(after.state))
 
     def _among(self, start: State, times: np.ndarray, states: Sequence[State], supply: Supply, to_jump: bool) -> None:
         """Write the rows within many steps."""
@@ -83,7 +83,7 @@ class Rows:
                 continue
             if i >= kept:
                 return
-            self._write(state, supply.u)
+            self._write(state, self.feed.model.measure(state), supply.u)
 
     def between(self, weaver: Weaver, table: np.ndarray, inputs: Inputs, to_jump: bool) -> None:
         """Write the rows within many steps whose states a weaver knows, and at their ends.
@@ -194,17 +194,17 @@ class Rows:
             self.recorder.row(t, y, u)
         return due
 
-    def finish(self, state: State, u: np.ndarray) -> np.ndarray:
+    def finish(self, state: State, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Write the row of the end, if the last one is before it, and return all rows."""
         rows = self.recorder.table()
         if not len(rows) or rows[-1, 0] < state.t - 1e-12 * self.until:
-            self._write(state, u)
+            self._write(state, y, u)
             rows = self.recorder.table()
         return rows
 
-    def _write(self, state: State, u: np.ndarray) -> None:
+    def _write(self, state: State, y: np.ndarray, u: np.ndarray) -> None:
         self.count += 1
-        self.recorder.row(state.t, self.feed.model.measure(state), u)
+        self.recorder.row(state.t, y, u)
         self.frame(state)
 
     def _write_between(self, state: State, interval: Interval, u: np.ndarray) -> None:
