@@ -11,6 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.alpha.method import AdaptiveAlpha
 from flexctrl.dynamics.asked import check_arguments, check_rows, check_times, events_of
+from flexctrl.dynamics.bouncing import bounced
 from flexctrl.dynamics.breakaway import loosened
 from flexctrl.dynamics.checking import laid_beside
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same
@@ -192,7 +193,8 @@ def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning |
         asked = always or may_grow(journey, law) or are_asked(run, journey)
         if asked or leaves(run, journey, beginning.again):
             told = laid_beside(run, journey, check, beginning, shorter(journey, law))
-            run = loosened(misread(told, run, journey, beginning, law), run, journey, beginning)
+            told = loosened(misread(told, run, journey, beginning, law), run, journey, beginning)
+            run = bounced(told, run, journey, beginning)
     return turned_over(said_of_rates(ringing(run, journey), journey), journey)
 
 

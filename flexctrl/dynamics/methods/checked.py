@@ -113,7 +113,9 @@ class Checked(_Wrapped):
     Where nothing of that is told, and dry contacts stick or break loose that slide with less than it takes to break
     them loose, it is run in the same steps with contacts that bear 5 % more (if one has broken loose), and 5 % less: a
     note says which contact it hangs on if such a run is a fifth of the motion away, of the machine's or of an output's
-    own. All runs in other steps may be wrong alike there.
+    own. All runs in other steps may be wrong alike there. So may those of a drive that meets its play eight times and
+    more by a shaft whose vibration steps do not see: it is run once more by a method that damps that (ρ = 0). What this
+    tells of outputs counts if it is more, and a note says by what they bounce.
 
     Steps of one length are checked where it has gone so far twelve times, to and fro. Where forces or rates are then a
     hundredth of their range apart, one in half the steps tells of these; what has met four corners is confirmed by one
