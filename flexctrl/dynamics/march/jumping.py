@@ -199,6 +199,8 @@ def massed(m: March) -> int:
     """Make the mass for the present shape, or ask for it."""
     if m.asking == 1:
         return WANTS_MASS
+    if m.probes.groups > 0:  # whose last digits hang on where they start from
+        copy(m.flat.padded, m.rate, m.flat.rate)
     drive(m.flat)
     sloped(m, 0.0, 0.0, 1.0)
     return weighed(m)
