@@ -91,7 +91,6 @@ def slide(stepper: Stepper, point: AlphaPoint, h: float) -> AlphaPoint:
         Where no inputs are found that the law agrees with, or turns at.
     """
     held = replace(stepper, memory=None, _solve=None)
-
     ends = dict[bytes, _End]()
 
     def end(u: np.ndarray) -> _End:
