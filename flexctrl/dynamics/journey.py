@@ -365,19 +365,19 @@ class Journey:
             self._counts,
             self.told,
             self.balked,
-            self.read[1] if self.marched else _UNREAD,
+            self.read_here,
             self.origin,
         )
 
     @property
-    def marched(self) -> bool:
-        """Whether compiled loops have come where the run stands, to a sample."""
-        return self.read[0] is self.point and self.read[1].size > 0
+    def read_here(self) -> np.ndarray:
+        """What compiled loops have read where the run stands, at a sample that is due; empty if they have not."""
+        return self.read[1] if self.read[0] is self.point else _UNREAD
 
     @property
     def outputs_here(self) -> np.ndarray:
         """The outputs where the run stands, as what has come there has read them."""
-        return self.read[1] if self.marched else self.plan.model.measure(self.point.state)
+        return read if (read := self.read_here).size else self.plan.model.measure(self.point.state)
 
     def end_by(self, crossings: Sequence[Crossing], t: float) -> None:
         """End the run if any of what happens at an instant ends it; say which do."""

@@ -21,7 +21,7 @@ __all__ = ["renew"]
 
 def renew(journey: Journey, stop: float) -> None:
     """Give new inputs at a sample instant or break; accelerations jump with them."""
-    marched, y = journey.marched, journey.outputs_here
+    read, y = journey.read_here, journey.outputs_here
     if journey.point.state.t != stop:
         journey.point = replace(journey.point, state=journey.point.state.with_(t=stop))
     feed, before = journey.plan.feed, journey.point.supply
@@ -36,8 +36,7 @@ def renew(journey: Journey, stop: float) -> None:
         _jump(journey, fresh, coming(journey, stop))
     if not (journey.watch.idle or same):
         leapt(journey)
-    row = y if marched else feed.model.measure(journey.point.state)  # as rides have it: before inputs jump
-    journey.rows.here(journey.point, 1e-6 * journey.mark.size, row)
+    journey.rows.here(journey.point, 1e-6 * journey.mark.size, read)  # as rides have it: before inputs jump
 
 
 def _jump(journey: Journey, fresh: Supply, step: float) -> None:

@@ -130,7 +130,7 @@ def _begun(
     journey = Journey(plan, stepper, point, stops, books, watch, rows, track, Mark(size), origin, notes=notes)
     if moved := [model.coordinates[i] for i in quasistatic(model) if point.state.q[i] != state.q[i]]:
         journey.notes += (f"{', '.join(moved)}: moved by the start's inputs to where forces balance, as without mass",)
-    rows.here(point, 0.0, journey.outputs_here)
+    rows.here(point, 0.0)
     return journey
 
 

@@ -23,6 +23,7 @@ __all__ = ["Rows"]
 _FRAMES = 120
 _NEAR = 1e-9
 _ROUND_OFF = 1e-15
+_UNREAD = np.zeros(0)
 
 
 @dataclass
@@ -51,10 +52,10 @@ class Rows:
     count: int = 0
     frames: Frames = field(default_factory=Frames)
 
-    def here(self, point: Point, slack: float, y: np.ndarray) -> None:
-        """Write the row of a point with its outputs, if one is due within some slack."""
+    def here(self, point: Point, slack: float, read: np.ndarray = _UNREAD) -> None:
+        """Write the row of a point, if one is due within some slack; what has been read there is not measured again."""
         if self.every is None or abs(self.count * self.every - point.state.t) <= slack:
-            self._write(point.state, y, point.supply.u)
+            self._write(point.state, read if read.size else self.feed.model.measure(point.state), point.supply.u)
 
     def within(self, before: Point, after: Point, to_jump: bool) -> None:
         """Write the rows within a step, and the one at its end unless inputs are about to jump there."""
@@ -67,7 +68,7 @@ class Rows:
             u = self.feed.between(before.supply, after.supply, share, state).u
             self._write_between(state, Interval(before.state, after.state, curve.seen), u)
         if not to_jump:
-            self.here(after, near, self.feed.model.measure(after.state))
+            self.here(after, near)
 
     def _among(self, start: State, times: np.ndarray, states: Sequence[State], supply: Supply, to_jump: bool) -> None:
         """Write the rows within many steps."""
