@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, overload
 
 import numpy as np
 
-__all__ = ["Eight", "eight", "larger", "largest", "lost", "put", "rounded", "total"]
+__all__ = ["Eight", "ahead", "eight", "larger", "largest", "lost", "put", "rounded", "total"]
 
 SPLIT = 2.0**27 + 1.0
 
@@ -21,6 +21,10 @@ def eight(x: np.ndarray) -> Eight:
 def put(x: np.ndarray, value: Eight | float) -> None:
     """Write the first eight entries of a vector."""
     x[:8] = value
+
+
+def ahead(x: np.ndarray) -> None:
+    """Have the first entries of a vector brought near, as they will be read; they need not be there."""
 
 
 def larger(a: Eight, b: Eight) -> Eight:

@@ -28,7 +28,7 @@ from flexctrl.kernels.native_types import (
 
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _ORDER = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
-_EIGHTS = {getattr(eights, n): n for n in ("eight", "put", "larger", "largest", "total", "rounded", "lost")}
+_EIGHTS = {getattr(eights, n): n for n in ("ahead", "eight", "put", "larger", "largest", "total", "rounded", "lost")}
 _BUILT_IN = ("float", "int", "abs", "min", "max")
 
 
@@ -271,6 +271,9 @@ class Expressions:
         a = arguments[0].text
         if name == "eight":
             return self._value("Eight", f"load {EIGHT}, ptr {a}, align 8")
+        if name == "ahead":
+            self._put(f"call void @llvm.prefetch.p0(ptr {a}, i32 0, i32 3, i32 1)")  # to be read, kept in all caches
+            return Value(None, "")
         if name == "put":
             self._put(f"store {EIGHT} {self._cast(arguments[1], 'Eight').text}, ptr {a}, align 8")
             return Value(None, "")

@@ -69,6 +69,7 @@ DECLARATIONS = (
     f"declare {EIGHT} @llvm.fabs.v8f64({EIGHT})",
     f"declare {EIGHT} @llvm.maxnum.v8f64({EIGHT}, {EIGHT})",
     f"declare {EIGHT} @llvm.fma.v8f64({EIGHT}, {EIGHT}, {EIGHT})",
+    "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)",
     f"declare double @llvm.vector.reduce.fmax.v8f64({EIGHT})",
     f"declare double @llvm.vector.reduce.fadd.v8f64(double, {EIGHT})",
 )

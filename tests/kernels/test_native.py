@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flexctrl.errors import KernelError
-from flexctrl.kernels.eights import Eight, eight, larger, largest, lost, put, rounded, total
+from flexctrl.kernels.eights import Eight, ahead, eight, larger, largest, lost, put, rounded, total
 from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel
 from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly, lasting_zeros
 from flexctrl.model.flat.flat import clear as cleared
@@ -107,6 +107,8 @@ def is_small(x: float) -> bool:
 def eights(m: Record) -> int:
     most = 0.0 * eight(m.x)
     for i in range(0, m.n, 8):
+        ahead(m.x[i + 8 :])  # in the end beyond all that there is
+        ahead(m.x[i - 80 :])
         here = 2 * eight(m.x[i:]) - eight(m.y[i:]) / SCALE
         put(m.y[i:], -here)
         most = larger(most, abs(here))

@@ -6,11 +6,14 @@ written one by one that are read eight at once. So rows are summed up side by si
 
 from __future__ import annotations
 
-from flexctrl.kernels.eights import eight, put
+from flexctrl.kernels.eights import ahead, eight, put
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.fronts import Fronts
 
 __all__ = ["solve", "solve_own"]
+
+_SOON = 144
+"""Numbers until what is read backwards is fetched: two fronts of a chain. Memory does not see that coming by itself."""
 
 
 def solve_own(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals, wide: Reals) -> None:
@@ -106,6 +109,8 @@ def backward_in_place(pivots: int, rest: int, b: Reals, others: Wholes, a: Reals
     two = eight(own[last:])
     for j in range(rest):
         column = a[j * pivots :]
+        ahead(column[-_SOON:])
+        ahead(column[8 - _SOON :])
         one = one - b[others[j]] * eight(column)
         two = two - b[others[j]] * eight(column[last:])
     put(own, one)
