@@ -82,7 +82,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     tolerance = journey.plan.tolerance
     if shorter < 1.0:
         told, others = _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)
-        if not (others and isinstance(method.pace, Fixed) and rattles(journey)):
+        if news(told, run) or not (others and isinstance(method.pace, Fixed) and rattles(journey)):
             return told, others
         confirmed, finest = _confirmed(run, told, journey, method, beginning, 0.5 * shorter)
         return confirmed, (*others, *finest)
@@ -102,7 +102,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if not quiet:
         told, nearer = _nearer(run, told, other, journey, nearby, beginning)
     if told.report.error > TOLD:
-        return told, (other, *nearer)
+        return _rattled(run, told, (other, *nearer), journey, method, beginning)
     if parted:
         return elsewhere(told, other.gap, journey, coarser.said), (other, *nearer)
     if isinstance(method.pace, Fixed):
@@ -115,15 +115,26 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
         kept, nearer = _grown(run, kept, other, third, journey, nearby, beginning)
     others = (other, third, *nearer)
     if kept.report.error > TOLD:
-        return kept, others
+        return _rattled(run, kept, others, journey, method, beginning)
     grown = (farther.longer**run.report.order - 1.0) / (coarser.longer**run.report.order - 1.0)
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
     if astray:
-        return elsewhere(kept, third.gap, journey, farther.said), others
+        run, kept = (elsewhere(each, third.gap, journey, farther.said) for each in (run, kept))
+        return _rattled(run, kept, others, journey, method, beginning)
     by_chance = any(_by_chance(near, other, run.report.order) for near in nearer)
-    if not (by_chance or rattles(journey) or jumps(run, journey, beginning.again)):
-        return kept, others
-    confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
+    if not news(kept, run) and (by_chance or jumps(run, journey, beginning.again)):
+        confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
+        return confirmed, (*others, *finer)
+    return _rattled(run, kept, others, journey, method, beginning)
+
+
+def _rattled(
+    run: Run, told: Run, others: tuple[Other, ...], journey: Journey, method: Checked, beginning: Beginning
+) -> _Known:
+    """The run with what is known, and where corners come one after another with what a finer one tells."""
+    if not rattles(journey):
+        return told, others
+    confirmed, finer = _confirmed(run, told, journey, method, beginning, 0.5)
     return confirmed, (*others, *finer)
 
 
@@ -133,7 +144,7 @@ def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning
     Where corners come one after another errors go by no power of the steps: what others make of them may well be too
     little, if it is not far less than what would be noted.
     """
-    if news(told, run) or max(told.report.error, *told.report.output_errors.values(), 0.0) < _NEARLY:
+    if max(told.report.error, *told.report.output_errors.values(), 0.0) < _NEARLY:
         return told, ()
     again = replace(run, checkpoint=told.checkpoint)
     finer, others = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, shorter), beginning)

@@ -67,7 +67,7 @@ def truth() -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("tolerance", [None, fc.Tolerance(1e-6, 1e-9)], ids=["default", "1e-6"])
+@pytest.mark.parametrize("tolerance", [None, fc.Tolerance(1e-5, 1e-8)], ids=["default", "1e-5"])
 def test_what_bounces_unseen_is_told(tolerance):
     """Turn and angle were 2.3 to 2.9 % off, told 0.08 to 0.5 %, and the finer run agreed with the coarser one."""
     run = fc.simulate(machine(), law(), until=END, every=SAMPLE, tolerance=tolerance)
@@ -76,6 +76,13 @@ def test_what_bounces_unseen_is_told(tolerance):
     assert off["turn"] > 0.01
     assert all(run.report.output_errors[name] > 0.5 * off[name] for name in run.outputs)
     assert any("bounces" in note for note in run.report.notes)
+
+
+def test_what_bounces_is_right_where_impacts_are_followed():
+    """Under a hundredth of the tolerance it was 2.7 % off as well: deep impacts were left to the control of errors."""
+    run = fc.simulate(machine(), law(), until=END, every=SAMPLE, tolerance=fc.Tolerance(1e-6, 1e-9))
+    turn = truth()[:, 0]
+    assert np.abs(run["turn"] - turn).max() < 3e-3 * np.ptp(turn)
 
 
 def test_what_bears_without_bouncing_is_run_no_more():

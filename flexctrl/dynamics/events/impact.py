@@ -2,7 +2,7 @@
 
 What a step may err by is told in places. An impact of a stiff rope is over within micrometres: steps that leave these
 to chance lose, or make, the speed it comes back with. Where it is damped, that is wrong by up to (ωh)²/4 however deep
-it is; without damping of the machine or the method, only late.
+it is; without damping it comes back late, and all that follows is so much later.
 """
 
 from __future__ import annotations
@@ -12,25 +12,22 @@ import math
 import numpy as np
 
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.scales import farthest, yardsticks
+from flexctrl.dynamics.scales import farthest
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
-__all__ = ["DAMPED", "LASTING", "NO_IMPACT", "SEEN", "SMALL", "STEPS", "finer", "followed", "lasts"]
+__all__ = ["LASTING", "NO_IMPACT", "SMALL", "STEPS", "finer", "followed", "lasts"]
 
-SEEN = 300.0
 SMALL = 1e-4
 STEPS = 12.0
 LASTING = 56
 """Steps an impact is followed for: it takes π/ω, 38 of them, or stays."""
-DAMPED = 0.01
-"""Twice the damping ratio of an impact that is followed whether or not it is seen."""
 NO_IMPACT = 0, 0.0
 _USUAL, _FEWEST = 1e-4, 0.2
 
 
 def finer(share: float) -> float:
-    """Return how many times more steps follow a damped impact, where errors are to be less than a share of the way.
+    """Return how many times more steps follow an impact, where errors are to be less than a share of the way.
 
     Of second order, as steps chosen by errors are: those go with the cube root of the tolerance. Under a far larger
     tolerance fewer do, or runs that are laid beside others to tell their errors would be off alike.
@@ -45,8 +42,7 @@ def lasts(
     """Return how many steps follow an impact at a corner, and how long: 1/(12 ω); none where nothing hits.
 
     ω² = v·ΔK v / v·M v with the stiffness ΔK that the corner has brought about: Rayleigh's quotient of the speeds that
-    run into it. One that is not damped and as deep as 300 errors allowed is seen by the control of steps, and one with
-    next to no energy may go as it likes.
+    run into it. One with next to no energy may go as it likes.
 
     Parameters
     ----------
@@ -70,22 +66,17 @@ def lasts(
     stiffness, mass = -float(v @ (pushes[0] - pushes[1])), float(v @ momentum)
     if not (stiffness > 0.0 and mass > 2.0 * SMALL * turnover):
         return NO_IMPACT
-    drag = float(v @ (model.balance(before, v, still) - model.balance(beyond, v, still)))
-    return followed(model, v, (stiffness / mass, drag / mass), how[:2])
+    return followed(model, stiffness / mass, how[:2])
 
 
-def followed(
-    model: Plant, v: np.ndarray, brought: tuple[float, float], how: tuple[Tolerance, np.ndarray]
-) -> tuple[int, float]:
-    """Return how many steps follow an impact, and how long; none where the control of steps sees it.
+def followed(model: Plant, square: float, how: tuple[Tolerance, np.ndarray]) -> tuple[int, float]:
+    """Return how many steps follow an impact, and how long.
 
     Parameters
     ----------
     model : Plant
-    v : numpy.ndarray
-        The speeds that run into it.
-    brought : tuple of 2 floats
-        ω² and twice the rate at which damping ends them [1/s²], [1/s].
+    square : float
+        The ω² that it brings [1/s²].
     how : tuple of Tolerance and numpy.ndarray
         What is allowed, how far each degree of freedom has been.
 
@@ -95,10 +86,7 @@ def followed(
     float
         [s]
     """
-    (square, rate), (tolerance, moved) = brought, how
-    period, far = math.sqrt(1.0 / square), farthest(model, moved)
-    if rate * period > DAMPED:
-        times = finer(tolerance.relative + tolerance.absolute / max(float(far.max()), tolerance.absolute))
-        return int(LASTING * times), period / (STEPS * times)
-    deep = np.abs(v) * period / yardsticks(model) >= SEEN * tolerance.of(far)
-    return NO_IMPACT if deep.any() else (LASTING, period / STEPS)
+    tolerance, moved = how
+    far = float(farthest(model, moved).max())
+    times = finer(tolerance.relative + tolerance.absolute / max(far, tolerance.absolute))
+    return int(LASTING * times), math.sqrt(1.0 / square) / (STEPS * times)

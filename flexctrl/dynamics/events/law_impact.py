@@ -12,7 +12,6 @@ import numpy as np
 from flexctrl.dynamics.events.impact import NO_IMPACT, SMALL, STEPS, followed
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Point
-from flexctrl.model.state import State
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -53,27 +52,21 @@ def hits(journey: Journey, after: Point, h: float) -> tuple[int, float]:
     twice = 2.0 * model.energy(before.state)[0]
     if twice <= 2.0 * SMALL * books.sums.turnover:
         return NO_IMPACT
-    stiff, damped = _answers(journey, after, v, 1.0)
+    stiff = _answer(journey, after, v, 1.0)
     if not h * h * stiff > _FELT * twice:
         return NO_IMPACT
-    soft, calm = _answers(journey, before, v, -1.0)
+    soft = _answer(journey, before, v, -1.0)
     if stiff <= _MORE * max(soft, 0.0):
         return NO_IMPACT
-    plan = journey.plan
-    return followed(
-        plan.model, v, ((stiff - soft) / twice, (damped - calm) / twice), (plan.tolerance, books.sums.moved)
-    )
+    return followed(journey.plan.model, (stiff - soft) / twice, (journey.plan.tolerance, books.sums.moved))
 
 
-def _answers(journey: Journey, point: Point, v: np.ndarray, side: float) -> tuple[float, float]:
-    """By how much the law pushes back along some speeds: v·K v and v·C v, by differences ahead or back."""
+def _answer(journey: Journey, point: Point, v: np.ndarray, side: float) -> float:
+    """By how much the law pushes back along some speeds, v·K v, by differences ahead or back."""
     feed, model, state, x = journey.plan.feed, journey.plan.model, point.state, point.supply.x
     small = side * _NUDGE / max(float(np.abs(v / yardsticks(model)).max()), _TINY)
-
-    def pushed(there: State) -> float:
-        return float(v @ model.loads(state, feed.within(there, x).u))
-
-    here = pushed(state)
-    moved = pushed(model.advance(state, small * v, state.v, state.t))
-    faster = pushed(state.with_(v=state.v + side * _NUDGE * v))
-    return (here - moved) / small, (here - faster) / (side * _NUDGE)
+    here, moved = (
+        float(v @ model.loads(state, feed.within(there, x).u))
+        for there in (state, model.advance(state, small * v, state.v, state.t))
+    )
+    return (here - moved) / small

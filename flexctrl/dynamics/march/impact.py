@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from flexctrl.dynamics.events.impact import DAMPED, LASTING, SEEN, SMALL, STEPS, finer
+from flexctrl.dynamics.events.impact import LASTING, SMALL, STEPS, finer
 from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.record import March
 from flexctrl.dynamics.march.step import press_all
 from flexctrl.kernels.eights import eight, put, total
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import clear
+from flexctrl.model.flat.flat import clear, load
 
-__all__ = ["follow_impact", "pushed", "stiffness"]
+__all__ = ["follow_impact", "stiffness"]
 
 
 @seldom
@@ -38,6 +38,7 @@ def along_rates(m: March, t: float, share: float) -> float:
         put(f.step[i:], t * eight(m.v[i:]))
         put(f.v[i:], eight(m.v[i:]))
         put(f.rate[i:], share * eight(m.v[i:]))
+    load(f)  # which machines with kernels for all of it go without
     press_all(m)
     power = 0.0 * eight(m.weight)
     f.force[f.n] = 0.0
@@ -47,35 +48,14 @@ def along_rates(m: March, t: float, share: float) -> float:
 
 
 @seldom
-def pushed(m: March) -> float:
-    """Return the power of all forces here."""
-    power = along_rates(m, 0.0, 0.0)
-    clear(m.flat.padded, m.flat.step)
-    reach(m)
-    return power
-
-
-@seldom
-def follow_impact(m: March, stiffer: float, power: float) -> None:
-    """Follow an impact by short steps; before it forces had some power; see `events.impact.lasts`."""
-    here = along_rates(m, 0.0, 0.0)
-    mass = here - along_rates(m, 0.0, 1.0)
+def follow_impact(m: March, stiffer: float) -> None:
+    """Follow an impact by short steps; see `events.impact.lasts`."""
+    mass = along_rates(m, 0.0, 0.0) - along_rates(m, 0.0, 1.0)
     clear(m.flat.padded, m.flat.step)
     reach(m)
     m.follow = 0
     m.cap = 0.0
-    if not (stiffer > 0.0 and mass > 2.0 * SMALL * m.turnover):
-        return
-    period = math.sqrt(mass / stiffer)
-    if (power - here) * period > DAMPED * mass:
+    if stiffer > 0.0 and mass > 2.0 * SMALL * m.turnover:
         times = finer(m.relative + m.absolute / max(m.reached, m.absolute))
         m.follow = int(LASTING * times)
-        m.cap = period / (STEPS * times)
-        return
-    deep = False
-    for i in range(m.flat.n):
-        allowed = m.absolute + m.relative * (m.reached if m.parts == 1 else m.farthest[m.part[i]])
-        deep = deep or abs(m.v[i]) * period * m.weight[i] >= SEEN * allowed
-    if not deep:
-        m.follow = LASTING
-        m.cap = period / STEPS
+        m.cap = math.sqrt(mass / stiffer) / (STEPS * times)

@@ -11,7 +11,7 @@ from flexctrl.dynamics.march.books import accept, copy, reach
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import comes_through, value
 from flexctrl.dynamics.march.holding import lets_go
-from flexctrl.dynamics.march.impact import follow_impact, pushed, stiffness
+from flexctrl.dynamics.march.impact import follow_impact, stiffness
 from flexctrl.dynamics.march.joining import start_anew
 from flexctrl.dynamics.march.judging import chosen
 from flexctrl.dynamics.march.landing import shortened
@@ -49,11 +49,10 @@ def turn_corner(m: March, size: float) -> int:
         m.size = size
         m.follow = max(0, m.follow - 1)
     before = stiffness(m, -_SHARE * size) if controlled else 0.0
-    power = pushed(m) if controlled else 0.0
     if not nudged(m):
         return TURN
     if controlled:
-        follow_impact(m, stiffness(m, _SHARE * size) - before, power)
+        follow_impact(m, stiffness(m, _SHARE * size) - before)
         m.h = min(size, m.cap) if m.follow > 0 else size
         m.led = m.h
     return TURNED if start_anew(m) == DONE else TURN

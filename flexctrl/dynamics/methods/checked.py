@@ -105,8 +105,8 @@ class Checked(_Wrapped):
     powers): its word counts. Where they tell little, a note says whether a third one, under 243 times the
     tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at
     most that of the method: what rattles goes by no power of its steps. A run that has met four corners and more,
-    and of which 0.1 % or more is told but nothing noted, is laid beside a finer one too, in half the steps; so is one
-    under a continuous law that jumps, or to which the second run is nearer than a power of its steps would have it.
+    and of which 0.1 % or more is told, is laid beside a finer one too, in half the steps; so is one under a continuous
+    law that jumps, or to which the second run is nearer than a power of its steps would have it, if nothing is noted.
     What that tells counts if it is more. Where the first takes more than 0.7 of the steps (half of them under a sampled
     law), a finer one is all that follows.
 

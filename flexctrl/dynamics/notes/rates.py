@@ -91,22 +91,35 @@ class Apart:
 
 
 def _where_steep(run: Run, other: Run, near: float) -> np.ndarray:
-    """How far outputs of another run are from a run's own where these change most from row to row: there, and between.
+    """How far outputs of another run are from a run's own where these change most from row to row, there and between,
+    and in the rows that are farthest from it.
 
-    What a run does between two such rows may be anything, as far as rows tell: all that another one is off by may lie
+    What a run does between two rows may be anything, as far as rows tell: all that another one is off by may lie
     between them. It does not where both have many rows at the same times, as samples make them.
     """
     way = np.ptp(run.y, axis=0)
     steep = (np.abs(np.diff(run.y, axis=0)) / np.where(way > 0.0, way, np.inf)).max(axis=1)
     most = np.argsort(-steep)[:_MOST]
     shared = np.abs(other.t[np.clip(np.searchsorted(other.t, run.t - near), 0, len(other.t) - 1)] - run.t) <= near
-    rows = np.unique([most, most + 1])
+    rows = np.unique(np.concatenate([most, most + 1, _where_far(run, other, way)]))
     rows = rows[~shared[rows] & ~np.isin(rows, _at_events(run))] if shared.mean() < _SHARED else rows[:0]
     between = 0.5 * (run.t[most] + run.t[most + 1])[steep[most] > _STEEP]
     own = [(run.t[k], run.y[k]) for k in rows if _in_both(run, other, run.t[k])]
     own += [(t, run.track.moment(t)[1]) for t in between if _in_both(run, other, t)]
     apart = (np.abs(other.track.moment(t)[1] - y) for t, y in own)
     return reduce(np.fmax, apart, np.zeros(run.y.shape[1]))
+
+
+def _where_far(run: Run, other: Run, way: np.ndarray) -> np.ndarray:
+    """The rows in which outputs are farthest from smooth curves through another run's, of those that are so most."""
+    rows = np.flatnonzero((run.t > other.t[0]) & (run.t < other.t[-1]))
+    if len(other.t) < _POINTS:
+        return rows[:0]
+    apart = np.abs(interpolated(other.t, other.y, run.t[rows]) - run.y[rows]) / np.where(way > 0.0, way, np.inf)
+    apart[~np.isfinite(apart)] = 0.0
+    far = np.argsort(-apart, axis=0)[:2]
+    order = np.argsort(-np.take_along_axis(apart, far, axis=0), axis=None)
+    return rows[far.ravel()[order[: 2 * _MOST]]]
 
 
 def _struck(run: Run, other: Run) -> np.ndarray:

@@ -13,7 +13,7 @@ from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.notes.fading import fading, radius
 from flexctrl.dynamics.notes.outputs import Fast, placed
 from flexctrl.dynamics.notes.rates import is_named
-from flexctrl.dynamics.notes.shocks import Swing, shocks
+from flexctrl.dynamics.notes.shocks import Shock, Swing, shocks
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Integrator
@@ -31,6 +31,8 @@ _LAG = 0.3
 """Radians by which two runs part in phase from where on an extrapolation of them is larger than either."""
 _TOLD, _DUST = 1e-3, 1e-9
 _LOOKED_AT = 0.02, 0.2, 0.5, 0.9
+_MOMENTS = (np.arange(16) + 0.5) / 16.0
+"""Of what meets corners, as a rope is slack for a while, and steps are long then."""
 _FADED, _MORE, _AIM = 0.1, 3.0, 0.05
 """What is noted of what an output goes through, where that is more than three times what is told; and what is not."""
 _SAID = (
@@ -94,7 +96,7 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
             if not swing.size > max(_LITTLE * way, _STEADY * most, _DUST * yards[model.outputs.index(output.name)]):
                 break
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
-            step = _step(run, journey, shock.state.t, lasts)
+            step = _step(run, journey, shock, swing, lasts)
             beside = known.get(output.name, np.inf)
             ringing = _Ringing(output.name, shock.since, lasts, step, way, told, beside)
             off, said = _told(journey.plan.method, swing, ringing)
@@ -107,12 +109,18 @@ def _lasting(decay: float, left: float) -> float:
     return left if left * decay < 1.0 else 1.0 / decay
 
 
-def _step(run: Run, journey: Journey, since: float, lasts: float) -> float:
-    """How long steps are while something rings, on average [s]."""
-    end, track = min(since + lasts, journey.point.state.t), run.track
+def _step(run: Run, journey: Journey, shock: Shock, swing: Swing, lasts: float) -> float:
+    """How long steps are while something rings, on average [s]; 0 where it does not ring at all."""
+    since, track, corners = shock.state.t, run.track, {*journey.watch.corner_names}
+    end = min(since + lasts, journey.point.state.t)
+    known = bool(track.stretches) and track.starts[0] <= since < end
+    if known and any(event.name in corners and since < event.t < end for event in journey.events):
+        moments = since + (end - since) * _MOMENTS
+        steps = [track.step(t) for t in moments.tolist() if shock.stands(swing, *track.state(t))]
+        return float(np.mean(steps)) if steps else 0.0
     if journey.rows.every is None and len(run.t) and run.t[0] <= since < end:
         return (end - since) / max(int(np.count_nonzero(np.diff(run.t[(run.t >= since) & (run.t <= end)]))), 1)
-    if track.stretches and track.starts[0] <= since < end:
+    if known:
         return float(np.mean([track.step(since + share * (end - since)) for share in _LOOKED_AT]))
     return journey.point.state.t / max(journey.mark.steps, 1)
 

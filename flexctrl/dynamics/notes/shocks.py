@@ -34,7 +34,7 @@ __all__ = ["Shock", "Swing", "shocks"]
 _SEEDS = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
-_ROUND_OFF, _LITTLE = 1e-12, 1e-6
+_ROUND_OFF, _LITTLE, _SLACK = 1e-12, 1e-6, 0.1
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
 _MOST, _BESIDE = 16, 1e-9
 """Breaks of a law that are looked at, and how far on either side, in parts of the run."""
@@ -147,6 +147,12 @@ class Shock:
         moved = float(rates @ (self.inertia @ rates))
         lost = 0.5 * float(rates @ (self.damping @ rates - self._answer(rates))) + self.contacts.rubbed(rates)
         return max(lost / moved, 0.0) if moved > 0.0 else 0.0
+
+    def stands(self, swing: Swing, state: State, u: np.ndarray) -> bool:
+        """Tell whether there is something to swing against in another state: a line that is not slack there."""
+        stiffness = -self.model.slope(state, state.v, np.zeros(self.model.n), _SEEDS[-1], u)
+        rates = swing.rates
+        return bool(rates @ (stiffness @ rates) > _SLACK * (rates @ (self.stiffness @ rates)))
 
     def _answer(self, rates: np.ndarray) -> np.ndarray:
         """By how much the forces of a continuous law without states of its own change with rates; elsewhere nothing."""
