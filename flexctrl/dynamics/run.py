@@ -143,7 +143,7 @@ class Report:
         deflection of millimetres beside a travel of metres. Forces and rates by other runs laid beside, by how they
         ring after loads that are put on at once, or by how large they get in a finer run (over their largest value),
         whichever tells more; where none of these is there, nothing is told of them. Empty for linear
-        models; those that move by no more than absolute tolerances are left out.
+        models; places that move, and forces and rates that are, no more than absolute tolerances are left out.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str

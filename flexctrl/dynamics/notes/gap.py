@@ -83,12 +83,13 @@ def between(run: Run, other: Run, journey: Journey, taken: int) -> Gap:
 
 
 def _of_tracks(run: Run, other: Run, journey: Journey, instants: int) -> Gap:
-    """Places and turns of nodes and angles of motors, in yardsticks, at instants of no rhythm."""
+    """Places and turns of nodes and angles of motors, in yardsticks, at instants of no rhythm and where rows differ."""
     model, begin = journey.plan.model, max(run.track.starts[0], other.track.starts[0])
     end = min(run.final.t, other.final.t)
     assert isinstance(model, Model)
     k = np.arange(1, instants)
     t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / instants, end)
+    t = np.unique(np.append(t, _farthest(run, other, model, (begin, end))))
     pairs = [(run.track.state(s)[0], other.track.state(s)[0]) for s in t]
     apart = np.array([_apart(model, one, other) for one, other in pairs])
     worst = _names(model)[int(np.argmax(apart.max(axis=0)))]
@@ -96,6 +97,18 @@ def _of_tracks(run: Run, other: Run, journey: Journey, instants: int) -> Gap:
     read[judged] = np.max([abs(model.measure(one) - model.measure(other)) for one, other in pairs], axis=0)[judged]
     size = np.maximum.accumulate(apart.max(axis=1)) / _most(journey)
     return Gap(t, size, worst, read, bent(model, [one for one, _ in pairs]))
+
+
+def _farthest(run: Run, other: Run, model: Model, within: tuple[float, float]) -> np.ndarray:
+    """Instants at which places and angles among the outputs are farthest apart as rows have it, those that are most."""
+    rows, judged = np.flatnonzero((other.t > within[0]) & (other.t < within[1])), placed(model)
+    if len(run.t) < _POINTS or not len(rows) or not judged:
+        return np.zeros(0)
+    yards = output_yardsticks(model, 1.0)[judged]
+    apart = np.abs(other.y[rows][:, judged] - interpolated(run.t, run.y[:, judged], other.t[rows]))
+    apart = np.nan_to_num(apart / np.where(yards > 0.0, yards, np.inf), posinf=0.0)
+    far = np.argmax(apart, axis=0)
+    return other.t[rows[far[np.argsort(-apart.max(axis=0))[:_FEWER]]]]
 
 
 def _of_rows(run: Run, other: Run, journey: Journey) -> Gap:

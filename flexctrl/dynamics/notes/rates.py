@@ -228,13 +228,17 @@ def _jumps(run: Run, way: dict[int, float], shares: Mapping[str, float], struck:
 
 
 def _judged(run: Run, journey: Journey, little: float) -> dict[int, float]:
-    """The forces and rates that go through more than a share of their largest value, and what each goes through."""
+    """The forces and rates that go through more than a share of their largest value, and what each goes through.
+
+    That has to be more than absolute tolerances; or the value itself, where it may go through next to nothing.
+    """
     model = journey.plan.model
     if not isinstance(model, Model) or len(run.y) < _POINTS:
         return {}
     way, most = ways(journey, run.y), np.abs(run.y).max(axis=0)
     least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
-    return {i: float(way[i]) for i in fast(model) if np.inf > way[i] > max(least[i], little * most[i])}
+    counts = (most if little < _LITTLE else way) > least
+    return {i: float(way[i]) for i in fast(model) if counts[i] and np.inf > way[i] > little * most[i]}
 
 
 def _apart(run: Run, others: Sequence[tuple[Run, float]]) -> list[Apart]:
