@@ -80,8 +80,9 @@ class Apart:
             low, high = _between(run, other.t[within], near)
             y = other.y[within]
             most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
-            if run.track.stretches and other.track.stretches and len(other.t) and not run.track.feed.sample_time:
-                most, struck = np.maximum(most, _where_steep(run, other, near)), _struck(run, other)
+            if run.track.stretches and other.track.stretches and len(other.t):
+                struck = _struck(run, other)
+                most = most if run.track.feed.sample_time else np.maximum(most, _where_steep(run, other, near))
         return cls(longer, min(max(free, _LEAST), 1.0), most, struck)
 
     def left(self, order: np.ndarray) -> np.ndarray:
