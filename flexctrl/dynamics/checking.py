@@ -104,7 +104,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if told.report.error > TOLD:
         return _rattled(run, told, (other, *nearer), journey, method, beginning)
     if parted:
-        return elsewhere(told, other.gap, journey, coarser.said), (other, *nearer)
+        run, told = (elsewhere(each, other.gap, journey, coarser.said) for each in (run, told))
+        return _rattled(run, told, (other, *nearer), journey, method, beginning)
     if isinstance(method.pace, Fixed):
         return told, (other, *nearer)
     farther = method.coarser(tolerance, _FARTHER)

@@ -13,7 +13,7 @@ import numpy as np
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.frozen import frozen
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import check_number
+from flexctrl.structure.freedoms import check_finite, check_number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -297,9 +297,9 @@ class Run:
         Raises
         ------
         StructureError
-            For a time outside the run, if it took no step, or if its steps took too much room to be kept.
+            For no time or one outside the run, if it took no step, or if its steps took too much room to be kept.
         """
-        track = self.track
+        t, track = check_finite(t, "t", "run.at"), self.track
         if track.empty:
             ended = f"the run ended before its first step ({self.status.value}: {self.report.message})"
             raise StructureError(f"run.at: {ended}; run.final is where it stood")

@@ -15,6 +15,7 @@ from flexctrl.dynamics.notes.peaks import unresolved
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
+from flexctrl.effects.lugre_friction import LuGreFriction
 from flexctrl.model.model import Model
 
 if TYPE_CHECKING:
@@ -115,9 +116,15 @@ def shorter(journey: Journey, law: Manner) -> float:
 
 
 def _flows(journey: Journey) -> bool:
-    """Tell whether bristles or lags take short steps after samples, which keep the others: these are then alike."""
+    """Tell whether bristles or lags take short steps after samples, which keep the others: these are then alike.
+
+    So are coarser runs in when bristles let go, with or without samples: what creeps first is over within a step.
+    """
     model = journey.plan.model
-    return journey.plan.feed.sample_time > 0.0 and isinstance(model, Model) and model.motion.flows.size > 0
+    if not isinstance(model, Model):
+        return False
+    bristles = any(isinstance(effect, LuGreFriction) for effect in model.effects)
+    return bristles or (journey.plan.feed.sample_time > 0.0 and model.motion.flows.size > 0)
 
 
 def rattles(journey: Journey) -> bool:
