@@ -251,6 +251,12 @@ class Journey:
         self.status, self.message = Status.FAILED, f"{error} ({where}{ahead})"
         self.fault = error.__cause__
 
+    def _tell_progress(self) -> None:
+        try:
+            self.plan.tell(self.point.state.t / self.plan.until)
+        except Exception as error:
+            raise Unwritten(f"progress raised {type(error).__name__}: {error}") from error
+
     def _judge(self) -> None:
         """Hold an end by the clock or by an event against the books; others are told what these say beside."""
         if self.status in (Status.FINISHED, Status.STOPPED) and (unresolved := self.books.unresolved):
@@ -303,7 +309,7 @@ class Journey:
             look_back(self)
             if (now := time.perf_counter()) - self._told > _SECONDS:
                 self._told = now
-                self.plan.tell(self.point.state.t / self.plan.until)
+                self._tell_progress()
                 foresee(self)
             if self.plan.autosave is not None and now - self._kept > self.plan.autosave.seconds:
                 self._kept = now

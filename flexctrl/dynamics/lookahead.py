@@ -20,9 +20,9 @@ from flexctrl.errors import ControllerError
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["OF_RUN", "look_ahead"]
+__all__ = ["FEWEST", "OF_RUN", "look_ahead"]
 
-_FEWEST, OF_RUN = 32, 4096
+FEWEST, OF_RUN = 32, 4096
 """Instants in a step, and in as much as the whole run."""
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _BENT, _CUT = 0.02, 0.005
@@ -143,9 +143,9 @@ def _first_jump(journey: Journey, course: _Course) -> float:
 
 def _course(journey: Journey, span: float) -> _Course:
     """Ask the law over a span from here; closely only if that shows what is passed over otherwise."""
-    course = _asked(journey, span, _FEWEST)
+    course = _asked(journey, span, FEWEST)
     closely = math.ceil(OF_RUN * min(span / journey.plan.until, 1.0))
-    if closely > _FEWEST and not course.steep and course.bends(len(course.times) - 1) <= _BENT:
+    if closely > FEWEST and not course.steep and course.bends(len(course.times) - 1) <= _BENT:
         swings = journey.mark.swings
         closer = _asked(journey, span, closely)
         if closer.bends(len(closer.times) - 1) > 2.0 * _BENT:
@@ -157,7 +157,7 @@ def _course(journey: Journey, span: float) -> _Course:
 def _swings_ahead(journey: Journey, span: float, course: _Course) -> np.ndarray:
     """The swings that count in steps of one length: those of some steps to come, too, as what sets out gently bends."""
     try:
-        return _asked(journey, _AHEAD * span, _FEWEST).swings
+        return _asked(journey, _AHEAD * span, FEWEST).swings
     except ControllerError:  # it may say nothing there
         return course.swings
 

@@ -254,7 +254,7 @@ class Run:
     track : Track
         The steps, as far as they are kept; see `at`.
     fault : BaseException or None
-        What the controller raised, where that ended the run; ``raise run.fault`` shows its lines.
+        What the controller, an event or ``progress`` raised, where it ended the run: ``raise run.fault`` shows it.
     """
 
     t: np.ndarray

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.linear_motion.exact import ExactStepper
-from flexctrl.dynamics.lookahead import OF_RUN
+from flexctrl.dynamics.lookahead import FEWEST, OF_RUN
 from flexctrl.dynamics.march.stepper import plain_of
 
 if TYPE_CHECKING:
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["left_out", "passed_over"]
 
-_FEW = 64
-"""In more steps than that most are looked at more closely than the run as a whole."""
+_FEW = OF_RUN // FEWEST
+"""In more steps than that they are looked at more closely than the run as a whole."""
 
 
 def left_out(journey: Journey) -> tuple[str, ...]:

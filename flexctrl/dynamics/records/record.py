@@ -18,7 +18,7 @@ __all__ = ["CsvStream", "InMemory", "Record", "Recorder", "Table", "Unwritten", 
 
 
 class Unwritten(Exception):
-    """What a run records cannot be written; caused by the system's own error."""
+    """What a run records cannot be written, or not be told while it goes on; caused by the error of who was to."""
 
 
 @contextmanager
