@@ -13,6 +13,7 @@ from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.gap import interpolated
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.outputs import fast, ways
+from flexctrl.dynamics.notes.striking import at_events, in_both, struck
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Fixed
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
 _POINTS, _NEAR = 4, 1e-9
-_STEEP, _MOST, _JUMP, _SHARED, _BEYOND = 0.1, 8, 0.01, 0.3, 1e-3
+_STEEP, _MOST, _JUMP, _SHARED = 0.1, 8, 0.01, 0.3
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
 """What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
@@ -37,7 +38,10 @@ LOST, _SURE = 0.1, 0.25
 """From which share of an output's range a gap is no longer one of small lags (all of it from twice that), and by how
 much the order seen may be lower."""
 _SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
-_STRUCK = "{name} may jump by {far:.2g} % of its range at events: rows at their very instants are of one side of that"
+_STRUCK = (
+    "{name} may jump by {far:.2g} % of its range at events: rows at their very instants, or as near as these may be "
+    "off, are of one side of that"
+)
 _LINEAR = (
     "what errors of steps do to single outputs is not told of a linear model: the method Exact makes none, and is its "
     "default"
@@ -58,7 +62,7 @@ class Apart:
     most : numpy.ndarray, shape (outputs,)
         In rows, in units of the outputs.
     struck : numpy.ndarray, shape (outputs,)
-        In rows at the very instants of events, where forces may jump.
+        In rows at the very instants of events, where forces may jump, or of the other side of one.
     """
 
     longer: float
@@ -74,16 +78,16 @@ class Apart:
         that has failed need be no numbers: they tell nothing.
         """
         fewer, near = other.report.steps / max(run.report.steps, 1), _NEAR * run.final.t
-        free, (most, struck) = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros((2, run.y.shape[1]))
+        free, (most, jumped) = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros((2, run.y.shape[1]))
         if len(run.t) >= _POINTS:
             within = (other.t >= run.t[0] - near) & (other.t <= run.t[-1] + near) & np.isfinite(other.y).all(axis=1)
             low, high = _between(run, other.t[within], near)
             y = other.y[within]
             most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
             if run.track.stretches and other.track.stretches and len(other.t):
-                struck = _struck(run, other)
+                jumped = struck(run, other)
                 most = most if run.track.feed.sample_time else np.maximum(most, _where_steep(run, other, near))
-        return cls(longer, min(max(free, _LEAST), 1.0), most, struck)
+        return cls(longer, min(max(free, _LEAST), 1.0), most, jumped)
 
     def left(self, order: np.ndarray) -> np.ndarray:
         """What of a gap is the first run's own, if errors go by powers of the steps."""
@@ -103,10 +107,10 @@ def _where_steep(run: Run, other: Run, near: float) -> np.ndarray:
     most = np.argsort(-steep)[:_MOST]
     shared = np.abs(other.t[np.clip(np.searchsorted(other.t, run.t - near), 0, len(other.t) - 1)] - run.t) <= near
     rows = np.unique(np.concatenate([most, most + 1, _where_far(run, other, way)]))
-    rows = rows[~shared[rows] & ~np.isin(rows, _at_events(run))] if shared.mean() < _SHARED else rows[:0]
+    rows = rows[~shared[rows] & ~np.isin(rows, at_events(run))] if shared.mean() < _SHARED else rows[:0]
     between = 0.5 * (run.t[most] + run.t[most + 1])[steep[most] > _STEEP]
-    own = [(run.t[k], run.y[k]) for k in rows if _in_both(run, other, run.t[k])]
-    own += [(t, run.track.moment(t)[1]) for t in between if _in_both(run, other, t)]
+    own = [(run.t[k], run.y[k]) for k in rows if in_both(run, other, run.t[k])]
+    own += [(t, run.track.moment(t)[1]) for t in between if in_both(run, other, t)]
     apart = (np.abs(other.track.moment(t)[1] - y) for t, y in own)
     return reduce(np.fmax, apart, np.zeros(run.y.shape[1]))
 
@@ -121,29 +125,6 @@ def _where_far(run: Run, other: Run, way: np.ndarray) -> np.ndarray:
     far = np.argsort(-apart, axis=0)[:2]
     order = np.argsort(-np.take_along_axis(apart, far, axis=0), axis=None)
     return rows[far.ravel()[order[: 2 * _MOST]]]
-
-
-def _struck(run: Run, other: Run) -> np.ndarray:
-    """How far outputs jump in rows at the instants of events: just beyond, or as another run is there."""
-    jumps = []
-    for k in [k for k in _at_events(run) if _in_both(run, other, run.t[k])][:_MOST]:
-        beyond = run.t[k] + _BEYOND * (run.t[k + 1] - run.t[k])
-        jumps += [np.abs(moment[1] - run.y[k]) for moment in (run.track.moment(beyond), other.track.moment(run.t[k]))]
-    return reduce(np.fmax, jumps, np.zeros(run.y.shape[1]))
-
-
-def _in_both(run: Run, other: Run, t: float) -> bool:
-    """Tell whether a time is within what two runs have kept of their steps."""
-    return bool(max(run.track.starts[0], other.track.starts[0]) < t < min(run.final.t, other.final.t))
-
-
-def _at_events(run: Run) -> np.ndarray:
-    """The rows at the instants of events, or so near that another run may well be past them; without the last."""
-    events = np.array([event.t for event in run.events])
-    rows = np.clip(np.searchsorted(run.t, events), 1, len(run.t) - 1)
-    rows = rows - (events - run.t[rows - 1] < run.t[rows] - events)
-    off, step = np.abs(run.t[rows] - events), np.diff(run.t, append=run.t[-1])[rows]
-    return np.unique(rows[off < _BEYOND * step])
 
 
 def are_asked(run: Run, journey: Journey) -> bool:
