@@ -124,7 +124,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
         return _rattled(run, kept, others, journey, method, beginning)
     by_chance = any(_by_chance(near, other, run.report.order) for near in nearer)
     if not news(kept, run) and (by_chance or jumps(run, journey, beginning.again)):
-        confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
+        confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5, 0.0 if by_chance else _NEARLY)
         return confirmed, (*others, *finer)
     return _rattled(run, kept, others, journey, method, beginning)
 
@@ -139,13 +139,16 @@ def _rattled(
     return confirmed, (*others, *finer)
 
 
-def _confirmed(run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> _Known:
+def _confirmed(
+    run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float, least: float = _NEARLY
+) -> _Known:
     """The run with what a finer one tells of it, if that is more.
 
     Where corners come one after another errors go by no power of the steps: what others make of them may well be too
-    little, if it is not far less than what would be noted.
+    little, if it is not far less than what would be noted. What is near by chance is not asked how near: forces and
+    rates are not counted yet.
     """
-    if max(told.report.error, *told.report.output_errors.values(), 0.0) < _NEARLY:
+    if max(told.report.error, *told.report.output_errors.values(), 0.0) < least:
         return told, ()
     again = replace(run, checkpoint=told.checkpoint)
     finer, others = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, shorter), beginning)

@@ -85,7 +85,8 @@ def test_a_single_coarser_run_may_be_right_where_this_one_is_wrong():
     assert _off([Apart(2.0, 1.0, np.array([0.3]))], np.array([3.0]), 2.0, steady=True)[0] == pytest.approx(0.1)
     finer = Apart(0.5, 1.0, np.array([0.3]))
     assert _off([finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.4)
-    assert _off([Apart(3.0, 1.0, np.array([0.9])), finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.4)
+    mean = np.sqrt(0.4 * 0.9)  # as the finer one may be near by chance
+    assert _off([Apart(3.0, 1.0, np.array([0.9])), finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(mean)
 
 
 def test_rows_at_other_times_are_laid_beside_what_is_between():

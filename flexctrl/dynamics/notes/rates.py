@@ -236,15 +236,15 @@ def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np
     What rings in a coarser run may have lost its phase there: gaps that are a fifth of all that there is go by no power
     of the steps, if no farther run shows that they do; nor does a farther one whose gap is that large.
     A finer one may be near by chance, where each impact adds its own: no less is told than the geometric mean of what
-    it tells and what a coarser one would leave.
+    it tells and what coarser ones do.
     """
     near, *farther = sorted(apart, key=lambda a: a.longer)
     single = not farther or near.longer == farther[-1].longer
     known = near.longer < 1.0 or (steady and single)
     least = np.full(near.most.shape, order if known else least_order(near.longer, order))
     if near.longer < 1.0:
-        own, coarser = near.left(least), [a.left(np.full_like(least, order)) for a in farther if a.longer > 1.0]
-        return np.maximum(own, np.sqrt(own * coarser[0])) if coarser else own
+        own, coarser = near.left(least), [a for a in farther if a.longer > 1.0]
+        return np.maximum(own, np.sqrt(own * _off(coarser, ways, order, steady))) if coarser else own
     seen = (
         least if single else orders_seen(near.most, farther[-1].most, (near.longer, farther[-1].longer), (least, order))
     )
