@@ -235,6 +235,8 @@ def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np
 
     What rings in a coarser run may have lost its phase there: gaps that are a fifth of all that there is go by no power
     of the steps, if no farther run shows that they do; nor does a farther one whose gap is that large.
+    Where the order seen is less than the method's, part of what is off goes by none, and is in all runs alike: no less
+    is told than the geometric mean of what the order leaves and all of the gap.
     A finer one may be near by chance, where each impact adds its own: no less is told than the geometric mean of what
     it tells and what coarser ones do.
     """
@@ -254,7 +256,8 @@ def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np
         off = near.left(seen)
         lost = np.where(ways > 0.0, np.clip(near.most / ways / LOST - 1.0, 0.0, 1.0), 0.0)
     sure = ~np.full(off.shape, single) & (seen > order - _SURE)
-    return np.where(sure, off, off + lost * (near.most - off))
+    mean = np.sqrt(off * near.most) if not known else off
+    return np.where(sure, off, np.maximum(off + lost * (near.most - off), mean))
 
 
 def _between(run: Run, t: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
