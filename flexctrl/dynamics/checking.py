@@ -105,7 +105,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
         return _rattled(run, told, (other, *nearer), journey, method, beginning)
     if parted:
         run, told = (elsewhere(each, other.gap, journey, coarser.said) for each in (run, told))
-        return _rattled(run, told, (other, *nearer), journey, method, beginning)
+        confirmed, finer = _confirmed(run, told, journey, method, beginning, 0.5)
+        return confirmed, (other, *nearer, *finer)
     if isinstance(method.pace, Fixed):
         return told, (other, *nearer)
     farther = method.coarser(tolerance, _FARTHER)
@@ -121,7 +122,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
     if astray:
         run, kept = (elsewhere(each, third.gap, journey, farther.said) for each in (run, kept))
-        return _rattled(run, kept, others, journey, method, beginning)
+        confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
+        return confirmed, (*others, *finer)
     by_chance = any(_by_chance(near, other, run.report.order) for near in nearer)
     if not news(kept, run) and (by_chance or jumps(run, journey, beginning.again)):
         confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5, 0.0 if by_chance else _NEARLY)

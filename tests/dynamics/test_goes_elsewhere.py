@@ -32,14 +32,14 @@ def pendulum(second: bool = True) -> fc.Model:
 
 
 def test_runs_at_1_5_and_27_times_the_tolerance_are_off_alike():
-    """By a fifth of the motion on the way, and agree to 3 %: there is no telling it from them."""
+    """By a fifth of the motion on the way, and agree to 3 %: there is no telling it from them, but from a finer one."""
     model = pendulum()
     law = fc.Sampled(pd(kp=0.2, kd=0.02, measured="x", rate="rate", command="torque"), 0.05)
     how = {"until": 4.0, "start": model.rest.with_(v=np.array([5.625082529694051, 0.3]))}
     run, true = fc.simulate(model, law, **how), fc.simulate(model, law, **how, **FINE)
     assert np.linalg.norm(run.final.x - true.final.x, axis=1).max() > 0.05
-    assert run.report.error < 0.01
-    [note] = said(run)
+    assert 0.1 < run.report.error < 0.3
+    note = said(run)[0]
     assert "under 243 times the tolerance" in note
     assert "see whether Tolerance(1e-06, 1e-09) agrees" in note
     again = fc.simulate(model, law, tolerance=fc.Tolerance(1e-6, 1e-9), **how)

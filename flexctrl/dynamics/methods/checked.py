@@ -103,12 +103,13 @@ class Checked(_Wrapped):
     1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 % a note says so, and
     until when the run is right to that. What would be noted is asked of a second run first, half as far away (in
     powers): its word counts. Where they tell little, a note says whether a third one, under 243 times the
-    tolerance, goes elsewhere: two may be off alike. Where two runs beside stand, p is the order that they show, at
-    most that of the method: what rattles goes by no power of its steps. A run that has met four corners and more,
-    and of which 0.1 % or more is told, is laid beside a finer one too, in half the steps; so is one under a continuous
-    law that jumps, or to which the second run is nearer than a power of its steps would have it, if nothing is noted.
-    What that tells counts if it is more. Where the first takes more than 0.7 of the steps (half of them under a sampled
-    law), a finer one is all that follows; of machines with bristles it is all there is.
+    tolerance, goes elsewhere: two may be off alike, and one in half the steps tells by how much. Where two runs beside
+    stand, p is the order that they show, at most that of the method: what rattles goes by no power of its steps. A run
+    that has met four corners and more, and of which 0.1 % or more is told, is laid beside a finer one too, in half the
+    steps; so is one under a continuous law that jumps, or to which the second run is nearer than a power of its steps
+    would have it, if nothing is noted. What that tells counts if it is more. Where the first takes more than 0.7 of the
+    steps (half of them under a sampled law), a finer one is all that follows; of machines with bristles it is all there
+    is.
 
     Where nothing of that is told, and dry contacts stick or break loose that slide with less than it takes to break
     them loose, it is run in the same steps with contacts that bear 5 % more (if one has broken loose), and 5 % less: a
