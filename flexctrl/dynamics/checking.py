@@ -84,8 +84,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
         told, others = _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)
         if news(told, run) or not (others and isinstance(method.pace, Fixed) and rattles(journey)):
             return told, others
-        confirmed, finest = _confirmed(run, told, journey, method, beginning, 0.5 * shorter)
-        return confirmed, (*others, *finest)
+        return _confirmed(run, told, others, journey, method, beginning, 0.5 * shorter)
     coarser = method.coarser(tolerance)
     told, first = _told(run, journey, coarser, beginning)
     if not first or first[0].run.status is Status.INTERRUPTED:
@@ -105,8 +104,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
         return _rattled(run, told, (other, *nearer), journey, method, beginning)
     if parted:
         run, told = (elsewhere(each, other.gap, journey, coarser.said) for each in (run, told))
-        confirmed, finer = _confirmed(run, told, journey, method, beginning, 0.5)
-        return confirmed, (other, *nearer, *finer)
+        return _confirmed(run, told, (other, *nearer), journey, method, beginning)
     if isinstance(method.pace, Fixed):
         return told, (other, *nearer)
     farther = method.coarser(tolerance, _FARTHER)
@@ -122,12 +120,11 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
     if astray:
         run, kept = (elsewhere(each, third.gap, journey, farther.said) for each in (run, kept))
-        confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5)
-        return confirmed, (*others, *finer)
+        return _confirmed(run, kept, others, journey, method, beginning)
     by_chance = any(_by_chance(near, other, run.report.order) for near in nearer)
     if not news(kept, run) and (by_chance or jumps(run, journey, beginning.again)):
-        confirmed, finer = _confirmed(run, kept, journey, method, beginning, 0.5, 0.0 if by_chance else _NEARLY)
-        return confirmed, (*others, *finer)
+        least = 0.0 if by_chance else _NEARLY
+        return _confirmed(run, kept, others, journey, method, beginning, least=least)
     return _rattled(run, kept, others, journey, method, beginning)
 
 
@@ -135,14 +132,18 @@ def _rattled(
     run: Run, told: Run, others: tuple[Other, ...], journey: Journey, method: Checked, beginning: Beginning
 ) -> _Known:
     """The run with what is known, and where corners come one after another with what a finer one tells."""
-    if not rattles(journey):
-        return told, others
-    confirmed, finer = _confirmed(run, told, journey, method, beginning, 0.5)
-    return confirmed, (*others, *finer)
+    return _confirmed(run, told, others, journey, method, beginning) if rattles(journey) else (told, others)
 
 
 def _confirmed(
-    run: Run, told: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float, least: float = _NEARLY
+    run: Run,
+    told: Run,
+    others: tuple[Other, ...],
+    journey: Journey,
+    method: Checked,
+    beginning: Beginning,
+    shorter: float = 0.5,
+    least: float = _NEARLY,
 ) -> _Known:
     """The run with what a finer one tells of it, if that is more.
 
@@ -151,14 +152,14 @@ def _confirmed(
     rates are not counted yet.
     """
     if max(told.report.error, *told.report.output_errors.values(), 0.0) < least:
-        return told, ()
+        return told, others
     again = replace(run, checkpoint=told.checkpoint)
-    finer, others = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, shorter), beginning)
+    finer, finest = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, shorter), beginning)
     if finer.report.error > told.report.error:
-        return _as_much(finer, told), others
+        return _as_much(finer, told), (*others, *finest)
     notes = (*told.report.notes, *(note for note in finer.report.notes if note not in run.report.notes))
     known = replace(told, checkpoint=finer.checkpoint, report=replace(told.report, notes=notes))
-    return _as_much(known, finer), others
+    return _as_much(known, finer), (*others, *finest)
 
 
 def _halved(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> _Known:

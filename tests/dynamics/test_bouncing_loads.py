@@ -27,7 +27,7 @@ def bounce(frequency: float) -> tuple[fc.Model, fc.State]:
 def exact(times: np.ndarray, frequency: float, thrown: float) -> np.ndarray:
     """Its height above the end of the slack rope, speed and pull: arcs of a vibration about rest, and parabolas."""
     rest = -GRAVITY / frequency**2
-    swing = np.hypot(thrown / frequency, 0.0)
+    swing = thrown / frequency
     caught = np.arcsin(-rest / swing)  # phase at which it leaves the rope, from rest upwards
     speed = swing * frequency * np.cos(caught)
     taut, free = (np.pi + 2.0 * caught) / frequency, 2.0 * speed / GRAVITY
@@ -45,8 +45,7 @@ CASES = [(12.0, 2.0), (20.0, 1.2), (30.0, 0.9), (45.0, 1.5), (60.0, 0.4), (100.0
 
 def thrown_up(frequency: float, speed: float, tolerance: fc.Tolerance, method: fc.Unchecked | None = None) -> fc.Run:
     model, start = bounce(frequency)
-    v = np.zeros(model.n)
-    v[:] = speed
+    v = np.full(model.n, speed)
     return fc.simulate(model, start=start.with_(v=v), until=UNTIL, every=0.015, tolerance=tolerance, method=method)
 
 
