@@ -49,6 +49,12 @@ def record(request: pytest.FixtureRequest) -> Iterator[Callable[..., Row]]:
     SESSION.texts[module] = (request.module.PAGE, request.module.__doc__)
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse to write pages from several processes: each would write the sections of its own tests."""
+    if config.getoption("--validation-pages") and config.getoption("numprocesses", None):
+        raise pytest.UsageError("--validation-pages takes one process: leave out -n")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Remember every test collected, before some are left out."""
