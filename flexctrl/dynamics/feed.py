@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 _SMALL = 1e-7
 _NEAR = 1e-10
+_ENDLESS = 1e200
+"""Commands from here on leave no energy that is a number."""
 
 
 _NONE = np.zeros(0)
@@ -268,8 +270,8 @@ class Feed:
             )
         for i, value in zip(writes, values):  # noqa: B905 - a few numbers, often: quicker in a list, unchecked again
             u[i] += value
-        if not math.isfinite(sum(u)):
-            name, value = next((n, v) for n, v in zip(self.model.inputs, u, strict=True) if not math.isfinite(v))
+        if not abs(sum(u)) < _ENDLESS:
+            name, value = max(zip(self.model.inputs, u, strict=True), key=lambda given: _size(given[1]))
             raise CommandError(
                 f"the controller commands {value} for {name!r}; look at its gains and at what it divides by"
             )
@@ -362,3 +364,7 @@ def feed_of(model: Plant, controller: Any, inputs: np.ndarray) -> Feed:
     from flexctrl.design.hardware import bare  # all kinds of controllers: not for runs without any
 
     return Feed(model, inputs, bare(as_controller(controller, model.inputs, model.outputs)))
+
+
+def _size(value: float) -> float:
+    return math.inf if math.isnan(value) else abs(value)

@@ -67,7 +67,8 @@ def remedy(journey: Journey) -> str:
     if isinstance(method, ExplicitRungeKutta):
         return "stiff parts are for implicit methods: take AdaptiveAlpha, or GeneralizedAlpha(step)"
     if not isinstance(pace, Fixed):
-        return "give a smaller Tolerance"
+        mean = journey.point.state.t / max(journey.mark.steps, 1)
+        return f"give a smaller Tolerance, or steps of one length: GeneralizedAlpha({0.1 * mean:.1g})"
     smaller = f"take steps smaller than {pace.step:g} s, or AdaptiveAlpha, which finds them"
     motion, switches = journey.plan.model.motion, journey.plan.model.switches
     if isinstance(method, ConservingMidpoint) or motion.flows.size or switches.names or journey.books.sums.lost:

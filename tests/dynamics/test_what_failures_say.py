@@ -87,3 +87,37 @@ def test_explicit_steps_that_are_too_long_are_called_so(step):
     assert "AdaptiveAlpha" in run.report.message
     assert "singular" not in run.report.message
     assert "too long for what is stiff" in run.report.message or "stiff parts are for" in run.report.message
+
+
+class Overdriven(Ending):
+    """A law whose command is a number, after an instant, of which no energy is one."""
+
+    def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([-1e250 if t > self.last else 0.0])
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("sample_time", [0.0, 1e-3], ids=["continuous", "sampled"])
+def test_a_command_of_which_no_energy_is_a_number_is_named(sample_time, backend):
+    run = fc.simulate(arm(backend), Overdriven(sample_time, 0.05), until=0.1)
+    assert run.status is fc.Status.FAILED
+    assert "commands -1e+250 for 'torque'; look at its gains" in run.report.message
+    assert np.isfinite(run.y).all()
+
+
+def test_the_steps_that_a_run_by_tolerance_is_told_to_take_instead_are_fine_enough():
+    """A load that swings below a motor of 250 million times its mass: the rope does not give way by chosen steps."""
+    load, top = fc.PointMass("load", (1.0, 0, -8.0), 100.0), fc.PointMass("top", (0, 0, 0), 1.0)
+    hoist = fc.Winch("hoist", load.node, top.node, EA=1e7, radius=0.2, ratio=10.0, inertia=1e7)
+    structure = fc.Structure(
+        [load, top], [fc.Support(top.node)], [hoist], [fc.MotorTorque("motor", hoist)], [fc.Position("x", load.node, "x")]
+    )
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation()])
+    run = fc.simulate(model, until=4.6)
+    assert run.status is fc.Status.FAILED
+    told = re.search(r"or steps of one length: GeneralizedAlpha\(([\d.e+-]+)\)", run.report.message)
+    assert told, run.report.message
+    other = fc.simulate(model, until=4.6, method=fc.GeneralizedAlpha(float(told[1])))
+    assert other.status is fc.Status.FINISHED
+    period = 2 * np.pi * np.sqrt(np.hypot(1, 8) / 9.81) * (1 + np.arctan2(1, 8) ** 2 / 16)
+    assert other.at(period / 2)["x"] == pytest.approx(-1.0, abs=1e-3)
