@@ -109,9 +109,8 @@ def test_the_steps_that_a_run_by_tolerance_is_told_to_take_instead_are_fine_enou
     """A load that swings below a motor of 250 million times its mass: the rope does not give way by chosen steps."""
     load, top = fc.PointMass("load", (1.0, 0, -8.0), 100.0), fc.PointMass("top", (0, 0, 0), 1.0)
     hoist = fc.Winch("hoist", load.node, top.node, EA=1e7, radius=0.2, ratio=10.0, inertia=1e7)
-    structure = fc.Structure(
-        [load, top], [fc.Support(top.node)], [hoist], [fc.MotorTorque("motor", hoist)], [fc.Position("x", load.node, "x")]
-    )
+    motor, where = fc.MotorTorque("motor", hoist), fc.Position("x", load.node, "x")
+    structure = fc.Structure([load, top], [fc.Support(top.node)], [hoist], [motor], [where])
     model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation()])
     run = fc.simulate(model, until=4.6)
     assert run.status is fc.Status.FAILED
