@@ -16,11 +16,10 @@ from flexctrl.dynamics.checking import news
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.beside import agreeing
-from flexctrl.dynamics.notes.outputs import fast, seen, ways
+from flexctrl.dynamics.notes.outputs import fast, seen, told_from, ways
 from flexctrl.dynamics.notes.rates import Apart
 from flexctrl.dynamics.others import Beginning, made, noted
 from flexctrl.dynamics.run import Run
-from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 
@@ -144,5 +143,5 @@ def _note(run: Run, other: Run, journey: Journey, off: np.ndarray) -> str:
 
 def _rates(model: Model, journey: Journey, way: np.ndarray) -> list[int]:
     """The forces and rates that go through more than steps resolve."""
-    least = journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
-    return [i for i in fast(model) if np.inf > way[i] > least[i]]
+    needed = told_from(journey)
+    return [i for i in fast(model) if np.inf > way[i] > needed[i]]

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from flexctrl.dynamics.events.event import Occurrence
     from flexctrl.dynamics.records.dense import Track
 
+_SEEN = 1e-5
+"""What is seen to move, however much steps may err by [rad, shares of the machine's size]."""
+
 
 class Status(Enum):
     """How a run ended; ``STOPPED`` is by an event that ends it."""
@@ -77,6 +80,11 @@ class Tolerance:
         """
         return self.absolute + self.relative * moved
 
+    @property
+    def negligible(self) -> float:
+        """The absolute tolerance, or what is seen to move even if steps may err by more [yardsticks]."""
+        return min(self.absolute, _SEEN)
+
 
 @frozen
 class EnergyBalance:
@@ -124,7 +132,8 @@ class Report:
     energy : EnergyBalance
     energy_residual : float
         Worst |energy − start − work in + dissipated| over the largest energy turned over: what the
-        integrator lost or made.
+        integrator lost or made. What may be booked as dissipated by rates that damping ends within steps, and never
+        have been, is no part of it; a note tells of that.
     worst : str
         The degree of freedom that converged last.
     closure_error : float
@@ -169,6 +178,9 @@ class Report:
     output_errors: Mapping[str, float]
     message: str
     notes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "output_errors", {name: float(off) for name, off in self.output_errors.items()})
 
     def __str__(self) -> str:
         e = self.energy

@@ -52,8 +52,9 @@ class CoulombFriction(Effect):
     """Dry friction in drives, hinges and slides: it sticks exactly, and slides against a constant force.
 
     What sticks does not move at all: while the force that holds it stays below F_s, its equation of motion is
-    replaced by v̇ = 0. Where sticking begins and ends is located within the step; a slip that is over within less than
-    a step is left out, where steps are chosen only if it is within tolerance. It needs `LargeRotation`
+    replaced by v̇ = 0. Where sticking begins and ends is located within the step; a slip, or a stick, that is over
+    within less than a step is left out (and not among the events), where steps are chosen only if it is within
+    tolerance: those of `ExplicitRungeKutta` are long, a tenth of a period and more. It needs `LargeRotation`
     (without it a model is linear), and mass on what slides. Linear models and equilibria do not contain it: they
     are those of the machine that is shaken loose, `Model.notes` says so.
 

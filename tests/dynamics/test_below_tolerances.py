@@ -40,3 +40,19 @@ def test_what_is_smaller_than_errors_of_steps(push):
 def test_what_rests_or_moves_is_not_named():
     for inputs in ({}, {"push": 1.0}):
         assert not fc.simulate(oscillator(), until=1.0, inputs=inputs).report.notes
+
+
+@pytest.mark.parametrize("absolute", [1e-3, 1e-2, 1.0])
+def test_what_is_told_of_steps_of_one_length_does_not_hang_on_the_tolerance(absolute):
+    """Which they have nothing to do with; an absolute one of a centimetre a metre excuses no errors of metres."""
+    upper = fc.RigidBody("upper", (0.5, 0, 0), 1.0, (0.01, 0.1, 0.1), {"hinge": (0, 0, 0), "end": (1, 0, 0)})
+    lower = fc.RigidBody("lower", (1.5, 0, 0), 1.0, (0.01, 0.1, 0.1), {"hinge": (1, 0, 0), "end": (2, 0, 0)})
+    joints = [fc.Support(upper.point("hinge"), "u v w rx rz"), fc.Hinge(upper.point("end"), lower.point("hinge"), "y")]
+    outputs = [fc.Velocity("speed", lower.point("end"), "x"), fc.Position("x", lower.point("end"), "x")]
+    model = fc.assemble(fc.Structure([upper, lower], joints, outputs=outputs), [fc.LargeRotation(), fc.Gravity()])
+    how = {"until": 6.0, "every": 0.1, "method": fc.GeneralizedAlpha(0.005)}
+    usual, loose = (fc.simulate(model, tolerance=t, **how).report for t in (None, fc.Tolerance(1e-4, absolute)))
+    assert usual.error > 0.05
+    assert loose.error == pytest.approx(usual.error, rel=1e-3)
+    assert loose.output_errors == pytest.approx(usual.output_errors, rel=1e-3)
+    assert loose.notes == usual.notes

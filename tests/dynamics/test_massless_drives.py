@@ -70,11 +70,12 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_its_angle_and_speed_are_of_second_order_after_jumps_of_the_torque(case):
     effect, exact = CASES[case]
-    runs = [fc.simulate(machine(effect), Swell(), until=UNTIL, method=fc.GeneralizedAlpha(h)) for h in (2e-3, 1e-3)]
+    methods = (fc.GeneralizedAlpha(h) for h in (2e-3, 1e-3, 5e-4))
+    runs = [fc.simulate(machine(effect), Swell(), until=UNTIL, method=method) for method in methods]
     errors = [np.abs(run.y[-1] - exact) for run in runs]
     assert (errors[0] <= [2e-5, 2e-4, 1e-5]).all()
     assert (errors[1] <= errors[0] / 3.0 + 1e-9).all()
-    assert runs[0].report.energy_residual > 3.0 * runs[1].report.energy_residual
+    assert runs[1].report.energy_residual > 3.0 * runs[2].report.energy_residual
 
 
 def test_the_midpoint_rule_takes_it_with_friction_at_any_step():
@@ -87,7 +88,7 @@ def test_the_midpoint_rule_takes_it_with_friction_at_any_step():
     assert (errors[0] <= [1e-4, 2e-2, 1e-5]).all()
     assert (errors[1] <= [2e-6, 1e-4, 1e-6]).all()
     assert errors[2][2] == pytest.approx(errors[1][2] / 4.0, rel=0.1)
-    assert runs[1].report.energy_residual > 3.0 * runs[2].report.energy_residual
+    assert max(run.report.energy_residual for run in runs) < 1e-12
 
 
 def test_a_junction_that_nothing_holds_is_named_by_every_method():

@@ -83,6 +83,8 @@ def test_chosen_steps_that_see_the_first_peak_but_lose_the_ringing():
     assert note.startswith("tension rings by up to 1.1e+02 from the start on")
 
 
+UNTOLD = "functions of time were looked at every"
+"""Said of functions in Python in few steps: what they do between is not known."""
 SWITCHED = {
     "a step": fc.OpenLoop({"torque": Step(TORQUE, at=0.3)}),
     "sampled": fc.OpenLoop({"torque": lambda t: TORQUE * (t >= 0.3)}, sample_time=0.05),
@@ -95,14 +97,15 @@ SWITCHED = {
 def test_a_torque_switched_on_later(law, every):
     """The motor rings as from a start; no step sees it."""
     run = fc.simulate(drive(1e6), law, until=1.0, method=fc.GeneralizedAlpha(1e-2), every=every)
-    (note,) = run.report.notes
+    (note,) = (note for note in run.report.notes if not note.startswith(UNTOLD))
     assert run["speed"].max() < 0.71
     assert note.startswith(f"speed rings by up to {ripple(1e6):.2g} from t = 0.3 s on")
 
 
 def test_a_torque_that_rises_slowly():
     law = fc.OpenLoop({"torque": lambda t: min(t / 0.8, 1.0) * TORQUE})
-    assert not fc.simulate(drive(1e6), law, until=1.0, method=fc.GeneralizedAlpha(1e-2)).report.notes
+    notes = fc.simulate(drive(1e6), law, until=1.0, method=fc.GeneralizedAlpha(1e-2)).report.notes
+    assert [note for note in notes if not note.startswith(UNTOLD)] == []
 
 
 def test_a_rope_pulled_later():

@@ -8,7 +8,7 @@ from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import follow, lean, miss, tighten
 from flexctrl.dynamics.march.record import DONE, March
 from flexctrl.dynamics.march.step import blended
-from flexctrl.dynamics.records.absurd import FAR, OFTEN, absurd, borne_out, looking, unlooked
+from flexctrl.dynamics.records.absurd import ALIKE, FAR, OFTEN, absurd, borne_out, looking, missed, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
 from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
@@ -122,9 +122,10 @@ def looked_at(m: March, lost: float) -> float:
         return lost
     told = lost
     if ended(m, 0.0, 0.0) or ended(m, 0.5 * m.h, lost):
-        mix(m, 0.0, 0.0)
-        told = min(lost, max(m.h * f.books[2], m.made - gap))
-        m.unseen += min(told, lost - told)
+        least = m.h * halfway(m)
+        if lost > ALIKE * least:
+            told = min(lost, max(least, m.made - gap))
+            m.unseen += min(told, lost - told)
     copy(f.padded, m.v, f.v)
     drive(f)
     energy(f)
@@ -144,13 +145,37 @@ def ended(m: March, onward: float, least: float) -> bool:
 
 @seldom
 def mix(m: March, beside: float, onward: float) -> None:
-    """Work out energies at what rates have beside a course, at its reverse, or at the mean rates (0)."""
+    """Work out energies at what rates have beside a course, or at its reverse."""
     f = m.flat
     for i in range(0, f.padded, 8):
         mean = eight(f.step[i:]) * (1.0 / m.h)
-        put(f.v[i:], beside * (eight(m.v[i:]) - mean - onward * eight(m.rate[i:])) if beside != 0.0 else mean)
+        put(f.v[i:], beside * (eight(m.v[i:]) - mean - onward * eight(m.rate[i:])))
     drive(f)
     energy(f)
+
+
+@seldom
+def halfway(m: March) -> float:
+    """Return what is dissipated at the mean rates, where half of the step has led; as `Books` does.
+
+    All has been kept already: it is half a step back from there.
+    """
+    f = m.flat
+    for i in range(0, f.padded, 8):
+        step = eight(f.step[i:])
+        put(f.v[i:], step * (1.0 / m.h))
+        put(f.force[i:], step)
+        put(f.step[i:], -0.5 * step)
+    reach(m)
+    drive(f)
+    energy(f)
+    lost = f.books[2]
+    for i in range(0, f.padded, 8):
+        put(f.step[i:], 0.0 * eight(f.v[i:]))
+    copy(f.padded, m.v, f.v)
+    reach(m)
+    copy(f.padded, f.force, f.step)
+    return lost
 
 
 def drawn_now(m: March) -> bool:
@@ -165,11 +190,11 @@ def draw(m: March) -> None:
     kinetic = m.flat.books[0]
     stored = m.flat.books[1]
     m.made = kinetic + stored - m.begun - m.gained + m.lost
-    m.gap = max(m.gap, abs(m.made))
+    m.gap = max(m.gap, missed(m.made, m.unseen))
     turned = max(abs(m.gained), max(m.lost, abs(stored + kinetic - m.begun)))
     swung = max(kinetic, max(abs(kinetic - m.moving), abs(stored - (m.begun - m.moving))))
     m.turnover = max(m.turnover, max(turned, swung))
-    if m.lawful == 1 and absurd(m.entered, m.made, m.turnover, m.reached, m.begun):
+    if m.lawful == 1 and absurd(m.entered, m.made - m.unseen, m.turnover, m.reached, m.begun):
         m.absurd = 1
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from flexctrl.dynamics.records.absurd import missed
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
 
@@ -75,7 +76,7 @@ def drifted(journey: Journey) -> Drift:
     off, width = np.zeros(model.n), np.zeros(model.n)
     off[went] = np.minimum(late, sums.moved[went])
     width[went] = _width(sums.swept[went], sums.bent[went], sums.path[went])
-    most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.absolute) * yardsticks(model)
+    most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.negligible) * yardsticks(model)
     lags = np.minimum([stepper.remains(lag) for lag in (off / most).tolist()], width / most)
     ran = _run_off(journey) / most
     shares = np.maximum(lags, ran)
@@ -111,7 +112,8 @@ def _run_off(journey: Journey) -> np.ndarray:
         return np.zeros_like(way)
     rounds = np.where(way > 1.0, 0.5 * way, 0.0)
     swings = np.where(way < 2.0 * math.pi, np.minimum(np.tan(0.25 * way) ** 2 / 8.0, _MOST) * sums.path / yard, 0.0)
-    return np.asarray(_judged(yard) * np.minimum(abs(sums.made) / sums.turnover * np.maximum(rounds, swings), way))
+    share = missed(sums.made, sums.unseen) / sums.turnover
+    return np.asarray(_judged(yard) * np.minimum(share * np.maximum(rounds, swings), way))
 
 
 def _note(journey: Journey, share: float, freedom: str) -> str:

@@ -169,7 +169,7 @@ def interpolated(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.nda
 def _most(journey: Journey) -> float:
     """How far the machine has moved, in yardsticks: what shares are of."""
     moved = farthest(journey.plan.model, journey.books.sums.moved)
-    return max(float(moved.max(initial=0.0)), 1e3 * journey.plan.tolerance.absolute)
+    return max(float(moved.max(initial=0.0)), 1e3 * journey.plan.tolerance.negligible)
 
 
 def _apart(model: Model, one: State, other: State) -> np.ndarray:

@@ -9,8 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics.notes.adding import remedy
-from flexctrl.dynamics.scales import yardsticks
+from flexctrl.dynamics.scales import output_yardsticks, yardsticks
 from flexctrl.dynamics.steps import Parting
+from flexctrl.dynamics.swift.stiff_lines import SURE
 from flexctrl.model.model import Model
 from flexctrl.structure.outputs import (
     AngularVelocity,
@@ -26,7 +27,7 @@ from flexctrl.structure.outputs import (
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reach", "seen", "ways"]
+__all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reach", "seen", "told_from", "ways"]
 
 _TOLD, _SEEN, _BESIDE = 0.05, 1.0, 2.0
 _ROUND_OFF = 1e-12
@@ -55,6 +56,26 @@ class OutputErrors(NamedTuple):
 
     shares: Mapping[str, float]
     notes: tuple[str, ...] = ()
+
+
+def told_from(journey: Journey) -> np.ndarray:
+    """Return what forces and rates have to go through to be told of, shape (outputs,).
+
+    That is what absolute tolerances leave of them; of a tension what the last corrections of steps do: stiff lines
+    stretch by less than any tolerance, and their forces are those that masses ask for.
+
+    Parameters
+    ----------
+    journey : Journey
+
+    Returns
+    -------
+    numpy.ndarray
+    """
+    model, absolute = journey.plan.model, journey.plan.tolerance.negligible
+    assert isinstance(model, Model)
+    tense = np.array([isinstance(output, Tension) for output in model.structure.outputs], dtype=bool)
+    return np.where(tense, min(SURE, absolute), absolute) * output_yardsticks(model, journey.mark.size)
 
 
 def placed(model: Model) -> list[int]:
@@ -145,7 +166,7 @@ def _seen(journey: Journey, y: np.ndarray, sight: sp.csr_matrix) -> tuple[np.nda
     model, tolerance = journey.plan.model, journey.plan.tolerance
     assert isinstance(model, Model)
     yards = yardsticks(model)
-    least = _SEEN * max(tolerance.absolute, _ROUND_OFF) * (sight @ np.where(np.isfinite(yards), yards, 0.0))
+    least = _SEEN * max(tolerance.negligible, _ROUND_OFF) * (sight @ np.where(np.isfinite(yards), yards, 0.0))
     way = ways(journey, y)
     return way, [i for i in placed(model) if way[i] > least[i]]
 

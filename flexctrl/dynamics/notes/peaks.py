@@ -84,7 +84,7 @@ def _compared(run: Run, other: Run, journey: Journey, longer: float) -> tuple[di
     assert isinstance(model, Model)
     peaks, others = (np.abs(r.y[r.t <= end]).max(axis=0, initial=0.0) for r in (run, other))
     most, off = np.maximum(peaks, others), np.abs(others - peaks) / (1.0 - longer)
-    least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
+    least = _SEEN * journey.plan.tolerance.negligible * output_yardsticks(model, journey.mark.size)
     far = [i for i in fast(model) if most[i] > least[i] and off[i] > _TOLD * most[i]]
     shares = {model.outputs[i]: min(float(off[i] / most[i]), 1.0) for i in far}
     return shares, tuple(_note(journey, i, peaks, others, shares[model.outputs[i]]) for i in far)

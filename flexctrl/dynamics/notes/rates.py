@@ -12,10 +12,9 @@ import numpy as np
 from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.gap import interpolated
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
-from flexctrl.dynamics.notes.outputs import fast, ways
+from flexctrl.dynamics.notes.outputs import fast, told_from, ways
 from flexctrl.dynamics.notes.striking import at_events, in_both, struck
 from flexctrl.dynamics.run import Run
-from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Fixed
 from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
@@ -28,8 +27,8 @@ __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "sa
 _POINTS, _NEAR = 4, 1e-9
 _STEEP, _MOST, _JUMP, _SHARED = 0.1, 8, 0.01, 0.3
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
-_SEEN, _LITTLE, _DUST = 1.0, 1e-3, 1e-6
-"""What is told: so many absolute tolerances, and a share of its largest value; of what is noted a larger one."""
+_LITTLE, _DUST = 1e-3, 1e-6
+"""What is told, of its largest value; of what is noted a larger share."""
 _ALIKE = 0.97
 """A coarser run in more of the steps is the same run: samples may round steps of any length to one."""
 _LEAST = 0.5
@@ -218,8 +217,8 @@ def _judged(run: Run, journey: Journey, little: float) -> dict[int, float]:
     if not isinstance(model, Model) or len(run.y) < _POINTS:
         return {}
     way, most = ways(journey, run.y), np.abs(run.y).max(axis=0)
-    least = _SEEN * journey.plan.tolerance.absolute * output_yardsticks(model, journey.mark.size)
-    counts = (most if little < _LITTLE else way) > least
+    needed = told_from(journey)
+    counts = (most if little < _LITTLE else way) > needed
     return {i: float(way[i]) for i in fast(model) if counts[i] and np.inf > way[i] > little * most[i]}
 
 

@@ -27,6 +27,8 @@ __all__ = ["ringing"]
 _SEEN, _SEEN_BY_MANY, _LITTLE, _STEADY, _RESOLVED = 1.0, 2.0, 0.05, 0.01, 0.2
 """Radians in a step, and in one of many stages; what counts, of what an output goes through and of its largest; a step
 that sees all."""
+_BY_MANY = 0.2
+"""Of that counts where shocks follow each other: no short first steps see them."""
 _LAG = 0.3
 """Radians by which two runs part in phase from where on an extrapolation of them is larger than either."""
 _TOLD, _DUST = 1e-3, 1e-9
@@ -74,16 +76,33 @@ def ringing(run: Run, journey: Journey) -> Run:
         return run
     asked = [o for o in model.structure.outputs if isinstance(o, Fast) and not is_named(o.name, run.report.notes)]
     judged = list(_judged(run, journey, model, asked)) if asked else []
-    notes = tuple(note for _, _, note in judged if note)
+    notes = tuple(each.note for each in judged if each.note)
     known = run.report.output_errors
-    found = ((name, share) for name, share, note in judged if share > _TOLD and (note or name not in known))
-    shares = {name: max(share, known.get(name, 0.0)) for name, share in found}
+    found = (each for each in judged if each.share > _TOLD and (each.counts or each.name not in known))
+    shares = {each.name: max(each.share, known.get(each.name, 0.0)) for each in found}
     report = replace(run.report, output_errors={**known, **shares}, notes=(*run.report.notes, *notes))
     return replace(run, report=report) if judged else run
 
 
-def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iterator[tuple[str, float, str]]:
-    """Each output, what it may be off by over its range, and what is to be said of it."""
+class _Judged(NamedTuple):
+    """An output, what it may be off by over its range, and what is to be said of it.
+
+    Attributes
+    ----------
+    name : str
+    share : float
+    note : str
+    counts : bool
+        Whether that is more than other runs know, which may be off alike.
+    """
+
+    name: str
+    share: float
+    note: str
+    counts: bool
+
+
+def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iterator[_Judged]:
     known, found = run.report.output_errors, list(shocks(run, journey))
     told = max(run.report.error, *(known.get(model.outputs[i], 0.0) for i in placed(model)), 0.0)
     yards = output_yardsticks(model, 1.0)
@@ -91,17 +110,19 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
         values = run[output.name]
         way, most = float(np.ptp(values)), float(np.abs(values).max())
         swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
-        share, note = 0.0, ""
+        share, note, by_many = 0.0, "", False
         for swing, shock in sorted(swings, key=lambda each: -each[0].size):
-            if not swing.size > max(_LITTLE * way, _STEADY * most, _DUST * yards[model.outputs.index(output.name)]):
-                break
+            much, dust = max(_LITTLE * way, _STEADY * most), _DUST * yards[model.outputs.index(output.name)]
+            if not swing.size > max(_BY_MANY * much if swing.gain > 1.0 else much, dust):
+                continue
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
             step = _step(run, journey, shock, swing, lasts)
             beside = known.get(output.name, np.inf)
             ringing = _Ringing(output.name, shock.since, lasts, step, way, told, beside)
             off, said = _told(journey.plan.method, swing, ringing)
-            share, note = max(share, min(off / way, 1.0) if way else 1.0), note or said
-        yield output.name, share, note
+            share = max(share, min(off / way, 1.0) if way else 1.0)
+            note, by_many = note or (said if swing.size > much else ""), by_many or swing.gain > 1.0
+        yield _Judged(output.name, share, note, bool(note) or by_many)
 
 
 def _lasting(decay: float, left: float) -> float:

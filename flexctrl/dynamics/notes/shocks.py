@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -36,8 +38,10 @@ _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
 _ROUND_OFF, _LITTLE, _SLACK = 1e-12, 1e-6, 0.1
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
-_MOST, _BESIDE = 16, 1e-9
-"""Breaks of a law that are looked at, and how far on either side, in parts of the run."""
+_ABOUT = 0.98, 0.99, 1.0, 1.01, 1.02
+"""Frequencies of vibrations, over what they are found as if all else let go."""
+_MOST, _BESIDE, _WATCHED = 16, 1e-9, 2048
+"""Breaks of a law that are looked at, and how far on either side, in parts of the run; samples that are."""
 
 
 class Swing(NamedTuple):
@@ -50,11 +54,14 @@ class Swing(NamedTuple):
         [rad/s]
     rates : numpy.ndarray, shape (n,)
         Amplitudes of the rates of degrees of freedom.
+    gain : float
+        How far shocks that follow each other make it swing, over what the largest does.
     """
 
     size: float
     frequency: float
     rates: np.ndarray
+    gain: float = 1.0
 
 
 class _Vibration(NamedTuple):
@@ -75,6 +82,38 @@ class _Vibration(NamedTuple):
     frequency: float
 
 
+class Train(NamedTuple):
+    """Shocks that follow each other by the clock.
+
+    Attributes
+    ----------
+    sizes : tuple of float
+        Each over the largest; a single one has none beside it.
+    apart : float
+        Time from one to the next [s].
+    """
+
+    sizes: tuple[float, ...] = ()
+    apart: float = 0.0
+
+    def gain(self, frequency: float, decay: float) -> float:
+        """Return how far they make something ring, over what the largest does: A ← A exp((iω − δ) T) + their size.
+
+        Whole turns between samples add all of them up. So that counts of frequencies within a fiftieth.
+        """
+        if len(self.sizes) < 2:
+            return 1.0
+        turns = (complex(-decay, share * frequency) * self.apart for share in _ABOUT)
+        return max(1.0, *(self._largest(cmath.exp(turn)) for turn in turns))
+
+    def _largest(self, turn: complex) -> float:
+        ringing, most = 0j, 0.0
+        for size in self.sizes:
+            ringing = ringing * turn + size
+            most = max(most, abs(ringing))
+        return most
+
+
 @frozen(eq=False)
 class Shock:
     """Forces put on at once.
@@ -90,6 +129,8 @@ class Shock:
     inertia, damping, stiffness : scipy.sparse.csr_matrix, shape (n, n)
     since : str
         When, in words.
+    train : Train
+        Others like it, as samples bring them.
     """
 
     feed: Feed
@@ -101,9 +142,10 @@ class Shock:
     damping: sp.csr_matrix
     stiffness: sp.csr_matrix
     since: str
+    train: Train
 
     @classmethod
-    def of(cls, run: Run, journey: Journey, at: State, inputs: Sequence[np.ndarray], since: str) -> Shock:
+    def of(cls, run: Run, journey: Journey, at: State, inputs: Sequence[np.ndarray], since: str, train: Train) -> Shock:
         """Return what inputs do to a machine, or what they do once they are others."""
         model, feed, u, jumps = cast(Model, journey.plan.model), journey.plan.feed, inputs[-1], len(inputs) > 1
         state = model.switches.under(at, u) if jumps else model.switches.begin(at, u)
@@ -119,7 +161,7 @@ class Shock:
                 before = -model.loads(state, inputs[0]) if jumps else model.balance(state, state.v, still)
                 rates[heavy] = factorise(M[heavy][:, heavy])((before + model.loads(state, u))[heavy])
         mass = np.where(M.diagonal() > model.dust, M.diagonal(), np.inf)
-        return cls(feed, contacts, still if jumps else state.v, rates, mass, M, C, K, since)
+        return cls(feed, contacts, still if jumps else state.v, rates, mass, M, C, K, since, train)
 
     @property
     def model(self) -> Model:
@@ -135,7 +177,9 @@ class Shock:
 
         def seen(part: _Vibration) -> Swing:
             size = np.hypot(by_place @ part.rates / part.frequency, by_rate @ part.rates)
-            return Swing(float(size), part.frequency, part.rates)
+            swing = Swing(float(size), part.frequency, part.rates)
+            gain = self.train.gain(swing.frequency, self.decay(swing))
+            return swing._replace(size=gain * swing.size, gain=gain)
 
         speed = isinstance(output, Velocity | AngularVelocity)
         alone = [seen(part) for part in self._vibrations if speed or part.part == _source(output)]
@@ -243,14 +287,15 @@ def shocks(run: Run, journey: Journey) -> Iterator[Shock]:
     -------
     iterator of Shock
     """
-    yield Shock.of(run, journey, journey.origin.state, [journey.origin.u], "the start")
+    yield Shock.of(run, journey, journey.origin.state, [journey.origin.u], "the start", Train())
     largest: dict[int, _Jump] = {}
     for jump in _jumps(run, journey):
         for i, leap in enumerate(np.abs(jump.after - jump.before).tolist()):
             if leap > (largest[i].size(i) if i in largest else 0.0):
                 largest[i] = jump
-    for jump in {id(found): found for found in largest.values()}.values():
-        yield Shock.of(run, journey, jump.state, [jump.before, jump.after], f"t = {jump.state.t:.3g} s")
+    for i, jump in {id(found): (i, found) for i, found in largest.items()}.values():
+        since = f"t = {jump.state.t:.3g} s"
+        yield Shock.of(run, journey, jump.state, [jump.before, jump.after], since, jump.train(i))
 
 
 def _later(run: Run, since: float) -> Iterator[State]:
@@ -261,19 +306,25 @@ def _later(run: Run, since: float) -> Iterator[State]:
 
 
 class _Jump(NamedTuple):
-    """Inputs before and after, in a state."""
+    """Inputs before and after, in a state; at samples also all others that are known, one after the other."""
 
     state: State
     before: np.ndarray
     after: np.ndarray
+    commands: np.ndarray = np.zeros((0, 0))
+    apart: float = 0.0
 
     def size(self, i: int) -> float:
         return float(abs(self.after[i] - self.before[i]))
 
+    def train(self, i: int) -> Train:
+        sizes = np.diff(self.commands[:, i]) / self.size(i) if self.apart else np.zeros(0)
+        return Train(tuple(sizes.tolist()), self.apart)
+
 
 def _jumps(run: Run, journey: Journey) -> Iterator[_Jump]:
-    """Where inputs jump: at breaks of a continuous law, as far as they are known, and at samples where rows tell."""
-    feed, track, t, every = journey.plan.feed, run.track, run.t, journey.rows.every
+    """Where inputs jump: at breaks of a continuous law, as far as they are known, and at samples."""
+    feed, track = journey.plan.feed, run.track
     if feed.controller is None or not track.stretches:
         return
     if feed.continuous:
@@ -283,7 +334,28 @@ def _jumps(run: Run, journey: Journey) -> Iterator[_Jump]:
             for b in sorted(set(inner))[:_MOST]:
                 state, before = track.state(b - beside)
                 yield _Jump(state.with_(t=b), before, track.state(b + beside)[1])
-    elif len(t) > 1 and (every is None or feed.sample_time > 0.5 * every):
-        leaps = np.abs(np.diff(run.u, axis=0))
-        for row in np.unique(1 + np.argmax(leaps, axis=0)).tolist() if leaps.any() else []:
-            yield _Jump(track.state(float(t[row]))[0], run.u[row - 1], run.u[row])
+        return
+    samples, u = _commands(run, journey)
+    leaps = np.abs(np.diff(u, axis=0))
+    for row in np.unique(1 + np.argmax(leaps, axis=0)).tolist() if leaps.any() else []:
+        state = track.state(float(samples[row] * feed.sample_time))[0]
+        yield _Jump(state, u[row - 1], u[row], u, feed.sample_time)
+
+
+def _commands(run: Run, journey: Journey) -> tuple[np.ndarray, np.ndarray]:
+    """The inputs after samples that follow each other, and the numbers of these: where rows show most of them move."""
+    feed, track = journey.plan.feed, run.track
+    first = math.ceil(track.starts[0] / feed.sample_time - _LITTLE)
+    last = math.ceil(run.final.t / feed.sample_time - _LITTLE)
+    leaps = np.abs(np.diff(run.u, axis=0))
+    way = np.ptp(run.u, axis=0)
+    if last - first > _WATCHED and len(leaps):
+        row = int(np.argmax((leaps / np.where(way > 0.0, way, 1.0)).max(axis=1)))
+        first = min(max(first, int(run.t[row] / feed.sample_time) - _WATCHED // 4), last - _WATCHED)
+    samples = np.arange(first, min(last, first + _WATCHED))
+    held = [
+        track.state((k + 0.5) * feed.sample_time)[1]
+        for k in samples.tolist()
+        if (k + 0.5) * feed.sample_time < run.final.t
+    ]
+    return samples[: len(held)], np.reshape(held, (len(held), run.u.shape[1]))

@@ -18,8 +18,8 @@ __all__ = ["turned_over"]
 
 _LEAP, _MOST, _WITHIN = 1.0, 40, 8
 """How far an angle goes from row to row where its axis may pass, how many such rows are looked at, and how closely."""
-_NEAR = 5.0
-"""So many times what the run errs by."""
+_NEAR, _AT_MOST = 5.0, 0.5
+"""So many times what the run errs by; and so many radians, whatever that is: others stand far from it."""
 _SAID = (
     "whole turns of {name} hang on less than steps err by: at t = {t:.4g} s its axis passes within {near:.1g} rad of "
     "its opposite, where what is left of a rotation is not defined; ask for a rotation about another axis, or against "
@@ -49,7 +49,7 @@ def turned_over(run: Run, journey: Journey) -> Run:
     for number, i in enumerate(angles):
         passed = [_nearest(run, model, number, k) for k in _leaps(run.y[:, i])]
         near, t = min(passed, default=(np.inf, 0.0))
-        if near < _NEAR * error:
+        if near < min(_NEAR * error, _AT_MOST):
             notes.append(_SAID.format(name=run.outputs[i], t=t, near=near))
     return replace(run, report=replace(run.report, notes=(*run.report.notes, *notes)))
 

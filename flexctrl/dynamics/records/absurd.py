@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from flexctrl.kernels.native import seldom
 
-__all__ = ["ABSURD", "FAR", "LOOKED_AT", "OFTEN", "ROUND_OFF", "VISIBLE", "absurd", "borne_out", "looking", "unlooked"]
+__all__ = [
+    "ABSURD",
+    "ALIKE",
+    "FAR",
+    "LOOKED_AT",
+    "OFTEN",
+    "ROUND_OFF",
+    "VISIBLE",
+    "absurd",
+    "borne_out",
+    "looking",
+    "missed",
+    "unlooked",
+]
 
 OFTEN = 32
 """Steps from one balance to the next; at first there is one after each."""
@@ -16,6 +29,8 @@ ROUND_OFF = 1e-6
 """Share of the energy at the start that may be lost in the last digits of places."""
 LOOKED_AT = 4
 """Steps of which the error of one is added up: of more, it could be told from the clock."""
+ALIKE = 1.1
+"""Quadrature that says so many times what is lost halfway, and no more, sees what is lost."""
 FAR = 4.0
 """So many times what quadrature says drag takes of rates that alternate from step to step, accelerations aside."""
 _MUCH, _SLIGHT, _LITTLE = 1e-2, 1e-3, 1e-6
@@ -54,3 +69,11 @@ def borne_out(lost: float, made: float, unseen: float, turnover: float) -> bool:
     ``made`` is what the books make with it [J].
     """
     return max(lost, unseen) <= _MUCH * turnover and made <= _SLIGHT * turnover
+
+
+def missed(made: float, unseen: float) -> float:
+    """Return what the books miss [J], of which ``made`` is what they have the method make.
+
+    As much as has been booked of rates that damping ends within steps may never have been lost.
+    """
+    return max(0.0, made - unseen) if made > 0.0 else -made

@@ -10,8 +10,10 @@ import numpy as np
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.local import Local
+from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
 from flexctrl.dynamics.records.absurd import (
     ABSURD,
+    ALIKE,
     FAR,
     LOOKED_AT,
     OFTEN,
@@ -20,6 +22,7 @@ from flexctrl.dynamics.records.absurd import (
     absurd,
     borne_out,
     looking,
+    missed,
     unlooked,
 )
 from flexctrl.dynamics.records.dense import Booked, Curve, Hermite
@@ -55,7 +58,8 @@ class Sums:
     kinetic, stored : float
         When the balance was drawn last [J].
     gap, turnover : float
-        Largest |energy − start − work + lost| and largest energy turned over [J].
+        Largest |energy − start − work + lost|, less what may be booked as lost and is not, and largest energy
+        turned over [J].
     made : float
         Energy − start − work + lost when the balance was drawn last [J].
     power : float
@@ -103,10 +107,11 @@ class Books:
         self.first = state.q
         self.lawful = self.model.large
         self.reach = yardsticks(self.model)
-        self.slight = _SLIGHT * tolerance.absolute * self.reach
+        self.slight = _SLIGHT * tolerance.negligible * self.reach
         probe = np.linspace(1.0, 2.0, self.model.n)
         changing = bool(self.model.switches.names or self.model.kinks.names)  # what is loose now may damp later
         self.dissipates = changing or self.model.energy(state.with_(v=probe))[2] != 0.0
+        self.midway = isinstance(method, ConservingMidpoint)  # what its damping takes is that, to round-off
         self.loses = self.dissipates or not method.symmetric  # steps that lead back in time take nothing for good
         kinetic, stored, power = self.model.energy(state)
         self.sums = Sums(kinetic + stored, kinetic, kinetic=kinetic, stored=stored, power=power)
@@ -126,7 +131,7 @@ class Books:
         if sums.entered < OFTEN or sums.entered % OFTEN == 0:
             self.close(after)
             gone = float((sums.moved / self.reach).max(initial=0.0))
-            if self.lawful and absurd(sums.entered, sums.made, sums.turnover, gone, sums.start):
+            if self.lawful and absurd(sums.entered, sums.made - sums.unseen, sums.turnover, gone, sums.start):
                 sums.absurd = True
 
     @property
@@ -167,11 +172,21 @@ class Books:
         step = after.state.q - before.state.q
         forces = loads(before.state, before.supply.u) + loads(after.state, after.supply.u)
         self.sums.work += 0.5 * float(forces @ step)
-        if self.dissipates:
+        if self.dissipates and self.midway:
+            self.sums.lost += self._halfway(before.state, after.state)
+        elif self.dissipates:
             power = self.model.energy(after.state)[2]
             lost = 0.5 * (self.sums.power + power) * (after.state.t - before.state.t)
             self.sums.lost += self._dissipated(lost, before.state, after)
             self.sums.power = power
+
+    def _halfway(self, before: State, after: State) -> float:
+        """What is dissipated at the mean rates, where half of the step has led.
+
+        Seen from the end of a step what turns goes aside, and has its stiff parts give way.
+        """
+        h, step = after.t - before.t, after.q - before.q
+        return h * self.model.energy(self.model.advance(before, 0.5 * step, step / h, before.t + 0.5 * h))[2]
 
     def _integrate(self, before: Point, after: Point, curve: Curve) -> None:
         """Integrate the powers over a step by Lobatto's rule with five points, where the method knows no better."""
@@ -213,12 +228,13 @@ class Books:
         if borne_out(lost, gap + lost, s.unseen, s.turnover):
             return lost
         h = after.t - before.t
-        mean = (after.q - before.q) / h
-        beside = after.v - mean
+        beside = after.v - (after.q - before.q) / h
         if not (self._ended(h, after, beside, 0.0) or self._ended(h, after, beside - 0.5 * h * end.rate, lost)):
             return lost
-        least = self._energy(after, mean)[2]
-        told = min(lost, max(h * least, s.made - gap))
+        least = self._halfway(before, after)
+        if lost <= ALIKE * least:
+            return lost
+        told = min(lost, max(least, s.made - gap))
         s.unseen += min(told, lost - told)
         return told
 
@@ -241,7 +257,7 @@ class Books:
         gap = s.kinetic + s.stored - s.start - s.work + s.lost
         s.turnover = max(s.turnover, abs(s.work), s.lost, abs(s.stored + s.kinetic - s.start))
         s.turnover = max(s.turnover, s.kinetic, abs(s.kinetic - s.moving), abs(s.stored - (s.start - s.moving)))
-        s.gap, s.made = max(s.gap, abs(gap)), gap
+        s.gap, s.made = max(s.gap, missed(gap, s.unseen)), gap
         s.closure = max(s.closure, self.model.motion.closure_error(point.state))
 
     @property
