@@ -152,11 +152,13 @@ class Report:
         deflection of millimetres beside a travel of metres. Forces and rates by other runs laid beside, by how they
         ring after loads that are put on at once, or by how large they get in a finer run (over their largest value),
         whichever tells more; where none of these is there, nothing is told of them. Empty for linear
-        models; places that move, and forces and rates that are, no more than absolute tolerances are left out.
+        models; places that move, and rates that are, no more than absolute tolerances are left out, and tensions that
+        are no more than what the last digits of places make.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str
-        What was held or released so that rigid loops close, and what was changed in the start.
+        Warnings: which numbers are off, by how much and what to do about it; what was held or released so that rigid
+        loops close, what was changed in the start, and what the model leaves out.
     """
 
     method: str
