@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.records.absurd import missed
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
@@ -118,7 +119,7 @@ def _run_off(journey: Journey) -> np.ndarray:
 
 def _note(journey: Journey, share: float, freedom: str) -> str:
     """What is to be said, with the tolerance or the step that would leave little."""
-    most = f"{100.0 * share:.2g} %" if share < 1.0 else "all (or a radian, or the machine's size)"
+    most = percent(share) if share < 1.0 else "all (or a radian, or the machine's size)"
     said = f"the errors of {journey.mark.steps} steps may have added up to {most} of the motion of {freedom}"
     return f"{said}: {remedy(journey, share)}"
 

@@ -12,6 +12,7 @@ from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.gap import Gap
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.notes.peaks import unresolved
+from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
@@ -297,7 +298,7 @@ def _right(run: Run, gap: Gap, left: float) -> float:
 def _note(journey: Journey, gap: Gap, error: float, right: float, kind: str) -> str:
     """What is to be said: how far off, until when all is well, and what would leave little."""
     plan, pace = journey.plan, journey.plan.method.pace
-    far = f"{100.0 * error:.2g} % of the motion" if error < _ALL else "all of the motion"
+    far = f"{percent(error)} of the motion" if error < _ALL else "all of the motion"
     parted = max(gap.most, journey.origin.error) > PARTED
     is_off = f"may be off by {far}, as {_GROWN}" if parted else f"is off by {far}"
     said = f"by a {kind} run, {gap.where} {is_off}"

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.dynamics.notes.adding import remedy
+from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.scales import output_yardsticks, yardsticks
 from flexctrl.dynamics.steps import Parting
 from flexctrl.dynamics.swift.stiff_lines import SURE
@@ -194,9 +195,9 @@ def _notes(journey: Journey, y: np.ndarray, shares: Mapping[str, float], error: 
     worst, *others = sorted(far, key=lambda name: -shares[name])
     way = float(ways(journey, y)[journey.plan.model.outputs.index(worst)])
     share, do = shares[worst], remedy(journey, shares[worst])
-    note = said.format(name=worst, way=way, far=f"{100.0 * share:.2g} %", steps=journey.mark.steps, remedy=do)
+    note = said.format(name=worst, way=way, far=percent(share), steps=journey.mark.steps, remedy=do)
     if not others:
         return (note,)
-    named = ", ".join(f"{name} {100.0 * shares[name]:.2g} %" for name in others[:_NAMED])
+    named = ", ".join(f"{name} {percent(shares[name])}" for name in others[:_NAMED])
     more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
     return (f"{note}; beside it {named}{more}",)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.notes.outputs import fast
+from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Fixed
@@ -25,7 +26,7 @@ _TOLD, _SEEN, _AIM, _RESOLVED = 0.05, 10.0, 0.01, 0.2
 _UNSEEN, _BLIND = 0.5, 2.0
 """Radians of its vibration in a step beyond which a line's peaks may be missed, beyond which by half steps too."""
 _SAID = (
-    "by a finer run, the largest {name} is {other:.3g}, here it is {own:.3g}, and may be off by {far:.2g} %: "
+    "by a finer run, the largest {name} is {other:.3g}, here it is {own:.3g}, and may be off by {far}: "
     "take steps of {finer:.1g} s"
 )
 _MISSED = (
@@ -110,4 +111,4 @@ def _frequency(model: Model, output: Output) -> float:
 def _note(journey: Journey, output: int, peaks: np.ndarray, others: np.ndarray, share: float) -> str:
     name, step = journey.plan.model.outputs[output], journey.mark.size
     finer = (_AIM / share) ** (1.0 / journey.plan.method.order) * step
-    return _SAID.format(name=name, other=others[output], own=peaks[output], far=100.0 * share, finer=finer)
+    return _SAID.format(name=name, other=others[output], own=peaks[output], far=percent(share), finer=finer)

@@ -13,6 +13,7 @@ from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.gap import interpolated
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.outputs import fast, told_from, ways
+from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.notes.striking import at_events, in_both, struck
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.steps import Fixed
@@ -36,9 +37,9 @@ _LEAST = 0.5
 LOST, _SURE = 0.1, 0.25
 """From which share of an output's range a gap is no longer one of small lags (all of it from twice that), and by how
 much the order seen may be lower."""
-_SAID = "by another run, {name} may be off by {far:.2g} % of its range at an instant: see whether {finer} agrees"
+_SAID = "by another run, {name} may be off by {far} of its range at an instant: see whether {finer} agrees"
 _STRUCK = (
-    "{name} may jump by {far:.2g} % of its range at events: rows at their very instants, or as near as these may be "
+    "{name} may jump by {far} of its range at events: rows at their very instants, or as near as these may be "
     "off, are of one side of that"
 )
 _LINEAR = (
@@ -204,7 +205,7 @@ def _jumps(run: Run, way: dict[int, float], shares: Mapping[str, float], struck:
     if not much:
         return ()
     worst, *others = sorted(much, key=lambda name: -much[name])
-    note = _STRUCK.format(name=worst, far=100.0 * min(much[worst], 1.0))
+    note = _STRUCK.format(name=worst, far=percent(min(much[worst], 1.0)))
     return (note + (f"; so may {', '.join(others[:_NAMED])}" if others else ""),)
 
 
@@ -294,8 +295,8 @@ def said_of_rates(run: Run, journey: Journey) -> Run:
     if not far:
         return run
     worst, *others = sorted(far, key=lambda name: -shares[name])
-    note = _SAID.format(name=worst, far=100.0 * shares[worst], finer=agreeing(journey))
-    named = ", ".join(f"{name} {100.0 * shares[name]:.2g} %" for name in others[:_NAMED])
+    note = _SAID.format(name=worst, far=percent(shares[worst]), finer=agreeing(journey))
+    named = ", ".join(f"{name} {percent(shares[name])}" for name in others[:_NAMED])
     more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
     note += f"; beside it {named}{more}" if others else ""
     return replace(run, report=replace(report, notes=(*report.notes, note)))

@@ -40,7 +40,7 @@ _ROUND_OFF, _LITTLE, _SLACK = 1e-12, 1e-6, 0.1
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
 _ABOUT = 0.98, 0.99, 1.0, 1.01, 1.02
 """Frequencies of vibrations, over what they are found as if all else let go."""
-_MOST, _BESIDE, _WATCHED = 16, 1e-9, 2048
+_MOST, _BESIDE, _WATCHED = 16, 1e-9, 1024
 """Breaks of a law that are looked at, and how far on either side, in parts of the run; samples that are."""
 
 
@@ -352,10 +352,11 @@ def _commands(run: Run, journey: Journey) -> tuple[np.ndarray, np.ndarray]:
     if last - first > _WATCHED and len(leaps):
         row = int(np.argmax((leaps / np.where(way > 0.0, way, 1.0)).max(axis=1)))
         first = min(max(first, int(run.t[row] / feed.sample_time) - _WATCHED // 4), last - _WATCHED)
-    samples = np.arange(first, min(last, first + _WATCHED))
-    held = [
-        track.state((k + 0.5) * feed.sample_time)[1]
-        for k in samples.tolist()
-        if (k + 0.5) * feed.sample_time < run.final.t
-    ]
-    return samples[: len(held)], np.reshape(held, (len(held), run.u.shape[1]))
+    middles = (np.arange(first, min(last, first + _WATCHED)) + 0.5) * feed.sample_time
+    middles = middles[middles < run.final.t]
+    rows = np.searchsorted(run.t, middles) - 1
+    if (rows >= 0).all() and (middles - run.t[rows] < (0.5 + _LITTLE) * feed.sample_time).all():
+        held = run.u[rows]
+    else:
+        held = np.array([track.state(t)[1] for t in middles.tolist()]).reshape(-1, run.u.shape[1])
+    return np.rint(middles / feed.sample_time - 0.5).astype(int), held
