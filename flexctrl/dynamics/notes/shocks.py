@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -16,6 +14,7 @@ from scipy.linalg import eigh
 
 from flexctrl.dynamics.notes.contacts import Contacts
 from flexctrl.dynamics.notes.heavy import without_light
+from flexctrl.dynamics.notes.jumps import Jump, Train, input_jumps
 from flexctrl.dynamics.notes.outputs import Fast
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.swift.lengths import lengthening
@@ -38,10 +37,6 @@ _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
 _ROUND_OFF, _LITTLE, _SLACK = 1e-12, 1e-6, 0.1
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
-_ABOUT = 0.98, 0.99, 1.0, 1.01, 1.02
-"""Frequencies of vibrations, over what they are found as if all else let go."""
-_MOST, _BESIDE, _WATCHED = 16, 1e-9, 1024
-"""Breaks of a law that are looked at, and how far on either side, in parts of the run; samples that are."""
 
 
 class Swing(NamedTuple):
@@ -80,38 +75,6 @@ class _Vibration(NamedTuple):
     part: str
     rates: np.ndarray
     frequency: float
-
-
-class Train(NamedTuple):
-    """Shocks that follow each other by the clock.
-
-    Attributes
-    ----------
-    sizes : tuple of float
-        Each over the largest; a single one has none beside it.
-    apart : float
-        Time from one to the next [s].
-    """
-
-    sizes: tuple[float, ...] = ()
-    apart: float = 0.0
-
-    def gain(self, frequency: float, decay: float) -> float:
-        """Return how far they make something ring, over what the largest does: A ← A exp((iω − δ) T) + their size.
-
-        Whole turns between samples add all of them up. So that counts of frequencies within a fiftieth.
-        """
-        if len(self.sizes) < 2:
-            return 1.0
-        turns = (complex(-decay, share * frequency) * self.apart for share in _ABOUT)
-        return max(1.0, *(self._largest(cmath.exp(turn)) for turn in turns))
-
-    def _largest(self, turn: complex) -> float:
-        ringing, most = 0j, 0.0
-        for size in self.sizes:
-            ringing = ringing * turn + size
-            most = max(most, abs(ringing))
-        return most
 
 
 @frozen(eq=False)
@@ -288,8 +251,8 @@ def shocks(run: Run, journey: Journey) -> Iterator[Shock]:
     iterator of Shock
     """
     yield Shock.of(run, journey, journey.origin.state, [journey.origin.u], "the start", Train())
-    largest: dict[int, _Jump] = {}
-    for jump in _jumps(run, journey):
+    largest: dict[int, Jump] = {}
+    for jump in input_jumps(run, journey):
         for i, leap in enumerate(np.abs(jump.after - jump.before).tolist()):
             if leap > (largest[i].size(i) if i in largest else 0.0):
                 largest[i] = jump
@@ -303,60 +266,3 @@ def _later(run: Run, since: float) -> Iterator[State]:
     track, left = run.track, run.final.t - since
     if track.stretches and track.starts[0] <= since and left > 0.0:
         yield from (track.state(since + share * left)[0] for share in _LOOKED_AT)
-
-
-class _Jump(NamedTuple):
-    """Inputs before and after, in a state; at samples also all others that are known, one after the other."""
-
-    state: State
-    before: np.ndarray
-    after: np.ndarray
-    commands: np.ndarray = np.zeros((0, 0))
-    apart: float = 0.0
-
-    def size(self, i: int) -> float:
-        return float(abs(self.after[i] - self.before[i]))
-
-    def train(self, i: int) -> Train:
-        sizes = np.diff(self.commands[:, i]) / self.size(i) if self.apart else np.zeros(0)
-        return Train(tuple(sizes.tolist()), self.apart)
-
-
-def _jumps(run: Run, journey: Journey) -> Iterator[_Jump]:
-    """Where inputs jump: at breaks of a continuous law, as far as they are known, and at samples."""
-    feed, track = journey.plan.feed, run.track
-    if feed.controller is None or not track.stretches:
-        return
-    if feed.continuous:
-        beside = _BESIDE * journey.point.state.t
-        inner = [b for b in (*feed.breaks, *feed.met) if track.starts[0] + beside < b < journey.point.state.t - beside]
-        with suppress(ControllerError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
-            for b in sorted(set(inner))[:_MOST]:
-                state, before = track.state(b - beside)
-                yield _Jump(state.with_(t=b), before, track.state(b + beside)[1])
-        return
-    samples, u = _commands(run, journey)
-    leaps = np.abs(np.diff(u, axis=0))
-    for row in np.unique(1 + np.argmax(leaps, axis=0)).tolist() if leaps.any() else []:
-        state = track.state(float(samples[row] * feed.sample_time))[0]
-        yield _Jump(state, u[row - 1], u[row], u, feed.sample_time)
-
-
-def _commands(run: Run, journey: Journey) -> tuple[np.ndarray, np.ndarray]:
-    """The inputs after samples that follow each other, and the numbers of these: where rows show most of them move."""
-    feed, track = journey.plan.feed, run.track
-    first = math.ceil(track.starts[0] / feed.sample_time - _LITTLE)
-    last = math.ceil(run.final.t / feed.sample_time - _LITTLE)
-    leaps = np.abs(np.diff(run.u, axis=0))
-    way = np.ptp(run.u, axis=0)
-    if last - first > _WATCHED and len(leaps):
-        row = int(np.argmax((leaps / np.where(way > 0.0, way, 1.0)).max(axis=1)))
-        first = min(max(first, int(run.t[row] / feed.sample_time) - _WATCHED // 4), last - _WATCHED)
-    middles = (np.arange(first, min(last, first + _WATCHED)) + 0.5) * feed.sample_time
-    middles = middles[middles < run.final.t]
-    rows = np.searchsorted(run.t, middles) - 1
-    if (rows >= 0).all() and (middles - run.t[rows] < (0.5 + _LITTLE) * feed.sample_time).all():
-        held = run.u[rows]
-    else:
-        held = np.array([track.state(t)[1] for t in middles.tolist()]).reshape(-1, run.u.shape[1])
-    return np.rint(middles / feed.sample_time - 0.5).astype(int), held

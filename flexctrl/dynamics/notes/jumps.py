@@ -1,0 +1,138 @@
+"""Where inputs jump, and what jumps that follow each other by the clock add up to."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from flexctrl.dynamics.run import Run
+from flexctrl.errors import ControllerError
+from flexctrl.model.state import State
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["Jump", "Train", "input_jumps"]
+
+_ABOUT = 0.98, 0.99, 1.0, 1.01, 1.02
+"""Frequencies of vibrations, over what they are found as if all else let go."""
+_MOST, _BESIDE, _WATCHED = 16, 1e-9, 1024
+"""Breaks of a law that are looked at, and how far on either side, in parts of the run; samples that are."""
+_LITTLE = 1e-6
+
+
+class Train(NamedTuple):
+    """Shocks that follow each other by the clock.
+
+    Attributes
+    ----------
+    sizes : tuple of float
+        Each over the largest; a single one has none beside it.
+    apart : float
+        Time from one to the next [s].
+    """
+
+    sizes: tuple[float, ...] = ()
+    apart: float = 0.0
+
+    def gain(self, frequency: float, decay: float) -> float:
+        """Return how far they make something ring, over what the largest does: A ← A exp((iω − δ) T) + their size.
+
+        Whole turns between samples add all of them up. So that counts of frequencies within a fiftieth.
+        """
+        if len(self.sizes) < 2:
+            return 1.0
+        turns = (complex(-decay, share * frequency) * self.apart for share in _ABOUT)
+        return max(1.0, *(self._largest(cmath.exp(turn)) for turn in turns))
+
+    def _largest(self, turn: complex) -> float:
+        ringing, most = 0j, 0.0
+        for size in self.sizes:
+            ringing = ringing * turn + size
+            most = max(most, abs(ringing))
+        return most
+
+
+class Jump(NamedTuple):
+    """Inputs before and after, in a state; at samples also all others that are known, one after the other.
+
+    Attributes
+    ----------
+    state : State
+    before, after : numpy.ndarray, shape (inputs,)
+    commands : numpy.ndarray, shape (samples, inputs)
+        After samples that follow each other; none at breaks.
+    apart : float
+        Time from sample to sample [s].
+    """
+
+    state: State
+    before: np.ndarray
+    after: np.ndarray
+    commands: np.ndarray = np.zeros((0, 0))
+    apart: float = 0.0
+
+    def size(self, i: int) -> float:
+        """Return by how much an input jumps."""
+        return float(abs(self.after[i] - self.before[i]))
+
+    def train(self, i: int) -> Train:
+        """Return all jumps of an input at samples, over this one."""
+        sizes = np.diff(self.commands[:, i]) / self.size(i) if self.apart else np.zeros(0)
+        return Train(tuple(sizes.tolist()), self.apart)
+
+
+def input_jumps(run: Run, journey: Journey) -> Iterator[Jump]:
+    """Return where inputs jump: at breaks of a continuous law, as far as they are known, and at samples.
+
+    Parameters
+    ----------
+    run : Run
+    journey : Journey
+        How it went.
+
+    Returns
+    -------
+    iterator of Jump
+    """
+    feed, track = journey.plan.feed, run.track
+    if feed.controller is None or not track.stretches:
+        return
+    if feed.continuous:
+        beside = _BESIDE * journey.point.state.t
+        inner = [b for b in (*feed.breaks, *feed.met) if track.starts[0] + beside < b < journey.point.state.t - beside]
+        with suppress(ControllerError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
+            for b in sorted(set(inner))[:_MOST]:
+                state, before = track.state(b - beside)
+                yield Jump(state.with_(t=b), before, track.state(b + beside)[1])
+        return
+    samples, u = _commands(run, journey)
+    leaps = np.abs(np.diff(u, axis=0))
+    for row in np.unique(1 + np.argmax(leaps, axis=0)).tolist() if leaps.any() else []:
+        state = track.state(float(samples[row] * feed.sample_time))[0]
+        yield Jump(state, u[row - 1], u[row], u, feed.sample_time)
+
+
+def _commands(run: Run, journey: Journey) -> tuple[np.ndarray, np.ndarray]:
+    """The inputs after samples that follow each other, and the numbers of these: where rows show most of them move."""
+    feed, track = journey.plan.feed, run.track
+    first = math.ceil(track.starts[0] / feed.sample_time - _LITTLE)
+    last = math.ceil(run.final.t / feed.sample_time - _LITTLE)
+    leaps = np.abs(np.diff(run.u, axis=0))
+    way = np.ptp(run.u, axis=0)
+    if last - first > _WATCHED and len(leaps):
+        row = int(np.argmax((leaps / np.where(way > 0.0, way, 1.0)).max(axis=1)))
+        first = min(max(first, int(run.t[row] / feed.sample_time) - _WATCHED // 4), last - _WATCHED)
+    middles = (np.arange(first, min(last, first + _WATCHED)) + 0.5) * feed.sample_time
+    middles = middles[middles < run.final.t]
+    rows = np.searchsorted(run.t, middles) - 1
+    if (rows >= 0).all() and (middles - run.t[rows] < (0.5 + _LITTLE) * feed.sample_time).all():
+        held = run.u[rows]
+    else:
+        held = np.array([track.state(t)[1] for t in middles.tolist()]).reshape(-1, run.u.shape[1])
+    return np.rint(middles / feed.sample_time - 0.5).astype(int), held
