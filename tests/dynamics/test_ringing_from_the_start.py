@@ -125,3 +125,53 @@ def test_runs_of_an_extrapolation_that_part_in_phase(tolerance, named):
     )  # fmt: skip
     assert any("part by" in note for note in run.report.notes) is named
     assert bool(run["tension"].max() > 300.0) is named
+
+
+def swinging(EA: float, ratio: float, effects: tuple[fc.Effect, ...] = ()) -> fc.Model:
+    """A load of 10 kg on a rope of 2 m, free to swing in a plane."""
+    load = fc.PointMass("load", (0, 0, -2), 10.0)
+    rope = fc.Rope("rope", (0, 0, 0), (0, 0, -2), EA=EA, damping=2.0 * ratio * np.sqrt(10.0 * EA / 2.0))
+    joints = [fc.Support(rope.start), fc.Pin(rope.end, load.node), fc.Support(load.node, "v")]
+    structure = fc.Structure([rope, load], joints, outputs=[fc.Tension("tension", rope)])
+    return fc.assemble(structure, [fc.Gravity(), fc.LargeRotation(), fc.Flexible(), *effects])
+
+
+def pushed(model: fc.Model, speed: float) -> fc.State:
+    """It hangs, and is given a speed."""
+    sideways = np.array([1.0 if name.endswith("_u") else 0.0 for name in model.coordinates])
+    return fc.equilibrium(model).state.with_(v=speed * sideways)
+
+
+@pytest.mark.parametrize("EA", [1e7, 1e9, 1e11])
+def test_a_load_on_a_rope_that_is_sent_off_sideways(EA):
+    """At once the rope has to bear m v²/l more: it swings about that."""
+    model = swinging(EA, 0.003)
+    run = fc.simulate(model, until=8.0, every=0.08, start=pushed(model, 4.43))
+    assert any(note.startswith("tension rings by up to 98 from the start on") for note in run.report.notes)
+    assert run.report.output_errors["tension"] > 0.5
+
+
+def test_one_that_swings_already_goes_on_without_a_blow():
+    """A run that goes on from the state of another has nothing put on at once: its damping has ended the ring."""
+    model = swinging(1e9, 0.1)
+    first = fc.simulate(model, until=1.0, start=pushed(model, 4.43), method=fc.GeneralizedAlpha(1e-4))
+    rest = fc.simulate(model, until=2.0, start=first.final.with_(t=0.0))
+    assert not any("rings by up to" in note for note in rest.report.notes)
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e5, 1e8])
+def test_a_spring_within_its_open_play_does_not_ring(stiffness):
+    """It never closes; the other mass is on a spring of its own, and this one slows down alone: 0.02 exp(−t/2) m/s."""
+    one, two = fc.PointMass("one", (0, 0, 0), 2.0), fc.PointMass("two", (1, 0, 0), 3.0)
+    between = fc.Spring("between", one.node, two.node, stiffness=stiffness)
+    anchor = fc.Spring("anchor", (-1, 0, 0), one.node, stiffness=200.0)
+    joints = [fc.Support(one.node, "v w"), fc.Support(two.node, "v w"), fc.Support(anchor.start)]
+    joints += [fc.Pin(one.node, between.start), fc.Pin(two.node, between.end), fc.Pin(anchor.end, one.node)]
+    structure = fc.Structure([one, two, between, anchor], joints, outputs=[fc.Velocity("speed", two.node, "x")])
+    effects = [fc.LargeRotation(), fc.Backlash({"between": 0.5}), fc.ViscousFriction({"one.u": 1.0, "two.u": 1.5})]
+    model = fc.assemble(structure, effects)
+    v = np.array([0.5 if name.startswith("one") else 0.02 for name in model.coordinates])
+    run = fc.simulate(model, until=2.0, every=0.01, start=model.rest.with_(v=v))
+    assert run["speed"] == pytest.approx(0.02 * np.exp(-0.5 * run.t), rel=1e-4)
+    assert run.report.output_errors["speed"] < 1e-3
+    assert not any("rings" in note for note in run.report.notes)

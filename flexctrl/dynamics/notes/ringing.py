@@ -17,7 +17,9 @@ from flexctrl.dynamics.notes.shocks import Shock, Swing, shocks
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import output_yardsticks
 from flexctrl.dynamics.steps import Integrator
+from flexctrl.dynamics.swift.stiff_lines import SURE
 from flexctrl.model.model import Model
+from flexctrl.structure.outputs import Tension
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -111,8 +113,9 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
         way, most = float(np.ptp(values)), float(np.abs(values).max())
         swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
         share, note, by_many = 0.0, "", False
+        last = SURE if isinstance(output, Tension) else _DUST
         for swing, shock in sorted(swings, key=lambda each: -each[0].size):
-            much, dust = max(_LITTLE * way, _STEADY * most), _DUST * yards[model.outputs.index(output.name)]
+            much, dust = max(_LITTLE * way, _STEADY * most), last * yards[model.outputs.index(output.name)]
             if not swing.size > max(_BY_MANY * much if swing.gain > 1.0 else much, dust):
                 continue
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)

@@ -17,6 +17,7 @@ from flexctrl.dynamics.notes.heavy import without_light
 from flexctrl.dynamics.notes.jumps import Jump, Train, input_jumps
 from flexctrl.dynamics.notes.outputs import Fast
 from flexctrl.dynamics.run import Run
+from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.swift.lengths import lengthening
 from flexctrl.errors import ControllerError, SingularMatrixError
 from flexctrl.frozen import frozen
@@ -35,7 +36,7 @@ __all__ = ["Shock", "Swing", "shocks"]
 _SEEDS = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
-_ROUND_OFF, _LITTLE, _SLACK = 1e-12, 1e-6, 0.1
+_ROUND_OFF, _LITTLE, _SLACK, _AHEAD, _TINY = 1e-12, 1e-6, 0.1, 1e-6, 1e-300
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
 
 
@@ -212,13 +213,17 @@ class Shock:
 
     def _lines(self) -> Iterator[_Vibration]:
         """About where forces balance: they part by s̈/ω² and by ṡ/ω."""
-        for name, arm, frequency in lengthening(self.model, self.state):
+        soon = _AHEAD / max(float((np.abs(self.moves) / yardsticks(self.model)).max(initial=0.0)), _TINY)
+        ahead = lengthening(self.model, self.model.advance(self.state, soon * self.moves, self.moves, self.state.t))
+        for (name, arm, frequency), (_, later, _) in zip(lengthening(self.model, self.state), ahead, strict=True):
             free = arm / self.mass
             along = self.contacts.still(free)
             parted = float(arm @ along)
-            if frequency and parted > 0.0 and along @ (self.stiffness @ along) > 0.0:  # it is taut
+            least = _SLACK * frequency**2 * (along @ (self.inertia @ along))
+            if frequency and parted > 0.0 and along @ (self.stiffness @ along) > least:  # it is taut
                 frequency *= np.sqrt(parted / (arm @ free))
-                speed = np.hypot(arm @ self.rates / frequency, arm @ self.moves)
+                parting = arm @ self.rates + (later - arm) @ self.moves / soon  # what passes by a line parts, too
+                speed = np.hypot(parting / frequency, arm @ self.moves)
                 yield _Vibration(name, speed / parted * along, frequency)
 
     def _motors(self) -> Iterator[_Vibration]:
