@@ -214,6 +214,10 @@ def chain_race(quick: bool) -> dict[str, object]:
     return {"rows": rows, "growth": growth(quick), "swings": [full_swing(quick)]}
 
 
+TRIES = 9
+"""Of which the fastest counts: what fits no cache of its own waits for what else the processor does, for seconds."""
+
+
 def growth(quick: bool) -> dict[str, object]:
     """Exponent of our time per step between 100 and 10,000 elements, from the difference of long and short runs."""
     found = {}
@@ -221,7 +225,7 @@ def growth(quick: bool) -> dict[str, object]:
         times, newton = {}, {}
         for n in (100, 1000) if quick else (100, 1000, LARGEST):
             short, long = (100, 400) if n > 1000 else (500, 2500)
-            tries = [[our_chain(n, angle, steps)[1:] for steps in (short, long)] for _ in range(3)]
+            tries = [[our_chain(n, angle, steps)[1:] for steps in (short, long)] for _ in range(TRIES)]
             first, both = (min(two[k][0] for two in tries) for k in (0, 1))
             times[n] = (both - first) / (long - short)
             newton[n] = (tries[0][1][1] - tries[0][0][1]) / (long - short)
