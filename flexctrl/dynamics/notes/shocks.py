@@ -36,7 +36,7 @@ __all__ = ["Shock", "Swing", "shocks"]
 _SEEDS = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
-_ROUND_OFF, _LITTLE, _SLACK, _AHEAD, _TINY = 1e-12, 1e-6, 0.1, 1e-6, 1e-300
+_ROUND_OFF, _LITTLE, _SLACK, _AHEAD = 1e-12, 1e-6, 0.1, 1e-6
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
 
 
@@ -213,7 +213,7 @@ class Shock:
 
     def _lines(self) -> Iterator[_Vibration]:
         """About where forces balance: they part by s̈/ω² and by ṡ/ω."""
-        soon = _AHEAD / max(float((np.abs(self.moves) / yardsticks(self.model)).max(initial=0.0)), _TINY)
+        soon = _AHEAD / max(float((np.abs(self.moves) / yardsticks(self.model)).max(initial=0.0)), 1.0)
         ahead = lengthening(self.model, self.model.advance(self.state, soon * self.moves, self.moves, self.state.t))
         for (name, arm, frequency), (_, later, _) in zip(lengthening(self.model, self.state), ahead, strict=True):
             free = arm / self.mass
