@@ -65,7 +65,8 @@ torsion, Exudyn's cable has none.
 {missed}
 
 Our time per step between 100 and {largest} elements grows with an exponent of {growth};
-the goal is 1.05. {told}
+the goal is 1.05. {told} The full swing of 10,000 goes through 19 MB an iteration, in a cache that
+processors share: on hosts that do other work beside it the exponent has come out at 1.03 to 1.10.
 """
 _SWING = """\
 The full swing of {elements} elements over {steps} steps, through the lowest point and the whip of the
