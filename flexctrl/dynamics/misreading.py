@@ -131,14 +131,16 @@ def _note(run: Run, other: Run, journey: Journey, off: np.ndarray) -> str:
     judged = [*seen(journey, run.y)[1], *_rates(model, journey, way)]
     apart = Apart.of(run, other, 0.5).most
     far = {i: float(apart[i] / way[i]) for i in judged}
-    worst = max(far, key=lambda i: far[i], default=0)
-    if not far or far[worst] < _PARTED:
+    parted = sorted((i for i in judged if far[i] >= _PARTED), key=lambda i: -far[i])
+    if not parted:
         return ""
+    worst, *others = parted
     names = [run.outputs[i] for i in journey.plan.feed.reads]
     most = " and ".join(f"{name} {abs(value):.1g}" for name, value in zip(names, off, strict=True) if value)
     more = "more" if off.sum() > 0.0 else "less"
     known = {"off": most, "more": more, "where": run.outputs[worst], "far": far[worst]}
-    return _HANGS.format(remedy=agreeing(journey), **known)
+    named = ", ".join(f"{run.outputs[i]} {far[i]:.2g}" for i in others)
+    return _HANGS.format(remedy=agreeing(journey), **known) + (f"; so are {named}" if named else "")
 
 
 def _rates(model: Model, journey: Journey, way: np.ndarray) -> list[int]:
