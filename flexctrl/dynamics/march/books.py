@@ -11,7 +11,7 @@ from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import ALIKE, FAR, OFTEN, absurd, borne_out, looking, missed, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import Reals, seldom
-from flexctrl.model.flat.flat import arrive, dissipate, drive, energy, keep, load, place, pull
+from flexctrl.model.flat.flat import arrive, clear, dissipate, drive, energy, keep, load, place, pull
 from flexctrl.model.gauges import read
 
 __all__ = ["accept", "copy", "draw", "drawn_now", "reach", "settle", "shelve"]
@@ -170,8 +170,7 @@ def halfway(m: March) -> float:
     drive(f)
     energy(f)
     lost = f.books[2]
-    for i in range(0, f.padded, 8):
-        put(f.step[i:], 0.0 * eight(f.v[i:]))
+    clear(f.padded, f.step)
     copy(f.padded, m.v, f.v)
     reach(m)
     copy(f.padded, f.force, f.step)

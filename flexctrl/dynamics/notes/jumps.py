@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterator
 from contextlib import suppress
@@ -40,22 +39,26 @@ class Train(NamedTuple):
     sizes: tuple[float, ...] = ()
     apart: float = 0.0
 
-    def gain(self, frequency: float, decay: float) -> float:
-        """Return how far they make something ring, over what the largest does: A ← A exp((iω − δ) T) + their size.
+    def gains(self, frequencies: np.ndarray, decays: np.ndarray) -> np.ndarray:
+        """Return how far they make things ring, over what the largest does: A ← A exp((iω − δ) T) + their size.
 
         Whole turns between samples add all of them up. So that counts of frequencies within a fiftieth.
-        """
-        if len(self.sizes) < 2:
-            return 1.0
-        turns = (complex(-decay, share * frequency) * self.apart for share in _ABOUT)
-        return max(1.0, *(self._largest(cmath.exp(turn)) for turn in turns))
 
-    def _largest(self, turn: complex) -> float:
-        ringing, most = 0j, 0.0
+        Parameters
+        ----------
+        frequencies, decays : numpy.ndarray, shape (things,)
+            ω and δ [1/s].
+
+        Returns
+        -------
+        numpy.ndarray, shape (things,)
+        """
+        turn = np.exp((1j * np.multiply.outer(_ABOUT, frequencies) - decays) * self.apart)
+        ringing, most = np.zeros(turn.shape, dtype=complex), np.ones(turn.shape)
         for size in self.sizes:
             ringing = ringing * turn + size
-            most = max(most, abs(ringing))
-        return most
+            most = np.maximum(most, np.abs(ringing))
+        return np.asarray(most.max(axis=0))
 
 
 class Jump(NamedTuple):

@@ -105,6 +105,7 @@ class _Judged(NamedTuple):
 
 
 def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iterator[_Judged]:
+    """What is to be told of each output, by the vibrations that it may ring with, largest first."""
     known, found = run.report.output_errors, list(shocks(run, journey))
     told = max(run.report.error, *(known.get(model.outputs[i], 0.0) for i in placed(model)), 0.0)
     yards = output_yardsticks(model, 1.0)
@@ -113,9 +114,9 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
         way, most = float(np.ptp(values)), float(np.abs(values).max())
         swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
         share, note, by_many = 0.0, "", False
-        last = SURE if isinstance(output, Tension) else _DUST
+        much = max(_LITTLE * way, _STEADY * most)
+        dust = (SURE if isinstance(output, Tension) else _DUST) * yards[model.outputs.index(output.name)]
         for swing, shock in sorted(swings, key=lambda each: -each[0].size):
-            much, dust = max(_LITTLE * way, _STEADY * most), last * yards[model.outputs.index(output.name)]
             if not swing.size > max(_BY_MANY * much if swing.gain > 1.0 else much, dust):
                 continue
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)

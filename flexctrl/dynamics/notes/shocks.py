@@ -71,11 +71,14 @@ class _Vibration(NamedTuple):
         Amplitudes of the rates of degrees of freedom.
     frequency : float
         [rad/s]
+    gain : float
+        How far shocks that follow each other make it swing, over what the largest does.
     """
 
     part: str
     rates: np.ndarray
     frequency: float
+    gain: float = 1.0
 
 
 @frozen(eq=False)
@@ -141,15 +144,13 @@ class Shock:
 
         def seen(part: _Vibration) -> Swing:
             size = np.hypot(by_place @ part.rates / part.frequency, by_rate @ part.rates)
-            swing = Swing(float(size), part.frequency, part.rates)
-            gain = self.train.gain(swing.frequency, self.decay(swing))
-            return swing._replace(size=gain * swing.size, gain=gain)
+            return Swing(part.gain * float(size), part.frequency, part.rates, part.gain)
 
         speed = isinstance(output, Velocity | AngularVelocity)
         alone = [seen(part) for part in self._vibrations if speed or part.part == _source(output)]
         return [*sorted(alone, key=lambda swing: swing.size)[-1:], *map(seen, self._modes if speed else ())]
 
-    def decay(self, swing: Swing) -> float:
+    def decay(self, swing: Swing | _Vibration) -> float:
         """Return the rate at which damping, friction, a law in time have it ring out [1/s]; 0 where they drive it."""
         rates = swing.rates
         moved = float(rates @ (self.inertia @ rates))
@@ -186,7 +187,7 @@ class Shock:
 
     @cached_property
     def _vibrations(self) -> tuple[_Vibration, ...]:
-        return (*self._lines(), *self._motors())
+        return self._followed([*self._lines(), *self._motors()])
 
     @cached_property
     def _modes(self) -> tuple[_Vibration, ...]:
@@ -201,8 +202,16 @@ class Shock:
             squares, shapes = eigh(*(0.5 * free.T @ (A + A.T) @ free for A in (own.K, own.M)))
             shapes = free @ shapes
             fast = np.flatnonzero(squares > _ROUND_OFF * squares[-1])
-            return tuple(self._mode(heavy, shapes[:, i], np.sqrt(squares[i])) for i in fast)
+            return self._followed([self._mode(heavy, shapes[:, i], np.sqrt(squares[i])) for i in fast])
         return ()
+
+    def _followed(self, parts: list[_Vibration]) -> tuple[_Vibration, ...]:
+        """What swings, with what shocks that follow this one add to it."""
+        if not (self.train.sizes and parts):
+            return tuple(parts)
+        decays = np.array([self.decay(part) for part in parts])
+        gains = self.train.gains(np.array([part.frequency for part in parts]), decays)
+        return tuple(part._replace(gain=gain) for part, gain in zip(parts, gains.tolist(), strict=True))
 
     def _mode(self, heavy: np.ndarray, shape: np.ndarray, frequency: float) -> _Vibration:
         share = self.inertia[heavy][:, heavy] @ shape
@@ -261,7 +270,7 @@ def shocks(run: Run, journey: Journey) -> Iterator[Shock]:
         for i, leap in enumerate(np.abs(jump.after - jump.before).tolist()):
             if leap > (largest[i].size(i) if i in largest else 0.0):
                 largest[i] = jump
-    for i, jump in {id(found): (i, found) for i, found in largest.items()}.values():
+    for i, jump in largest.items():  # one that is the largest of several inputs has another train for each
         since = f"t = {jump.state.t:.3g} s"
         yield Shock.of(run, journey, jump.state, [jump.before, jump.after], since, jump.train(i))
 
