@@ -235,7 +235,7 @@ def growth(quick: bool) -> dict[str, object]:
             "elements": list(times),
             "times": list(times.values()),
             "newton": list(newton.values()),
-            "bytes": bytes_an_element(1000),
+            "bytes": bytes_an_element(LARGEST),
         }
         print(f"growth, {name}: exponent {exponent:.3f}", found[name], flush=True)
     return found

@@ -22,10 +22,14 @@ from flexctrl.frozen import frozen
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 
-__all__ = ["Fronts", "Plan", "factor", "plan_of", "seat", "whose"]
+__all__ = ["NODE", "Fronts", "Plan", "factor", "plan_of", "seat", "whose"]
 
 _VANISHING = 1e-13
-_MERGED = 12
+NODE = 6
+_MERGED = 2 * NODE
+"""Unknowns of a front that small ones are joined to. Two nodes at once are quicker; one at a time takes less room."""
+_LARGE = 24_000
+"""Unknowns from which on room counts: factors of 4 MB fit no near cache."""
 
 
 @frozen(eq=False)
@@ -158,7 +162,8 @@ def plan_of(
     order = sp.csr_matrix((np.ones(len(after[0])), after), shape=(n, n))
     members, touching, group = _grouped(pattern, order)
     before = [set(found) - {i} for i, found in enumerate(_gathered(order, members, group))]
-    return _laid_out(n, n if own is None else own, _merged(*_eliminated(members, touching, before)))
+    fronts = _merged(*_eliminated(members, touching, before), NODE if n > _LARGE else _MERGED)
+    return _laid_out(n, n if own is None else own, fronts)
 
 
 def _grouped(pattern: sp.csr_matrix, order: sp.csr_matrix) -> tuple[list[np.ndarray], list[set[int]], np.ndarray]:
@@ -229,8 +234,8 @@ def _reversed(before: list[set[int]]) -> dict[int, list[int]]:
     return behind
 
 
-def _merged(order: list[np.ndarray], touched: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return (own unknowns, others) of fronts, small ones joined with the next that they touch."""
+def _merged(order: list[np.ndarray], touched: list[np.ndarray], most: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return (own unknowns, others) of fronts, small ones joined with the next that they touch, to so many."""
     holder = {int(i): k for k, own in enumerate(order) for i in own}
     when = {i: k for k, i in enumerate(int(i) for own in order for i in own)}
     own = [g.tolist() for g in order]
@@ -239,7 +244,7 @@ def _merged(order: list[np.ndarray], touched: list[np.ndarray]) -> list[tuple[np
         if not len(others):
             continue
         p = holder[min(others.tolist(), key=when.__getitem__)]
-        if len(own[c]) + len(own[p]) <= _MERGED or len(others) == len(own[p]) + len(touched[p]):
+        if len(own[c]) + len(own[p]) <= most or len(others) == len(own[p]) + len(touched[p]):
             own[p] = own[c] + own[p]
             holder |= dict.fromkeys(own[c], p)
             gone[c] = True

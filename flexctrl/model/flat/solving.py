@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from flexctrl.kernels.eights import ahead, eight, put
 from flexctrl.kernels.native import Reals, Wholes
-from flexctrl.model.flat.fronts import Fronts
+from flexctrl.model.flat.fronts import NODE, Fronts
 
 __all__ = ["solve", "solve_own"]
 
 _SOON = 144
 """Numbers until what is read backwards is fetched: two fronts of a chain. Memory does not see that coming by itself."""
+_FORTH, _BACK = 1152, 576
+"""The same of fronts of a node, in both directions: 16 of them. They are those of models that fit no near cache."""
 
 
 def solve_own(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals, wide: Reals) -> None:
@@ -37,12 +39,16 @@ def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:
         pivots = f.pivots[s]
         size = f.size[s]
         own = b[f.first[s] :]
-        forward(pivots, size, own, down[below:], work)
-        below += pivots * size
-        copy_on(pivots, work, own)
         others = f.others[f.rest[s] :]
-        for i in range(pivots, size):
-            b[others[i - pivots]] += work[i]
+        if pivots == NODE and size == 2 * NODE:
+            fetch(pivots * size, down[below + _FORTH :])
+            node_forward(own, b, others, down[below:], work)
+        else:
+            forward(pivots, size, own, down[below:], work)
+            copy_on(pivots, work, own)
+            for i in range(pivots, size):
+                b[others[i - pivots]] += work[i]
+        below += pivots * size
     right = f.right
     for s in range(f.count - 1, -1, -1):
         pivots = f.pivots[s]
@@ -50,12 +56,53 @@ def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:
         right -= pivots * rest
         own = b[f.first[s] :]
         others = f.others[f.rest[s] :]
-        if pivots >= 8 and pivots <= 16:
+        if pivots == NODE and rest == NODE:
+            fetch(pivots * rest, up[right - _BACK :])
+            node_backward(own, b, others, up[right:], work)
+        elif pivots >= 8 and pivots <= 16:
             backward_in_place(pivots, rest, b, others, up[right:], own)
         else:
             copy_on(pivots, own, work)
             backward(pivots, rest, b, others, up[right:], work)
             copy_on(pivots, work, own)
+
+
+def fetch(count: int, a: Reals) -> None:
+    """Have so many numbers brought near."""
+    for i in range(0, count, 8):
+        ahead(a[i:])
+
+
+def node_forward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) -> None:
+    """Go forward from one node to the next, in twice two sums: its loops are of known length, and none is left."""
+    one = own[0] * eight(a)
+    two = own[0] * eight(a[8:])
+    three = own[1] * eight(a[2 * NODE :])
+    four = own[1] * eight(a[2 * NODE + 8 :])
+    for k in range(2, NODE, 2):
+        column = a[2 * NODE * k :]
+        one = one + own[k] * eight(column)
+        two = two + own[k] * eight(column[8:])
+        three = three + own[k + 1] * eight(column[2 * NODE :])
+        four = four + own[k + 1] * eight(column[2 * NODE + 8 :])
+    put(work, one + three)
+    put(work[8:], two + four)
+    for i in range(NODE):
+        own[i] = work[i]
+    for i in range(NODE):
+        b[others[i]] += work[NODE + i]
+
+
+def node_backward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) -> None:
+    """Come back to a node from the next."""
+    one = b[others[0]] * eight(a)
+    two = b[others[1]] * eight(a[NODE:])
+    for j in range(2, NODE, 2):
+        one = one + b[others[j]] * eight(a[NODE * j :])
+        two = two + b[others[j + 1]] * eight(a[NODE * j + NODE :])
+    put(work, one + two)
+    for i in range(NODE):
+        own[i] -= work[i]
 
 
 def copy_on(n: int, x: Reals, y: Reals) -> None:
