@@ -11,7 +11,7 @@ import scipy.linalg as la
 import flexctrl as fc
 from flexctrl.design import MinimumJerk, pd
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.notes.sampled_growth import _answers, _loop, _missed
+from flexctrl.dynamics.notes.sampled_growth import _answers, _counts, _loop, _missed, _samples
 
 NEAR, FAR, OMEGA, ZETA = 1.79, 1.76, 83.46, 0.0057
 SAMPLE, KP, KD = 1.49 / 83.46, 46.2, 13.5
@@ -172,6 +172,6 @@ def test_growth_that_steps_see_and_limits_hold_is_no_failure(seen, lost):
         plan=SimpleNamespace(method=fc.AdaptiveAlpha()),
         mark=SimpleNamespace(steps=700),
     )
-    found = _missed(loop, journey, 0.8)
-    assert "the sampled loop is unstable" in found.said
+    found = _missed(loop, _samples(loop, journey), _counts(loop, journey), 0.8)
+    assert "the sampled loop is unstable" in found.said()
     assert found.lost is lost

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
+from flexctrl.dynamics.notes.moments import moments
 from flexctrl.errors import FlexctrlError
 
 if TYPE_CHECKING:
@@ -17,15 +19,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Manner", "answers", "jumps"]
 
-_PLACES, _HALVINGS = 17, 16
+_PLACES, _FEW, _HALVINGS = 17, 9, 16
 _JUMP = 5e-3
 """Encoders of an arm or a crane step by 1e-5 of their way; what moves a run by percents steps by a hundredth."""
 _BENT, _AT_ONCE = 0.05, 0.4
 """How much slopes change along the line, of the largest, and which share of it at one place where that is a limit."""
 _LEVEL, _OFTEN = 0.1, 8
 """How much less steep a law is where it is saturated, and how many times an input turns where a loop hunts."""
+_GROUPS, _IN_TURN, _APART = 3, 8, 16
+"""Samples on the way at which a law is asked, too: so many in turn, as some count them; fewer where there are few."""
 
-Answer = Callable[[float], np.ndarray]
+_BEFORE = 1e-6
+"""Of a sample: a law's state is the one it came with."""
+
+Answer: TypeAlias = Callable[[float], np.ndarray]
+_Told: TypeAlias = Callable[[float, np.ndarray, np.ndarray], tuple[list[float], np.ndarray]]
 
 
 class Manner(Enum):
@@ -40,7 +48,9 @@ class Manner(Enum):
 def answers(run: Run, journey: Journey, feed: Feed | None) -> Manner:
     """Tell how a sampled law answers along the line from the least to the most of all that it has read.
 
-    Where the largest change between two places does not become small as they come nearer, it is a jump.
+    Where the largest change between two places does not become small as they come nearer, it is a jump. These are
+    looked for at some samples on the way as well, as laws may go by the clock or count, and along one reading alone,
+    the others being what they were: what goes by their difference changes little where all go up together.
 
     Parameters
     ----------
@@ -57,8 +67,7 @@ def answers(run: Run, journey: Journey, feed: Feed | None) -> Manner:
     """
     if feed is None or not feed.sample_time:
         return Manner.SMOOTH
-    t, x = journey.point.state.t, journey.point.supply.x
-    return _along(run, feed, lambda y: feed.told(t, x, y))
+    return _along(run, journey, feed, feed.told, _at_samples(run, feed))
 
 
 def jumps(run: Run, journey: Journey, feed: Feed | None) -> bool:
@@ -78,20 +87,68 @@ def jumps(run: Run, journey: Journey, feed: Feed | None) -> bool:
     """
     if feed is None or not feed.reacting:
         return False
-    t, x = journey.point.state.t, journey.point.supply.x
-    return _along(run, feed, lambda y: feed.answer(t, y, x)) is Manner.ABRUPT
+
+    def told(t: float, x: np.ndarray, y: np.ndarray) -> tuple[list[float], np.ndarray]:
+        return feed.answer(t, y, x)
+
+    found = (_Asked(m.t, m.supply.x, feed.measured(m.state)) for m in moments(run, _IN_TURN))
+    return _along(run, journey, feed, told, found) is Manner.ABRUPT
 
 
-def _along(run: Run, feed: Feed, told: Callable[[np.ndarray], tuple[list[float], np.ndarray]]) -> Manner:
-    """How a law answers along that line."""
+class _Asked(NamedTuple):
+    """When a law is asked, its state then, and what it reads."""
+
+    t: float
+    x: np.ndarray
+    y: np.ndarray
+
+
+def _at_samples(run: Run, feed: Feed) -> Iterator[_Asked]:
+    """Samples on the way, as far as steps have been kept."""
+    if not run.track.stretches:
+        return
+    first, last = (math.ceil(t / feed.sample_time) for t in (run.track.starts[0], run.final.t))
+    count = min(_GROUPS * _IN_TURN, (last - first) // _APART)
+    for k in range(count):
+        group, turn = divmod(k, _IN_TURN)
+        t = (first + 1 + turn + (2 * group + 1) * (last - first) // (2 * _GROUPS)) * feed.sample_time
+        if t < run.final.t:
+            yield _Asked(t, run.track.point(t - _BEFORE * feed.sample_time)[1].x, feed.measured(run.track.state(t)[0]))
+
+
+def _along(run: Run, journey: Journey, feed: Feed, told: _Told, asked: Iterator[_Asked]) -> Manner:
+    """How a law answers along that line at the end, and whether it jumps at other times."""
     if not feed.reads.size or not len(run.y):
         return Manner.SMOOTH
-    read = run.y[:, feed.reads]
+    read, end = run.y[:, feed.reads], journey.point
     low, high = read.min(axis=0), read.max(axis=0)
+
+    def line(at: _Asked, start: np.ndarray, stop: np.ndarray) -> Answer:
+        return lambda share: np.concatenate(told(at.t, at.x, start + share * (stop - start)))
+
     try:
-        return _kind(lambda share: np.concatenate(told(low + share * (high - low))), _hunts(run.u))
+        last = line(_Asked(end.state.t, end.supply.x, read[-1]), low, high)
+        found = _kind(last, _hunts(run.u))
+        if found is Manner.ABRUPT:
+            return found
+        least = _JUMP * np.ptp([last(share) for share in np.linspace(0.0, 1.0, _FEW)], axis=0)
+        for k, at in enumerate(asked):
+            one = np.arange(len(low)) == k % len(low)
+            alone = line(at, np.where(one, low, at.y), np.where(one, high, at.y))
+            if _leaps(line(at, low, high), least) or _leaps(alone, least):
+                return Manner.ABRUPT
     except (FlexctrlError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
         return Manner.SMOOTH
+    return found
+
+
+def _leaps(answer: Answer, least: np.ndarray) -> bool:
+    """Whether there is a jump along a line, of half a percent and more than so much."""
+    places = np.linspace(0.0, 1.0, _FEW)
+    said = np.array([answer(share) for share in places])
+    changes, bound = np.abs(np.diff(said, axis=0)), np.maximum(least, _JUMP * np.ptp(said, axis=0))
+    parts = np.flatnonzero(np.ptp(said, axis=0) > least).tolist()
+    return any(_jump(answer, i, places, int(np.argmax(changes[:, i])), float(bound[i])) > bound[i] for i in parts)
 
 
 def _hunts(u: np.ndarray) -> bool:
@@ -112,11 +169,13 @@ def _kind(answer: Answer, hunts: bool = False) -> Manner:
     return Manner.LIMITED if any(_cornered(changes[:, part]) for part in moving) else Manner.SMOOTH
 
 
-def _jump(answer: Answer, part: int, places: np.ndarray, at: int) -> float:
-    """What is left of a change as the places it is between come nearer."""
+def _jump(answer: Answer, part: int, places: np.ndarray, at: int, least: float = 0.0) -> float:
+    """What is left of a change as the places it is between come nearer, or less than the least that counts."""
     low, high = places[at], places[at + 1]
     below, above = answer(low)[part], answer(high)[part]
     for _ in range(_HALVINGS):
+        if abs(above - below) < least:
+            break
         middle = 0.5 * (low + high)
         said = answer(middle)[part]
         if abs(said - below) > abs(above - said):

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.notes.fading import radius
+from flexctrl.dynamics.notes.moments import moments
 from flexctrl.dynamics.notes.sampled_loop import Answers, SampledLoop
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Controlled
@@ -23,33 +24,76 @@ if TYPE_CHECKING:
 
 __all__ = ["grows", "of_sampled_loop"]
 
-_MOST = 400
+_MOST, _FEW = 400, 60
+"""States of loops that are looked at about the start and the end; and about some moments between."""
 _GROWN, _LOST, _BOUNDED, _TURNED = 1.0, 3.0, 20.0, 0.5
 """Powers of e over the run: what steps may miss, beyond which nothing is right, and what of growth that steps see is
 held by limits that a loop about one place does not have; poles that turn together [rad]."""
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
-_HALVINGS, _ENDS = 10, 2
+_HALVINGS, _ENDS, _BETWEEN = 10, 2, 8
 _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
 _SAID = (
-    "the sampled loop is unstable, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, of which "
+    "the sampled loop is unstable{when}, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, of which "
     "steps of {step:.2g} s see e^{seen:.2g}; look at the gains and the sample time, or take steps of {finer:.1g} s "
     "at most"
 )
 
 
 class Missed(NamedTuple):
-    """What is to be said of growth that steps do not see, and whether nothing of the run is right then."""
+    """Growth over some samples that steps do not see.
 
-    said: str
-    lost: bool
+    Attributes
+    ----------
+    pole : complex
+    whole, seen, most : float
+        Powers of e: of the pole, and of what steps see of it, at the least and at the most.
+    step, finer : float
+        A step that sees least, and one that sees it [s].
+    """
+
+    pole: complex
+    whole: float
+    seen: float
+    most: float
+    step: float
+    finer: float
+
+    @property
+    def lost(self) -> bool:
+        """Whether nothing of the run is right, if this is what becomes of it."""
+        return self.whole - self.most > _LOST and self.most < _BOUNDED
+
+    def said(self, when: str = "") -> str:
+        """What is to be said."""
+        z = self.pole
+        pole = f"{z.real:.4g}" + (f" ± {abs(z.imag):.4g}i" if abs(z.imag) > 1e-9 else "")
+        told = {"whole": self.whole, "seen": max(self.seen, 0.0), "step": self.step, "finer": self.finer}
+        return _SAID.format(pole=pole, when=when, **told)
+
+
+class Counts(NamedTuple):
+    """How many steps there are in a sample: where fewest are, and in most."""
+
+    fewest: int
+    mostly: int
+    others: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, mean: float, fewer: float = 1.0) -> Counts:
+        """Return those about a mean, which has others on both sides."""
+        few, mostly, *others = (
+            max(1, k) for k in (math.floor(fewer * mean), round(mean), math.floor(mean), math.ceil(mean))
+        )
+        return cls(few, mostly, tuple(others))
 
 
 def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     """Return a run with what is to be said of a sampled loop that grows as its steps do not see.
 
     Linear about the start and about the end: where that is so at both, the run has failed; at one, or where limits must
-    have held what steps do see grow by far, a note says so.
+    have held what steps do see grow by far, a note says so. Small loops are looked at between them, too, as gains may
+    be high there alone.
 
     Parameters
     ----------
@@ -68,15 +112,15 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     if feed is None or not feed.sample_time or math.isnan(rho) or not (ended and isinstance(model, Model)):
         return run
     try:
-        found = [_missed(loop, journey, rho) for loop in _loops(journey, feed)]
+        found = [_missed(loop, _samples(loop, journey), _counts(loop, journey), rho) for loop in _loops(journey, feed)]
+        missed = [one for one in found if one and one.whole - one.seen > _GROWN]
+        between = "" if missed else _between(run, journey, feed, rho)
     except (FlexctrlError, ArithmeticError, ValueError) as error:  # beside where it was, a law may say nothing
         return _noted(run, f"whether the sampled loop grows could not be told: {error}")
-    missed = [one for one in found if one]
-    if not missed:
-        return run
     if len(missed) == _ENDS and all(one.lost for one in missed):
-        return replace(run, status=Status.FAILED, report=replace(run.report, message=missed[-1].said))
-    return _noted(run, missed[0].said)
+        return replace(run, status=Status.FAILED, report=replace(run.report, message=missed[-1].said()))
+    said = missed[0].said() if missed else between
+    return _noted(run, said) if said else run
 
 
 def grows(journey: Journey, feed: Feed | None) -> bool:
@@ -112,12 +156,17 @@ def _loops(journey: Journey, feed: Feed) -> Iterator[SampledLoop]:
     law, end = feed.controller, journey.point
     assert law is not None
     for state, x in ((journey.origin.state, np.asarray(law.initial(), dtype=float)), (end.state, end.supply.x)):
-        model = journey.plan.model
-        if not feed.reads.size or 2 * model.n + x.size > _MOST or model.switches.sticks(state):
-            continue
-        answers = _answers(feed, state, x)
-        if answers is not None:
-            yield _loop(feed, state, end.supply.u, answers)
+        yield from _loop_at(feed, state, x, end.supply.u)
+
+
+def _loop_at(feed: Feed, state: State, x: np.ndarray, u: np.ndarray, most: int = _MOST) -> Iterator[SampledLoop]:
+    """The loop about a state, if it is no larger than that, and neither sticks nor answers by jumps."""
+    model = feed.model
+    if not feed.reads.size or 2 * model.n + x.size > most or model.switches.sticks(state):
+        return
+    answers = _answers(feed, state, x)
+    if answers is not None:
+        yield _loop(feed, state, u, answers)
 
 
 def _loop(feed: Feed, state: State, u: np.ndarray, law: Answers) -> SampledLoop:
@@ -151,28 +200,57 @@ def _answers(feed: Feed, state: State, x: np.ndarray) -> Answers | None:
     return Answers(near[:m, :k], near[:m, k:], near[m:, :k], near[m:, k:])
 
 
-def _missed(loop: SampledLoop, journey: Journey, rho: float) -> Missed | None:
-    """What is to be said of the pole whose growth over the run its steps miss most; None if they see it."""
-    span = journey.point.state.t - journey.origin.state.t
-    samples = span / loop.sample
-    growing = loop.poles(math.exp(_GROWN / max(samples, 1.0)))
+def _samples(loop: SampledLoop, journey: Journey) -> float:
+    return float((journey.point.state.t - journey.origin.state.t) / loop.sample)
+
+
+def _counts(loop: SampledLoop, journey: Journey) -> Counts:
+    """How many steps there are in a sample: about as many as on average, and fewer where little moves."""
+    mean = journey.mark.steps / _samples(loop, journey)
+    if not isinstance(journey.plan.method.pace, Controlled):
+        return Counts(*2 * (max(1, round(mean)),))
+    return Counts.of(mean, _UNEVEN)
+
+
+def _between(run: Run, journey: Journey, feed: Feed, rho: float) -> str:
+    """What is to be said of growth in the midst of a run, summed up over its parts; empty if steps see it."""
+    found: list[tuple[float, Missed]] = []
+    for t, step, state, supply in moments(run, _BETWEEN):
+        for loop in _loop_at(feed, state, supply.x, supply.u, _FEW):
+            some = _missed(loop, _samples(loop, journey) / _BETWEEN, Counts.of(loop.sample / step), rho)
+            found += [(t, some)] if some else []
+    if not found:
+        return ""
+    whole, seen = (sum(part) for part in zip(*((one.whole, one.seen) for _, one in found), strict=True))
+    if whole - seen <= _GROWN:
+        return ""
+    times = [t for t, _ in found]
+    worst = max((one for _, one in found), key=lambda one: one.whole - one.seen)
+    return worst._replace(whole=whole, seen=seen).said(f" from about t = {min(times):.3g} s to {max(times):.3g} s")
+
+
+def _missed(loop: SampledLoop, samples: float, counts: Counts, rho: float) -> Missed | None:
+    """The pole whose growth over some samples its steps miss most; None if none grows."""
+    growing = loop.poles(1.0 + 1e-9)
     if not growing.size:
         return None
-    fewer = _UNEVEN if isinstance(journey.plan.method.pace, Controlled) else 1.0
-    count = max(1, math.floor(fewer * loop.sample * journey.mark.steps / span * (1.0 + 1e-6)))
-    stepped = loop.stepped(rho, count, 1.0)
-    worst = max(growing, key=lambda z: math.log(abs(z)) - _grows(stepped, z))
-    whole, seen = (samples * pace for pace in (math.log(abs(worst)), _grows(stepped, worst)))
-    if whole - seen <= _GROWN:
-        return None
-    fine = next(
-        (k for k in range(1, _HALVINGS) if _near(loop.stepped(rho, count << k, 1.0), worst, samples)), _HALVINGS
+    stepped = {count: loop.stepped(rho, count, 1.0) for count in {counts.fewest, counts.mostly, *counts.others}}
+
+    def seen(z: complex) -> dict[int, float]:
+        return {count: _grows(poles, z) for count, poles in stepped.items()}
+
+    worst = max(growing, key=lambda z: math.log(abs(z)) - min(seen(z).values()))
+    found, few = seen(worst), counts.fewest
+    least = min(found, key=found.__getitem__)
+    fine = next((k for k in range(1, _HALVINGS) if _near(loop.stepped(rho, few << k, 1.0), worst, samples)), _HALVINGS)
+    return Missed(
+        pole=complex(worst),
+        whole=samples * math.log(abs(worst)),
+        seen=samples * found[least],
+        most=samples * found[counts.mostly],
+        step=loop.sample / least,
+        finer=loop.sample / (few << fine),
     )
-    pole = f"{worst.real:.4g}" + (f" ± {abs(worst.imag):.4g}i" if abs(worst.imag) > 1e-9 else "")
-    said = _SAID.format(
-        pole=pole, whole=whole, step=loop.sample / count, seen=max(seen, 0.0), finer=loop.sample / (count << fine)
-    )
-    return Missed(said, whole - seen > _LOST and seen < _BOUNDED)
 
 
 def _grows(stepped: np.ndarray, pole: complex) -> float:

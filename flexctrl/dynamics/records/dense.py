@@ -211,6 +211,10 @@ class Track:
         """The tensions among the outputs."""
         return Tensions(self.feed.model)
 
+    def point(self, t: float) -> tuple[State, Supply]:
+        """Return the state at a time, and the inputs that the step there set out under."""
+        return self.state(t)[0], self._ends(t)[0].supply
+
     def moment(self, t: float) -> tuple[State, np.ndarray, np.ndarray]:
         """Return the state, the outputs and the inputs at a time."""
         state, u, interval = self._found(t)
