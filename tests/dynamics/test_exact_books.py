@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.design import pd
+from flexctrl.design import Table, pd
 
 
 def cantilever() -> fc.Model:
@@ -61,3 +61,34 @@ def test_losses_are_the_integral_of_their_power():
     coarse = fc.simulate(model, until=3.0, start=start, method=fc.Exact(1.5))
     fine = fc.simulate(model, until=3.0, start=start, method=fc.Exact(1e-3))
     assert coarse.report.energy.dissipated == pytest.approx(0.5 * np.trapezoid(fine["v"] ** 2, fine.t), rel=1e-5)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.5, 1.0])
+def test_ramps(step):
+    """Nothing is damped, so the work is the energy at the end; a quadrature told 20 and −69 times that."""
+    spring = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=2e3)
+    mass = fc.PointMass("mass", spring.end, 1.0)
+    joints = [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")]
+    structure = fc.Structure([spring, mass], joints, inputs=[fc.Force("push", mass.node, "x")])
+    law = fc.OpenLoop({"push": Table(np.arange(0.0, 13.0, 0.7), 30.0 * np.random.default_rng(1).normal(size=19))})
+    run = fc.simulate(fc.assemble(structure, []), law, until=12.0, method=fc.Exact(step))
+    energy = run.report.energy
+    assert energy.work == pytest.approx(energy.kinetic + energy.stored, rel=1e-9)
+    assert run.report.energy_residual < 1e-11
+
+
+def test_work_under_a_ramp_is_that_by_hand():
+    """A force f t on m ẍ + c ẋ = f t from rest: ∫ f t v dt with v = f (t − τ (1 − e^(−t/τ))) τ / m, τ = m/c."""
+    m, c, f, T = 2.0, 3.0, 5.0, 4.0
+    mass, ground = (
+        fc.PointMass("mass", (0, 0, 0), m),
+        fc.Spring("drag", (-1, 0, 0), (0, 0, 0), stiffness=0.0, damping=c),
+    )
+    joints = [fc.Support(ground.start), fc.Pin(ground.end, mass.node), fc.Support(mass.node, "v w")]
+    model = fc.assemble(fc.Structure([mass, ground], joints, inputs=[fc.Force("push", mass.node, "x")]), [])
+    run = fc.simulate(model, fc.OpenLoop({"push": Table([0.0, T], [0.0, f * T])}), until=T, method=fc.Exact(T))
+    tau = m / c
+    decayed = tau**2 - (tau * T + tau**2) * np.exp(-T / tau)
+    work = f**2 * tau / m * (T**3 / 3.0 - tau * (T**2 / 2.0 - decayed))
+    assert run.report.energy.work == pytest.approx(work, rel=1e-9)
+    assert run.report.energy_residual < 1e-11

@@ -336,10 +336,7 @@ class _Curve:
         h = self.after.state.t - self.before.state.t
         return self.stepper.at(self.before, self.after.course, (t - self.before.state.t) / h, h)
 
-    def turned_over(self) -> tuple[float, float] | None:
-        """Return work of the inputs and losses over the step where the equations' own inputs are held."""
-        course = self.after.course
-        if course[1:].any() or (self.stepper.feed.continuous and not self.stepper.closed):
-            return None
-        w = self.stepper.forcing(self.before.supply.u)
-        return self.stepper.turnover.over(self.before.modal, w, self.after.state.t - self.before.state.t)
+    def turned_over(self) -> tuple[float, float]:
+        """Return work of the inputs and losses over the step."""
+        h = self.after.state.t - self.before.state.t
+        return self.stepper.turnover.over(self.before.modal, self.after.course, h)

@@ -190,9 +190,10 @@ class Books:
 
     def _integrate(self, before: Point, after: Point, curve: Curve) -> None:
         """Integrate the powers over a step by Lobatto's rule with five points, where the method knows no better."""
-        if isinstance(curve, Booked) and (known := curve.turned_over()) is not None:
-            self.sums.work += known[0]
-            self.sums.lost += known[1]
+        if isinstance(curve, Booked):
+            work, lost = curve.turned_over()
+            self.sums.work += work
+            self.sums.lost += lost
             return
         t, h = before.state.t, after.state.t - before.state.t
         first, last = self._powers(before.state, before.supply.u), self._powers(after.state, after.supply.u)

@@ -92,8 +92,8 @@ class Hermite:
 class Booked(Protocol):
     """A curve that knows what was turned over on it."""
 
-    def turned_over(self) -> tuple[float, float] | None:
-        """Return the work of the inputs and what was dissipated [J]; None where that is to be integrated."""
+    def turned_over(self) -> tuple[float, float]:
+        """Return the work of the inputs and what was dissipated [J]."""
 
 
 def curves_of(model: Plant, stepper: Stepper[Any]) -> Callable[[Point, Point], Curve]:
