@@ -59,7 +59,7 @@ class OutputErrors(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def told_from(journey: Journey) -> np.ndarray:
+def told_from(journey: Journey, faint: float = 1.0) -> np.ndarray:
     """Return what forces and rates have to go through to be told of, shape (outputs,).
 
     That is what absolute tolerances leave of them; of a tension what the last corrections of steps do: stiff lines
@@ -68,6 +68,8 @@ def told_from(journey: Journey) -> np.ndarray:
     Parameters
     ----------
     journey : Journey
+    faint : float
+        Share of that from which rates are told of, by runs that show them alike.
 
     Returns
     -------
@@ -76,7 +78,7 @@ def told_from(journey: Journey) -> np.ndarray:
     model, absolute = journey.plan.model, journey.plan.tolerance.negligible
     assert isinstance(model, Model)
     tense = np.array([isinstance(output, Tension) for output in model.structure.outputs], dtype=bool)
-    return np.where(tense, min(SURE, absolute), absolute) * output_yardsticks(model, journey.mark.size)
+    return np.where(tense, min(SURE, absolute), faint * absolute) * output_yardsticks(model, journey.mark.size)
 
 
 def placed(model: Model) -> list[int]:
@@ -107,13 +109,27 @@ def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:
     if not (isinstance(model, Model) and late.size and len(y) > 2):
         return OutputErrors({})
     sight = reach(journey)
-    off = sight @ late
     way, judged = _seen(journey, y, sight)
+    off = np.fmin(sight @ late, _alike(model, sight, late, journey.books.sums.moved) * way)
     if isinstance(journey.judging, Parting):
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.fmax(off, _LEFT * (sight @ journey.judging.parted) ** 2 / way)
     shares = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in judged}
     return OutputErrors(shares, _notes(journey, y, shares, journey.drift.share, _BY_SUMS))
+
+
+def _alike(model: Model, sight: sp.csr_matrix, late: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Return by what share outputs that are differences may be off; infinity for all others.
+
+    What is late in both places is late in what they are apart by: as large a share of it as of either. What else steps
+    do to it another run tells.
+    """
+    share = np.divide(late, moved, out=np.zeros_like(late), where=moved > 0.0)
+    found = np.full(sight.shape[0], np.inf)
+    for i in placed(model):
+        if getattr(model.structure.outputs[i], "minus", None) is not None:
+            found[i] = share[sight[i].indices].max(initial=0.0)
+    return found
 
 
 def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float, kind: str) -> OutputErrors:

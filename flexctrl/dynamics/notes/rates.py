@@ -28,8 +28,8 @@ __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "sa
 _POINTS, _NEAR = 4, 1e-9
 _STEEP, _MOST, _JUMP, _SHARED = 0.1, 8, 0.01, 0.3
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
-_LITTLE, _DUST = 1e-3, 1e-6
-"""What is told, of its largest value; of what is noted a larger share."""
+_LITTLE, _DUST, _FAINT = 1e-3, 1e-6, 1e-2
+"""What is told, of its largest value; of what is noted a larger share. What is told is fainter than what is noted."""
 _ALIKE = 0.97
 """A coarser run in more of the steps is the same run: samples may round steps of any length to one."""
 _LEAST = 0.5
@@ -218,8 +218,7 @@ def _judged(run: Run, journey: Journey, little: float) -> dict[int, float]:
     if not isinstance(model, Model) or len(run.y) < _POINTS:
         return {}
     way, most = ways(journey, run.y), np.abs(run.y).max(axis=0)
-    needed = told_from(journey)
-    counts = (most if little < _LITTLE else way) > needed
+    counts = most > told_from(journey, _FAINT) if little < _LITTLE else way > told_from(journey)
     return {i: float(way[i]) for i in fast(model) if counts[i] and np.inf > way[i] > little * most[i]}
 
 

@@ -26,9 +26,9 @@ __all__ = ["grows", "of_sampled_loop"]
 
 _MOST, _FEW = 400, 60
 """States of loops that are looked at about the start and the end; and about some moments between."""
-_GROWN, _LOST, _BOUNDED, _TURNED = 1.0, 3.0, 20.0, 0.5
-"""Powers of e over the run: what steps may miss, beyond which nothing is right, and what of growth that steps see is
-held by limits that a loop about one place does not have; poles that turn together [rad]."""
+_GROWN, _PARTLY, _LOST, _BOUNDED, _TURNED = 1.0, 0.5, 3.0, 20.0, 0.5
+"""Powers of e: what steps may miss over the run, and over a part of it; beyond which nothing is right; and what of
+growth that steps see is held by limits that a loop about one place does not have; poles that turn together [rad]."""
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
 _HALVINGS, _ENDS, _BETWEEN = 10, 2, 8
 _UNEVEN = 0.5
@@ -222,7 +222,7 @@ def _between(run: Run, journey: Journey, feed: Feed, rho: float) -> str:
     if not found:
         return ""
     whole, seen = (sum(part) for part in zip(*((one.whole, one.seen) for _, one in found), strict=True))
-    if whole - seen <= _GROWN:
+    if whole - seen <= _PARTLY:
         return ""
     times = [t for t, _ in found]
     worst = max((one for _, one in found), key=lambda one: one.whole - one.seen)
