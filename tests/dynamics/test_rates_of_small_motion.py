@@ -184,3 +184,21 @@ def test_bristles_after_samples_do_not_hide_what_rings_between_them(rubbing, bri
     off = np.abs(run["pull"] - true["pull"]).max() / np.ptp(true["pull"])
     assert off > 0.05
     assert 0.8 * off < run.report.output_errors["pull"] < 2.0 * off
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1])
+def test_exact_motion_is_told_alike_whatever_it_is_of(step):
+    """A model in small motion and its linear model: rows are exact in both, and nothing rings unseen between them."""
+    spring = fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=2e3, damping=1.0)
+    mass = fc.PointMass("mass", spring.end, 1.0)
+    joints = [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")]
+    outputs = [fc.Velocity("v", mass.node, "x"), fc.Tension("pull", spring)]
+    plan = fc.Structure([mass, spring], joints, inputs=[fc.Force("push", mass.node, "x")], outputs=outputs)
+    model = fc.assemble(plan, [])
+    runs = [
+        fc.simulate(m, inputs={"push": 20.0}, until=3.0, method=fc.Exact(step)) for m in (model, fc.linearize(model))
+    ]
+    for run in runs:
+        assert not run.report.notes
+        assert not run.report.output_errors
+    assert np.abs(runs[0].y - runs[1].y).max() < 1e-9

@@ -74,7 +74,7 @@ def ringing(run: Run, journey: Journey) -> Run:
     Run
     """
     model = journey.plan.model
-    if not (isinstance(model, Model) and len(run.y)):
+    if not (isinstance(model, Model) and len(run.y)) or journey.judging is None:  # or it is solved exactly
         return run
     asked = [o for o in model.structure.outputs if isinstance(o, Fast) and not is_named(o.name, run.report.notes)]
     judged = list(_judged(run, journey, model, asked)) if asked else []
@@ -179,6 +179,8 @@ def _told(method: Integrator, swing: Swing, of: _Ringing) -> tuple[float, str]:
     said = {"name": of.name, "swing": swing.size, "since": of.since}
     if turned > (_SEEN_BY_MANY if math.isnan(radius(method)) else _SEEN):
         return swing.size, _SAID.format(**said, turned=turned, finer=_RESOLVED / swing.frequency)
+    if swing.handed_on:
+        return 0.0, ""
     if isinstance(method, Richardson):
         lag = 0.75 * angle * turned**2 / 12.0
         note = _PARTED.format(**said, lag=lag, finer=of.step * np.sqrt(0.1 * _LAG / lag)) if lag > _LAG else ""

@@ -38,6 +38,8 @@ _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
 _ROUND_OFF, _LITTLE, _SLACK, _AHEAD = 1e-12, 1e-6, 0.1, 1e-6
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
+_DIRECT = 10.0
+"""How much larger than by itself a line rings with a mode that is looked at."""
 
 
 class Swing(NamedTuple):
@@ -52,12 +54,15 @@ class Swing(NamedTuple):
         Amplitudes of the rates of degrees of freedom.
     gain : float
         How far shocks that follow each other make it swing, over what the largest does.
+    handed_on : bool
+        Whether it is a line that other parts pull: runs beside know of it, unless no step sees it.
     """
 
     size: float
     frequency: float
     rates: np.ndarray
     gain: float = 1.0
+    handed_on: bool = False
 
 
 class _Vibration(NamedTuple):
@@ -139,7 +144,10 @@ class Shock:
         return self.contacts.state
 
     def swings(self, output: Fast) -> list[Swing]:
-        """What becomes of an output: the most that one line or motor makes of it, and what modes make of a speed."""
+        """What becomes of an output: the most that one line or motor makes of it, and what modes make of it.
+
+        These are looked at for speeds, and for lines that are not hit themselves.
+        """
         by_place, by_rate = (part[self.model.outputs.index(output.name)].toarray().ravel() for part in self._sights)
 
         def seen(part: _Vibration) -> Swing:
@@ -148,7 +156,13 @@ class Shock:
 
         speed = isinstance(output, Velocity | AngularVelocity)
         alone = [seen(part) for part in self._vibrations if speed or part.part == _source(output)]
-        return [*sorted(alone, key=lambda swing: swing.size)[-1:], *map(seen, self._modes if speed else ())]
+        most = sorted(alone, key=lambda swing: swing.size)[-1:]
+        if isinstance(output, Tension):
+            if self.moves.any():  # what goes round a corner pulls its line, and rings with nothing
+                return most
+            handed = [seen(part)._replace(handed_on=True) for part in self._modes]
+            return [*most, *(swing for swing in handed if swing.size > _DIRECT * sum(each.size for each in most))]
+        return [*most, *map(seen, self._modes if speed else ())]
 
     def decay(self, swing: Swing | _Vibration) -> float:
         """Return the rate at which damping, friction, a law in time have it ring out [1/s]; 0 where they drive it."""
