@@ -90,7 +90,7 @@ def enter(m: March) -> None:
         for i in range(0, f.padded, 8):
             work = work + 0.5 * (eight(m.pulled[i:]) + eight(f.force[i:])) * eight(f.step[i:])
             put(m.pulled[i:], eight(f.force[i:]))
-    else:
+    elif f.unit_loads > 0:
         for i in range(0, f.padded, 8):
             work = work + eight(f.load[i:]) * eight(f.step[i:])
     m.gained += total(work)
