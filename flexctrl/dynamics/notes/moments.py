@@ -11,7 +11,7 @@ from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.run import Run
 from flexctrl.model.state import State
 
-__all__ = ["Moment", "moments"]
+__all__ = ["Moment", "moments", "step_about"]
 
 _AROUND = 5
 
@@ -21,19 +21,16 @@ class Moment(NamedTuple):
 
     Attributes
     ----------
-    t : float
-        [s]
-    step : float
-        Mean length of the steps about it [s].
     state : State
     supply : Supply
         In force then.
+    part : float
+        How long a time this one stands for [s].
     """
 
-    t: float
-    step: float
     state: State
     supply: Supply
+    part: float
 
 
 def moments(run: Run, count: int) -> Iterator[Moment]:
@@ -49,11 +46,23 @@ def moments(run: Run, count: int) -> Iterator[Moment]:
     Moment
     """
     track, end = run.track, run.final.t
-    if not track.stretches or not end > track.starts[0]:
-        return
-    part = (end - track.starts[0]) / count
-    for i in range(count):
-        first = track.starts[0] + i * part
-        around = first + part * (np.arange(_AROUND) + 0.5) / _AROUND
-        middle = float(around[_AROUND // 2])
-        yield Moment(middle, float(np.mean([track.step(t) for t in around.tolist()])), *track.point(middle))
+    if track.stretches and end > track.starts[0]:
+        part = (end - track.starts[0]) / count
+        for i in range(count):
+            yield Moment(*track.point(track.starts[0] + (i + 0.5) * part), part)
+
+
+def step_about(run: Run, moment: Moment) -> float:
+    """Return the mean length of steps about a moment [s].
+
+    Parameters
+    ----------
+    run : Run
+    moment : Moment
+
+    Returns
+    -------
+    float
+    """
+    shares = (np.arange(_AROUND) + 0.5) / _AROUND - 0.5
+    return float(np.mean([run.track.step(t) for t in (moment.state.t + moment.part * shares).tolist()]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.notes.fading import radius
-from flexctrl.dynamics.notes.moments import moments
+from flexctrl.dynamics.notes.moments import moments, step_about
 from flexctrl.dynamics.notes.sampled_loop import Answers, SampledLoop
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Controlled
@@ -31,6 +31,7 @@ _GROWN, _PARTLY, _LOST, _BOUNDED, _TURNED = 1.0, 0.5, 3.0, 20.0, 0.5
 growth that steps see is held by limits that a loop about one place does not have; poles that turn together [rad]."""
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
 _HALVINGS, _ENDS, _BETWEEN = 10, 2, 8
+_GROWING = 1.0 + 1e-9
 _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
 _SAID = (
@@ -215,10 +216,13 @@ def _counts(loop: SampledLoop, journey: Journey) -> Counts:
 def _between(run: Run, journey: Journey, feed: Feed, rho: float) -> str:
     """What is to be said of growth in the midst of a run, summed up over its parts; empty if steps see it."""
     found: list[tuple[float, Missed]] = []
-    for t, step, state, supply in moments(run, _BETWEEN):
+    for moment in moments(run, _BETWEEN):
+        state, supply = moment.state, moment.supply
         for loop in _loop_at(feed, state, supply.x, supply.u, _FEW):
-            some = _missed(loop, _samples(loop, journey) / _BETWEEN, Counts.of(loop.sample / step), rho)
-            found += [(t, some)] if some else []
+            if loop.poles(_GROWING).size:
+                counts = Counts.of(loop.sample / step_about(run, moment))
+                some = _missed(loop, _samples(loop, journey) / _BETWEEN, counts, rho)
+                found += [(state.t, some)] if some else []
     if not found:
         return ""
     whole, seen = (sum(part) for part in zip(*((one.whole, one.seen) for _, one in found), strict=True))
@@ -231,7 +235,7 @@ def _between(run: Run, journey: Journey, feed: Feed, rho: float) -> str:
 
 def _missed(loop: SampledLoop, samples: float, counts: Counts, rho: float) -> Missed | None:
     """The pole whose growth over some samples its steps miss most; None if none grows."""
-    growing = loop.poles(1.0 + 1e-9)
+    growing = loop.poles(_GROWING)
     if not growing.size:
         return None
     stepped = {count: loop.stepped(rho, count, 1.0) for count in {counts.fewest, counts.mostly, *counts.others}}
