@@ -137,7 +137,7 @@ class Forces:
             levels = [self._blocks(z, level, gusts) for level in LEVELS]
             if excess is not None:
                 levels[0] += excess.blocks
-            return sp.csr_matrix(self.unfolded.slope(z, v, a, seeds, acting, [blocks, *levels], self.pattern))
+            return self.unfolded.slope(z, v, a, seeds, acting, [blocks, *levels], self.pattern)
         slope = self._led(state, v, a, seeds, z, blocks, gusts)
         if seeds[0] != 0.0:
             slope = slope + seeds[0] * self.motion.stiffening(state, acting)

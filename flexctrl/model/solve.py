@@ -16,6 +16,8 @@ from flexctrl.frozen import frozen
 Solve = Callable[[np.ndarray], np.ndarray]
 
 _DENSE_UP_TO = 40
+_ROOM = 2e7
+"""Numbers that a band may take: those of large trees are wide, as branches lie side by side there."""
 _FULL = 0.3
 """Share of entries from which on a matrix is dealt with as a full one."""
 
@@ -64,7 +66,7 @@ def plan(A: sp.csr_matrix) -> Plan:
     back[order] = np.arange(n)
     rows, columns = back[np.repeat(np.arange(n), np.diff(A.indptr))], back[A.indices]
     band = int(np.abs(rows - columns).max(initial=0))
-    if band > max(24, n // 6):
+    if band > max(24, n // 6) or n * (3 * band + 1) > _ROOM:
         return Plan(A.indptr, A.indices, empty, 0, empty)
     return Plan(A.indptr, A.indices, order, band, columns * (3 * band + 1) + 2 * band + rows - columns)
 

@@ -218,7 +218,7 @@ class Unfolded:
         reads, hands = says[rows], ~says[rows] & force[columns]
         return self.filled(np.append(columns[reads], rows[hands]), np.append(rows[reads], columns[hands]))
 
-    def stiffening(self, state: State, raw: np.ndarray) -> np.ndarray:
+    def stiffening(self, state: State, raw: np.ndarray) -> sp.csr_matrix:
         """Return ∂(Tᵀ F)/∂(own motion) under constant raw forces F, shape (n, n): the levers turn."""
         still = np.zeros(self.motion.n)
         seeds = LEVELS[0]
@@ -233,7 +233,7 @@ class Unfolded:
         raw: np.ndarray,
         blocks: Sequence[np.ndarray],
         cells: tuple[np.ndarray, np.ndarray],
-    ) -> np.ndarray:
+    ) -> sp.csr_matrix:
         """Return the slope of the forces in the degrees of freedom, shape (n, n).
 
         Parameters
@@ -290,18 +290,24 @@ class Unfolded:
             start += share.rows.size
         return at, runs, start + self.size - motion.n
 
-    def _folded(self, rows: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Return what is left of a matrix when all but the degrees of freedom are eliminated."""
+    def _folded(self, rows: np.ndarray, columns: np.ndarray, values: np.ndarray) -> sp.csr_matrix:
+        """Return what is left of a matrix when all but the degrees of freedom are eliminated.
+
+        Levers are led by few of these, whatever bends beside them: what they add is filled in there alone.
+        """
         from scipy.sparse.linalg import splu
 
         n, kept = self.motion.n, (rows >= 0) & (columns >= 0)
         E = sp.csr_matrix((values[kept], (rows[kept], columns[kept])), shape=(self.size, self.size))
-        found, back = E[:n, :n].toarray(), E[:n, n:]
-        said, led = splu(E[n:, n:].tocsc()), E[n:, :n].tocsc()
-        for first in range(0, n, _BLOCK):
+        led, back = E[n:, :n].tocsc(), E[:n, n:]
+        leading, felt = np.flatnonzero(np.diff(led.indptr)), np.flatnonzero(np.diff(back.indptr))
+        said, led, back = splu(E[n:, n:].tocsc()), led[:, leading], back[felt]
+        added = np.empty((len(felt), len(leading)))
+        for first in range(0, len(leading), _BLOCK):
             some = slice(first, first + _BLOCK)
-            found[:, some] -= back @ said.solve(led[:, some].toarray())
-        return found
+            added[:, some] = back @ said.solve(led[:, some].toarray())
+        at = sp.coo_matrix((added.ravel(), (np.repeat(felt, len(leading)), np.tile(leading, len(felt)))), shape=(n, n))
+        return sp.csr_matrix(E[:n, :n] - at)
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import resource
 import signal
@@ -201,7 +202,34 @@ def chain(folder: str, elements: str) -> None:
     """Twenty steps of a long chain; prints status and the most memory there was [MB]."""
     section = fc.Section(EA=1e5, EI_y=10.0, EI_z=10.0, GJ=10.0, rhoA=1.0, rhoJ=1e-3)
     beam = fc.Beam("chain", (0, 0, 0), (0.1 * int(elements), 0, 0), section, int(elements))
-    machine = fc.Structure([beam], [fc.Support(beam.start, "u v w")], outputs=[fc.Position("tip", beam.end, "z")])
+    _falls([beam], [fc.Support(beam.start, "u v w")])
+
+
+def hinged(folder: str, elements: str) -> None:
+    """The same of twenty beams hinged one to the next: long linkages of much that bends."""
+    section = fc.Section.tube(fc.STEEL, radius=0.02, thickness=0.002)
+    beams = [fc.Beam(f"b{i}", (i, 0, 0), (i + 1, 0, 0), section, int(elements) // 20) for i in range(20)]
+    hinges = [fc.Hinge(a.end, b.start, "y") for a, b in itertools.pairwise(beams)]
+    _falls(beams, [fc.Support(beams[0].start, "u v w rx rz"), *hinges])
+
+
+def tree(folder: str, elements: str) -> None:
+    """The same of a tree: each branch bears two, seven times."""
+    section = fc.Section.tube(fc.STEEL, radius=0.05, thickness=0.004)
+    each, rng = int(elements) // 255, np.random.default_rng(0)
+    trunk = fc.Beam("b0", (0, 0, 0), (0, 0, 3), section, each)
+    branches, joints = [trunk], [fc.Support(trunk.start)]
+    for i in range(254):
+        bearer = branches[i // 2]
+        way = np.subtract(bearer.end.position, bearer.start.position) * 0.8 + rng.normal(size=3)
+        end = tuple(bearer.end.position + way)
+        branches.append(fc.Beam(f"b{i + 1}", bearer.end.position, end, section, each))
+        joints.append(fc.Weld(bearer.end, branches[-1].start))
+    _falls(branches, joints)
+
+
+def _falls(parts: list[fc.Beam], joints: list[fc.Support | fc.Hinge | fc.Weld]) -> None:
+    machine = fc.Structure(parts, joints, outputs=[fc.Position("tip", parts[-1].end, "z")])
     model = fc.assemble(machine, [fc.LargeRotation(), fc.Gravity(), fc.Flexible()])
     run = fc.simulate(model, until=20e-4, method=fc.GeneralizedAlpha(1e-4))
     print(run.status.name, run.report.steps, most_resident())
