@@ -91,7 +91,7 @@ def jumps(run: Run, journey: Journey, feed: Feed | None) -> bool:
     def told(t: float, x: np.ndarray, y: np.ndarray) -> tuple[list[float], np.ndarray]:
         return feed.answer(t, y, x)
 
-    found = (_Asked(m.state.t, m.supply.x, feed.measured(m.state)) for m in moments(run, _IN_TURN))
+    found = (_Asked(m.state.t, m.supply.x, feed.measured(m.state)) for m in moments(run.track, run.final.t, _IN_TURN))
     return _along(run, journey, feed, told, found) is Manner.ABRUPT
 
 

@@ -11,6 +11,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
+from flexctrl.dynamics.notes.moments import moments, step_about
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.stability import without_energy
@@ -23,7 +24,9 @@ __all__ = ["Growth", "growth", "loop_poles"]
 
 _MOST = 400
 _DOUBTED, _MISSED = 0.5, 1.5
-_GROWN = 4.0
+_GROWN, _PARTLY = 4.0, 0.5
+"""Powers of e over the run, and over parts of it in which steps do not see them."""
+_FEW, _PARTS = 60, 8
 _INFINITE = 1e6
 _SAME = 1e-3
 _LOOP = "the continuous loop"
@@ -45,6 +48,8 @@ class Growth(NamedTuple):
         How long it had to grow [s].
     missed : bool
         Whether the loop was and is one that steps by far do not see grow, at the start and at the end.
+    when : str
+        Since when and until when, in words; empty if all along.
     """
 
     grown: str
@@ -52,10 +57,11 @@ class Growth(NamedTuple):
     step: float
     span: float
     missed: bool
+    when: str = ""
 
     def __str__(self) -> str:
         pole = f"{self.pole.real:.3g}" + (f" ± {abs(self.pole.imag):.3g}i" if self.pole.imag else "")
-        unstable = f"{self.grown} is unstable, with a pole at {pole} 1/s"
+        unstable = f"{self.grown} is unstable{self.when}, with a pole at {pole} 1/s"
         if abs(self.pole) * self.step > _DOUBTED:
             cause = "gains" if self.grown == _LOOP else "loads"
             finer = f"look at the {cause}, or take steps below {0.1 / abs(self.pole):.1g} s"
@@ -68,7 +74,8 @@ def growth(journey: Journey, start: tuple[State, Supply]) -> Growth | None:
 
     That of a continuous loop, or under loads that have no potential: what has one and leaves by itself does so without
     turning, as steps see it. Linear about the start and about the end: at one of these, if steps do not see it grow, at
-    both otherwise. What grows by less than e⁴ over the run is let pass.
+    both otherwise. What grows by less than e⁴ over the run is let pass. Under a continuous law small machines are
+    looked at between them, too.
 
     Parameters
     ----------
@@ -94,7 +101,27 @@ def growth(journey: Journey, start: tuple[State, Supply]) -> Growth | None:
     least, worst = sorted(found, key=lambda pole: pole.real)
     if least or abs(worst) * step > _DOUBTED:
         return Growth(grown, worst, step, span, abs(least) * step > _MISSED)
-    return None
+    return _between(journey, grown) if feed.reacting and 2 * feed.model.n <= _FEW else None
+
+
+def _between(journey: Journey, grown: str) -> Growth | None:
+    """Return the pole that grows most in the midst of a run, as gains may be high there alone, if steps do not see it.
+
+    What several parts of the run add is summed up.
+    """
+    feed, track, end, found = journey.plan.feed, journey.track, journey.point.state.t, []
+    for moment in moments(track, end, _PARTS):
+        step = step_about(track, moment)
+        poles = loop_poles(feed, moment.state, moment.supply, step)
+        pole = complex(max(poles, key=lambda pole: pole.real, default=0.0))
+        if pole.real > 0.0 and abs(pole) * step > _DOUBTED:
+            found.append((moment, pole, step))
+    if sum(pole.real * moment.part for moment, pole, _ in found) <= _PARTLY:
+        return None
+    (first, *_), (last, *_) = found[0], found[-1]
+    _, worst, step = max(found, key=lambda each: each[1].real)
+    when = f" from about t = {first.state.t:.3g} s to {last.state.t:.3g} s"
+    return Growth(grown, worst, step, len(found) * first.part, False, when)
 
 
 def _driven(feed: Feed, *inputs: np.ndarray) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexctrl.dynamics.feed import Supply
-from flexctrl.dynamics.run import Run
+from flexctrl.dynamics.records.dense import Track
 from flexctrl.model.state import State
 
 __all__ = ["Moment", "moments", "step_about"]
@@ -33,31 +33,32 @@ class Moment(NamedTuple):
     part: float
 
 
-def moments(run: Run, count: int) -> Iterator[Moment]:
+def moments(track: Track, end: float, count: int) -> Iterator[Moment]:
     """Yield the middles of so many equal parts of a run, as far as its steps have been kept.
 
     Parameters
     ----------
-    run : Run
+    track : Track
+    end : float
+        Of the run [s].
     count : int
 
     Yields
     ------
     Moment
     """
-    track, end = run.track, run.final.t
     if track.stretches and end > track.starts[0]:
         part = (end - track.starts[0]) / count
         for i in range(count):
             yield Moment(*track.point(track.starts[0] + (i + 0.5) * part), part)
 
 
-def step_about(run: Run, moment: Moment) -> float:
+def step_about(track: Track, moment: Moment) -> float:
     """Return the mean length of steps about a moment [s].
 
     Parameters
     ----------
-    run : Run
+    track : Track
     moment : Moment
 
     Returns
@@ -65,4 +66,4 @@ def step_about(run: Run, moment: Moment) -> float:
     float
     """
     shares = (np.arange(_AROUND) + 0.5) / _AROUND - 0.5
-    return float(np.mean([run.track.step(t) for t in (moment.state.t + moment.part * shares).tolist()]))
+    return float(np.mean([track.step(t) for t in (moment.state.t + moment.part * shares).tolist()]))

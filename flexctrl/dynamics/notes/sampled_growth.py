@@ -216,11 +216,11 @@ def _counts(loop: SampledLoop, journey: Journey) -> Counts:
 def _between(run: Run, journey: Journey, feed: Feed, rho: float) -> str:
     """What is to be said of growth in the midst of a run, summed up over its parts; empty if steps see it."""
     found: list[tuple[float, Missed]] = []
-    for moment in moments(run, _BETWEEN):
+    for moment in moments(run.track, run.final.t, _BETWEEN):
         state, supply = moment.state, moment.supply
         for loop in _loop_at(feed, state, supply.x, supply.u, _FEW):
             if loop.poles(_GROWING).size:
-                counts = Counts.of(loop.sample / step_about(run, moment))
+                counts = Counts.of(loop.sample / step_about(run.track, moment))
                 some = _missed(loop, _samples(loop, journey) / _BETWEEN, counts, rho)
                 found += [(state.t, some)] if some else []
     if not found:
