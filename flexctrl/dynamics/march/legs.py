@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -46,6 +47,11 @@ class Leg(NamedTuple):
     steps: int
 
 
+_KEPT = 2
+_asked: list[weakref.ref[Legs]] = []
+"""Rides whose states are known, the one asked for last at the end: states take ten times the room of what made them."""
+
+
 class Held(NamedTuple):
     """Legs from sample to sample, written down as they come.
 
@@ -63,6 +69,11 @@ class Held(NamedTuple):
     def legs(self) -> list[Leg]:
         """The legs."""
         return [Leg(Supply(np.array(u), x, self.rate), t, h, steps) for t, h, steps, u, x in self.samples]
+
+    @property
+    def steps(self) -> int:
+        """How many there are."""
+        return sum(steps for _, _, steps, _, _ in self.samples)
 
     def commands(self, after: np.ndarray) -> np.ndarray:
         """Return the inputs in force from each step's end on; after the last sample others may be."""
@@ -103,6 +114,11 @@ class Told(NamedTuple):
     def legs(self) -> list[Leg]:
         """The legs."""
         return [self._leg(row) for row in self.table]
+
+    @property
+    def steps(self) -> int:
+        """How many there are."""
+        return int(self.table[:, 2].sum())
 
     def _leg(self, row: np.ndarray) -> Leg:
         t, size, steps = row[:3].tolist()
@@ -202,9 +218,19 @@ class Legs:
         """Where the last leg ends."""
         return self.end
 
-    @cached_property
+    @property
     def again(self) -> list[Again]:
-        """All legs, done again."""
+        """All legs, done again; what has been found is kept of the rides asked for last."""
+        found = self._again
+        if not (_asked and _asked[-1]() is self):
+            kept = [*(ride for ride in _asked if ride() not in (None, self)), weakref.ref(self)]
+            for ride in kept[:-_KEPT]:
+                vars(ride()).pop("_again", None)
+            _asked[:] = kept[-_KEPT:]
+        return found
+
+    @cached_property
+    def _again(self) -> list[Again]:
         stepper = self.stepper.again()
         stepper.marcher.recall(self.memory.march)
         stepper.enter(self.start)

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 __all__ = ["ride", "rides"]
 
 _NEAR = 1e-9
+_STEPS = 2000
+"""Of a ride, from which on another one begins: it is done again as a whole."""
 _SECONDS = 0.1
 _FAR = 100.0
 
@@ -101,14 +103,16 @@ class Ride:
     def go(self) -> bool:
         """Ride on from stop to stop."""
         deadline, m = time.perf_counter() + min(_SECONDS, self.journey.glance), self.marcher.march
-        well = True
+        well, taken, parts = True, 0, 0
         while well and m.t < self.until - self.tick:
             stop = self.journey.stops.next
             # samples are not the clock's business: they are taken here
             if (self.lookout is not None or not self.wary) and stop - m.t <= self.tick:
                 well = self._renew(stop)
                 continue
-            if self.legs.parts and time.perf_counter() >= deadline:
+            taken += sum(part.steps for part in self.legs.parts[parts:])
+            parts = len(self.legs.parts)
+            if parts and (time.perf_counter() >= deadline or taken >= _STEPS):
                 break
             if self.lookout is None and (self.wary or self.most):
                 well = stop - m.t > self.tick and self._leg(stop)
