@@ -276,6 +276,15 @@ def test_an_hour_of_closed_loop_stays_within_300_megabytes(kind, tmp_path, monke
 
 
 @pytest.mark.slow
+def test_a_minute_with_all_its_states_stays_within_300_megabytes_too(tmp_path):
+    """States done again for the runs laid beside it took ten times the room of what they are made from: 500 MB."""
+    status, rides, peak = printed("minute", tmp_path)
+    assert status == "FINISHED"
+    assert int(rides) > 5
+    assert float(peak) < 300.0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["chain", "hinged", "tree"])
 def test_ten_thousand_elements_stay_within_a_gigabyte(kind, tmp_path):
     """Hinged beams asked for 27 GB, a full matrix, and trees took 1.5 GB, a band as wide as their branches are many."""
