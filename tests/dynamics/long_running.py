@@ -211,7 +211,7 @@ def minute(folder: str) -> None:
         [fc.DriveAngle("angle", motor), fc.DriveSpeed("speed", motor)],
     )
     model = fc.assemble(plan, [fc.LargeRotation(), fc.Flexible(), fc.RayleighDamping(beta=1e-3)])
-    kept = fc.CsvStream(Path(folder) / "rows.csv")
+    kept = fc.CsvStream(Path(folder) / "rows.csv", every=0.1)
     run = fc.simulate(model, Turning(), until=60.0, method=FIXED, every=0.1, record=kept)
     print(run.status.name, len(run.track.stretches), most_resident())
 

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["samples"]
 
+_AT_ONCE = 1000
+"""Steps from one look at the clock to the next: asking a law takes longer than that."""
+
 
 def samples(ride: Ride, deadline: float) -> bool:
     """Go from sample to sample while there is room for rows; tell whether all is well.
@@ -28,7 +31,8 @@ def samples(ride: Ride, deadline: float) -> bool:
     With a controller at every step this is most of a run, so what is done for a sample is done here at once.
     """
     marcher, stops, mark = ride.marcher, ride.journey.stops, ride.journey.mark
-    last, nearly, pace, room = ride.until + ride.tick, ride.until - ride.tick, ride.pace, marcher.room
+    last, nearly, pace = ride.until + ride.tick, ride.until - ride.tick, ride.pace
+    room = min(marcher.room, _AT_ONCE)
     told, reads, sample = ride.journey.plan.feed.told, ride.journey.plan.feed.reads, stops.sample
     clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.readings
     held, first = Held(ride.supply.rate, []), ride.supply.u

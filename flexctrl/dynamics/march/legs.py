@@ -47,7 +47,7 @@ class Leg(NamedTuple):
     steps: int
 
 
-_KEPT = 2
+_KEPT = 4
 _asked: list[weakref.ref[Legs]] = []
 """Rides whose states are known, the one asked for last at the end: states take ten times the room of what made them."""
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["ride", "rides"]
 
 _NEAR = 1e-9
-_STEPS = 2000
+_STEPS = 1000
 """Of a ride, from which on another one begins: it is done again as a whole."""
 _SECONDS = 0.1
 _FAR = 100.0
