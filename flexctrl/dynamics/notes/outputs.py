@@ -110,7 +110,7 @@ def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:
         return OutputErrors({})
     sight = reach(journey)
     way, judged = _seen(journey, y, sight)
-    off = np.fmin(sight @ late, _alike(model, sight, late, journey.books.sums.moved) * way)
+    off = sight @ late
     if isinstance(journey.judging, Parting):
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.fmax(off, _LEFT * (sight @ journey.judging.parted) ** 2 / way)
@@ -118,18 +118,17 @@ def by_sums(journey: Journey, y: np.ndarray) -> OutputErrors:
     return OutputErrors(shares, _notes(journey, y, shares, journey.drift.share, _BY_SUMS))
 
 
-def _alike(model: Model, sight: sp.csr_matrix, late: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Return by what share outputs that are differences may be off; infinity for all others.
+def _alike(journey: Journey) -> dict[str, float]:
+    """Return by what share outputs that are differences may be off by what is late in both places alike.
 
-    What is late in both places is late in what they are apart by: as large a share of it as of either. What else steps
-    do to it another run tells.
+    As large a share of what they are apart by as of either. What else steps do to it another run tells.
     """
+    model, late, moved = journey.plan.model, journey.drift.late, journey.books.sums.moved
+    assert isinstance(model, Model)
+    apart = [i for i in placed(model) if getattr(model.structure.outputs[i], "minus", None) is not None]
     share = np.divide(late, moved, out=np.zeros_like(late), where=moved > 0.0)
-    found = np.full(sight.shape[0], np.inf)
-    for i in placed(model):
-        if getattr(model.structure.outputs[i], "minus", None) is not None:
-            found[i] = share[sight[i].indices].max(initial=0.0)
-    return found
+    sight = reach(journey) if apart else None
+    return {} if sight is None else {model.outputs[i]: float(share[sight[i].indices].max(initial=0.0)) for i in apart}
 
 
 def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float, kind: str) -> OutputErrors:
@@ -157,6 +156,8 @@ def by_rows(journey: Journey, y: np.ndarray, off: np.ndarray, error: float, kind
     if not summed:
         return journey.outputs
     way, judged = seen(journey, y)
+    alike = _alike(journey)
+    summed = {name: min(share, alike.get(name, 1.0)) for name, share in summed.items()}
     beside = {model.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in judged}
     more = {name: share for name, share in beside.items() if share > summed[name]}
     less = {name: share for name, share in summed.items() if name not in more}
