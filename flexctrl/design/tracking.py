@@ -315,9 +315,9 @@ def _check_functions(signals: Mapping[str, Signal], what: str) -> None:
     check_mapping(signals, what)
     for name, signal in signals.items():
         if not callable(signal):
-            raise ControllerError(
-                f"{what}: {name!r} is given {signal!r}, no function of time; use Constant({signal!r})"
-            )
+            held = signal if isinstance(signal, float | int) else 1.0
+            use = f"use Constant({held!r})" if held is signal else f"use Constant({held!r}), Table or any f(t)"
+            raise ControllerError(f"{what}: {name!r} is given {signal!r}, no function of time; {use}")
 
 
 def _merged(*parts: object) -> tuple[float, ...]:

@@ -60,7 +60,7 @@ def check_static(static: float, kinetic: float, owner: str) -> None:
 def check_large(effects: Sequence[Effect], owner: str) -> None:
     """Raise StructureError for an effect that is not linear in a model that is."""
     if not any(isinstance(e, LargeRotation) for e in effects):
-        raise StructureError(f"{owner}: is not linear, a model without LargeRotation is; add LargeRotation()")
+        raise StructureError(f"{owner} is not linear, but a model without LargeRotation is; add LargeRotation()")
 
 
 def check_drives(structure: Structure, names: tuple[str, ...], owner: str) -> None:
