@@ -95,7 +95,7 @@ BAD = [
     ("gravity = true", "wind = { areas = { lod = 1.0 }, speed = [1, 0, 0] }", "effects: Wind: 'lod' names no node"),
     ("gravity = true", 'rope_mass = { of = ["trolley"] }', "effects: RopeMass: "),
     ("gravity = true", "geometric_stiffness = true", "effects: GeometricStiffness is part of LargeRotation; give one"),
-    ("large_rotation = true", "backlash = { travel_drive = 0.1 }", "effects: Backlash: is not linear"),
+    ("large_rotation = true", "backlash = { travel_drive = 0.1 }", "effects: Backlash is not linear"),
     ('measured = "angle"', 'measured = "angel"', "[controllers.1] measured: the machine has no output 'angel'"),
     ('command = "torque"', 'command = "torqe"', "[controllers.1] command: the machine has no input 'torqe'"),
     ('through = "travel_drive"', 'through = "drive"', "[controllers.1.reference] through: the machine has no drive"),
