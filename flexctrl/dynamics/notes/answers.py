@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -126,7 +127,8 @@ def _along(run: Run, journey: Journey, feed: Feed, told: _Told, asked: Iterator[
     def line(at: _Asked, start: np.ndarray, stop: np.ndarray) -> Answer:
         return lambda share: np.concatenate(told(at.t, at.x, start + share * (stop - start)))
 
-    try:
+    found = Manner.SMOOTH
+    with suppress(FlexctrlError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
         last = line(_Asked(end.state.t, end.supply.x, read[-1]), low, high)
         found = _kind(last, _hunts(run.u))
         if found is Manner.ABRUPT:
@@ -137,8 +139,6 @@ def _along(run: Run, journey: Journey, feed: Feed, told: _Told, asked: Iterator[
             alone = line(at, np.where(one, low, at.y), np.where(one, high, at.y))
             if _leaps(line(at, low, high), least) or _leaps(alone, least):
                 return Manner.ABRUPT
-    except (FlexctrlError, ArithmeticError, ValueError):  # beside where it was, a law may say nothing
-        return Manner.SMOOTH
     return found
 
 
