@@ -223,10 +223,11 @@ class Legs:
         """All legs, done again; what has been found is kept of the rides asked for last."""
         found = self._again
         if not (_asked and _asked[-1]() is self):
-            kept = [*(ride for ride in _asked if ride() not in (None, self)), weakref.ref(self)]
-            for ride in kept[:-_KEPT]:
-                vars(ride()).pop("_again", None)
-            _asked[:] = kept[-_KEPT:]
+            rides = [ride for asked in _asked if (ride := asked()) is not None and ride is not self]
+            kept = [*rides, self][-_KEPT:]
+            for ride in rides[: 1 - _KEPT]:
+                vars(ride).pop("_again", None)
+            _asked[:] = map(weakref.ref, kept)
         return found
 
     @cached_property
