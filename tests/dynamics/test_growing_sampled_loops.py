@@ -11,7 +11,7 @@ import scipy.linalg as la
 import flexctrl as fc
 from flexctrl.design import MinimumJerk, pd
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.notes.sampled_growth import _answers, _counts, _loop, _missed, _samples
+from flexctrl.dynamics.notes.sampled_growth import _answers, _counts, _limited, _loop, _missed, _samples
 
 NEAR, FAR, OMEGA, ZETA = 1.79, 1.76, 83.46, 0.0057
 SAMPLE, KP, KD = 1.49 / 83.46, 46.2, 13.5
@@ -175,3 +175,17 @@ def test_growth_that_steps_see_and_limits_hold_is_no_failure(seen, lost):
     found = _missed(loop, _samples(loop, journey), _counts(loop, journey), 0.8)
     assert "the sampled loop is unstable" in found.said()
     assert found.lost is lost
+
+
+@pytest.mark.parametrize(("steep", "limited"), [(0.0, False), (1e-4, True)])
+def test_a_law_that_answers_little_to_much_holds_what_grows(steep, limited):
+    """Friction made up for by a steep tanh: loops that grew about rest alone ended as failed, right to 1e-5."""
+
+    def told(t, x, y):
+        return [-50.0 * y[0] - 13.5 * y[1] + (0.5 * np.tanh(y[1] / steep) if steep else 0.0)], x
+
+    state, t = np.zeros(2), np.linspace(0.0, 3.0, 50)
+    feed = SimpleNamespace(reads=np.arange(2), told=told, measured=lambda _: state)
+    point = SimpleNamespace(state=SimpleNamespace(t=3.0), supply=SimpleNamespace(x=np.zeros(0)))
+    run = SimpleNamespace(y=np.column_stack([0.2 * np.sin(t), 0.2 * np.cos(t)]))
+    assert _limited(run, SimpleNamespace(point=point), feed) is limited

@@ -32,6 +32,8 @@ growth that steps see is held by limits that a loop about one place does not hav
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
 _HALVINGS, _ENDS, _BETWEEN = 10, 2, 8
 _GROWING = 1.0 + 1e-9
+_NEARBY, _FAR, _HALF = 1e-4, 0.1, 0.5
+"""Shares of what readings go through, and of slopes."""
 _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
 _SAID = (
@@ -93,8 +95,8 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     """Return a run with what is to be said of a sampled loop that grows as its steps do not see.
 
     Linear about the start and about the end: where that is so at both, the run has failed; at one, or where limits must
-    have held what steps do see grow by far, a note says so. Small loops are looked at between them, too, as gains may
-    be high there alone.
+    have held what steps do see grow by far, or the law answers far less to much, a note says so. Small loops are looked
+    at between them, too, as gains may be high there alone.
 
     Parameters
     ----------
@@ -115,10 +117,11 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     try:
         found = [_missed(loop, _samples(loop, journey), _counts(loop, journey), rho) for loop in _loops(journey, feed)]
         missed = [one for one in found if one and one.whole - one.seen > _GROWN]
+        lost = len(missed) == _ENDS and all(one.lost for one in missed) and not _limited(run, journey, feed)
         between = "" if missed else _between(run, journey, feed, rho)
     except (FlexctrlError, ArithmeticError, ValueError) as error:  # beside where it was, a law may say nothing
         return _noted(run, f"whether the sampled loop grows could not be told: {error}")
-    if len(missed) == _ENDS and all(one.lost for one in missed):
+    if lost:
         return replace(run, status=Status.FAILED, report=replace(run.report, message=missed[-1].said()))
     said = missed[0].said() if missed else between
     return _noted(run, said) if said else run
@@ -146,6 +149,19 @@ def grows(journey: Journey, feed: Feed | None) -> bool:
         return any(loop.poles(growth).size for loop in _loops(journey, feed))
     except (FlexctrlError, ArithmeticError, ValueError):  # `of_sampled_loop` has said so
         return False
+
+
+def _limited(run: Run, journey: Journey, feed: Feed) -> bool:
+    """Tell whether a law answers by half, for their size, to readings a tenth of their range away, and holds growth."""
+    t, x, y = journey.point.state.t, journey.point.supply.x, feed.measured(journey.point.state)
+    way = np.diag(np.ptp(run.y[:, feed.reads], axis=0))
+
+    def slopes(share: float) -> np.ndarray:
+        both = ([feed.told(t, x, y + side * share * d)[0] for d in way if d.any()] for side in (1.0, -1.0))
+        return np.abs(np.subtract(*(np.array(told) for told in both))) / share
+
+    near, far = slopes(_NEARBY), slopes(_FAR)
+    return bool((far < _HALF * near)[near > _FAR * near.max(initial=0.0)].any())
 
 
 def _noted(run: Run, note: str) -> Run:
