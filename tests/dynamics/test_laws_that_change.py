@@ -37,7 +37,7 @@ class Masses(NamedTuple):
         stiffness, damping = self.spring
         a, b = fc.PointMass("a", (0, 0, 0), self.near), fc.PointMass("b", (2, 0, 0), self.far)
         spring = fc.Spring("spring", a.node, b.node, stiffness=stiffness, damping=damping)
-        outputs = [kind(name, node, "x") for kind, name, node in OUTPUTS(a.node, b.node)]
+        outputs = [kind(name, node, "x") for kind, name, node in watched(a.node, b.node)]
         joints = [fc.Support(a.node, "v w"), fc.Support(b.node, "v w")]
         pins = [fc.Pin(spring.start, a.node), fc.Pin(spring.end, b.node)]
         plan = fc.Structure([a, b, spring], [*joints, *pins], inputs=[fc.Force("u", a.node, "x")], outputs=outputs)
@@ -59,7 +59,7 @@ class Masses(NamedTuple):
         return np.array(rows)
 
 
-def OUTPUTS(a: fc.Node, b: fc.Node) -> list[tuple[type, str, fc.Node]]:
+def watched(a: fc.Node, b: fc.Node) -> list[tuple[type, str, fc.Node]]:
     return [(fc.Position, "x", a), (fc.Velocity, "v", a), (fc.Position, "far", b), (fc.Velocity, "rate", b)]
 
 

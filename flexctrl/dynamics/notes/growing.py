@@ -11,7 +11,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
-from flexctrl.dynamics.notes.moments import moments, step_about
+from flexctrl.dynamics.notes.moments import FEW, PARTLY, PARTS, moments, step_about
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
 from flexctrl.model.stability import without_energy
@@ -24,9 +24,7 @@ __all__ = ["Growth", "growth", "loop_poles"]
 
 _MOST = 400
 _DOUBTED, _MISSED = 0.5, 1.5
-_GROWN, _PARTLY = 4.0, 0.5
-"""Powers of e over the run, and over parts of it in which steps do not see them."""
-_FEW, _PARTS = 60, 8
+_GROWN = 4.0
 _INFINITE = 1e6
 _SAME = 1e-3
 _LOOP = "the continuous loop"
@@ -101,7 +99,7 @@ def growth(journey: Journey, start: tuple[State, Supply]) -> Growth | None:
     least, worst = sorted(found, key=lambda pole: pole.real)
     if least or abs(worst) * step > _DOUBTED:
         return Growth(grown, worst, step, span, abs(least) * step > _MISSED)
-    return _between(journey, grown) if feed.reacting and 2 * feed.model.n <= _FEW else None
+    return _between(journey, grown) if feed.reacting and 2 * feed.model.n <= FEW else None
 
 
 def _between(journey: Journey, grown: str) -> Growth | None:
@@ -110,13 +108,13 @@ def _between(journey: Journey, grown: str) -> Growth | None:
     What several parts of the run add is summed up.
     """
     feed, track, end, found = journey.plan.feed, journey.track, journey.point.state.t, []
-    for moment in moments(track, end, _PARTS):
+    for moment in moments(track, end, PARTS):
         step = step_about(track, moment)
         poles = loop_poles(feed, moment.state, moment.supply, step)
         pole = complex(max(poles, key=lambda pole: pole.real, default=0.0))
         if pole.real > 0.0 and abs(pole) * step > _DOUBTED:
             found.append((moment, pole, step))
-    if sum(pole.real * moment.part for moment, pole, _ in found) <= _PARTLY:
+    if sum(pole.real * moment.part for moment, pole, _ in found) <= PARTLY:
         return None
     (first, *_), (last, *_) = found[0], found[-1]
     _, worst, step = max(found, key=lambda each: each[1].real)

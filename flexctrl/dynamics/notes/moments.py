@@ -11,8 +11,10 @@ from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.records.dense import Track
 from flexctrl.model.state import State
 
-__all__ = ["Moment", "moments", "step_about"]
+__all__ = ["FEW", "PARTLY", "PARTS", "Moment", "moments", "step_about"]
 
+PARTS, FEW, PARTLY = 8, 60, 0.5
+"""In how many parts of a run loops are looked at, of up to how many states; powers of e that steps may miss in them."""
 _AROUND = 5
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.notes.fading import radius
-from flexctrl.dynamics.notes.moments import moments, step_about
+from flexctrl.dynamics.notes.moments import FEW, PARTLY, PARTS, moments, step_about
 from flexctrl.dynamics.notes.sampled_loop import Answers, SampledLoop
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Controlled
@@ -24,13 +24,12 @@ if TYPE_CHECKING:
 
 __all__ = ["grows", "of_sampled_loop"]
 
-_MOST, _FEW = 400, 60
-"""States of loops that are looked at about the start and the end; and about some moments between."""
-_GROWN, _PARTLY, _LOST, _BOUNDED, _TURNED = 1.0, 0.5, 3.0, 20.0, 0.5
-"""Powers of e: what steps may miss over the run, and over a part of it; beyond which nothing is right; and what of
-growth that steps see is held by limits that a loop about one place does not have; poles that turn together [rad]."""
+_MOST = 400
+_GROWN, _LOST, _BOUNDED, _TURNED = 1.0, 3.0, 20.0, 0.5
+"""Powers of e over the run: what steps may miss, beyond which nothing is right, and what of growth that steps see is
+held by limits that a loop about one place does not have; poles that turn together [rad]."""
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
-_HALVINGS, _ENDS, _BETWEEN = 10, 2, 8
+_HALVINGS, _ENDS = 10, 2
 _GROWING = 1.0 + 1e-9
 _NEARBY, _FAR, _HALF = 1e-4, 0.1, 0.5
 """Shares of what readings go through, and of slopes."""
@@ -232,17 +231,17 @@ def _counts(loop: SampledLoop, journey: Journey) -> Counts:
 def _between(run: Run, journey: Journey, feed: Feed, rho: float) -> str:
     """What is to be said of growth in the midst of a run, summed up over its parts; empty if steps see it."""
     found: list[tuple[float, Missed]] = []
-    for moment in moments(run.track, run.final.t, _BETWEEN):
+    for moment in moments(run.track, run.final.t, PARTS):
         state, supply = moment.state, moment.supply
-        for loop in _loop_at(feed, state, supply.x, supply.u, _FEW):
+        for loop in _loop_at(feed, state, supply.x, supply.u, FEW):
             if loop.poles(_GROWING).size:
                 counts = Counts.of(loop.sample / step_about(run.track, moment))
-                some = _missed(loop, _samples(loop, journey) / _BETWEEN, counts, rho)
+                some = _missed(loop, _samples(loop, journey) / PARTS, counts, rho)
                 found += [(state.t, some)] if some else []
     if not found:
         return ""
     whole, seen = (sum(part) for part in zip(*((one.whole, one.seen) for _, one in found), strict=True))
-    if whole - seen <= _PARTLY:
+    if whole - seen <= PARTLY:
         return ""
     times = [t for t, _ in found]
     worst = max((one for _, one in found), key=lambda one: one.whole - one.seen)
