@@ -65,7 +65,7 @@ torsion, Exudyn's cable has none.
 {missed}
 
 Our time per step between 100 and {largest} elements grows with an exponent of {growth};
-the goal is 1.05. {told} From 4,000 elements on nodes are eliminated one by one, not
+the goal is 1.05. {told} From 500 elements on nodes are eliminated one by one, not
 two at once: that is a third more work in solving, and a quarter fewer numbers. 10,000 go through 16 MB an iteration, in
 a cache that processors share: of full swings 1.00 to 1.05 have come out on hosts with nothing else to do, up to 1.08
 beside other work.

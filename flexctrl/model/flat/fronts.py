@@ -28,8 +28,8 @@ _VANISHING = 1e-13
 NODE = 6
 _MERGED = 2 * NODE
 """Unknowns of a front that small ones are joined to. Two nodes at once are quicker; one at a time takes less room."""
-_LARGE = 24_000
-"""Unknowns from which on room counts: factors of 4 MB fit no near cache."""
+_LARGE = 3_000
+"""Unknowns from which on room counts: factors of half a megabyte share a near cache with all else that a step reads."""
 
 
 @frozen(eq=False)
