@@ -11,6 +11,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.linear_motion.exact import Exact
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
+from flexctrl.dynamics.notes.limits import limited
 from flexctrl.dynamics.notes.moments import FEW, PARTLY, PARTS, moments, step_about
 from flexctrl.model.model import Model
 from flexctrl.model.plant import Plant
@@ -29,6 +30,7 @@ _INFINITE = 1e6
 _SAME = 1e-3
 _LOOP = "the continuous loop"
 _SMALL = 1e-7
+_OFTEN = 64
 
 
 class Growth(NamedTuple):
@@ -45,7 +47,8 @@ class Growth(NamedTuple):
     span : float
         How long it had to grow [s].
     missed : bool
-        Whether the loop was and is one that steps by far do not see grow, at the start and at the end.
+        Whether the loop was and is one that steps by far do not see grow, at the start and at the end, and nothing
+        holds it: a law that answers little to much does.
     when : str
         Since when and until when, in words; empty if all along.
     """
@@ -98,7 +101,8 @@ def growth(journey: Journey, start: tuple[State, Supply]) -> Growth | None:
     found = [_growing(loop_poles(feed, at, to, step), span) for at, to in (start, (end.state, end.supply))]
     least, worst = sorted(found, key=lambda pole: pole.real)
     if least or abs(worst) * step > _DOUBTED:
-        return Growth(grown, worst, step, span, abs(least) * step > _MISSED)
+        missed = abs(least) * step > _MISSED and not (feed.reacting and _limited(journey))
+        return Growth(grown, worst, step, span, missed)
     return _between(journey, grown) if feed.reacting and 2 * feed.model.n <= FEW else None
 
 
@@ -120,6 +124,15 @@ def _between(journey: Journey, grown: str) -> Growth | None:
     _, worst, step = max(found, key=lambda each: each[1].real)
     when = f" from about t = {first.state.t:.3g} s to {last.state.t:.3g} s"
     return Growth(grown, worst, step, len(found) * first.part, False, when)
+
+
+def _limited(journey: Journey) -> bool:
+    """Tell whether a law holds growth by answering less to much; its readings go as far as at some moments."""
+    feed, end = journey.plan.feed, journey.point
+    y = feed.measured(end.state)
+    states = [moment.state for moment in moments(journey.track, end.state.t, _OFTEN)]
+    way = np.ptp([y, *(feed.measured(state) for state in states)], axis=0)
+    return limited(lambda read: feed.renewed(end.state.t, read, end.supply).u, y, way)
 
 
 def _driven(feed: Feed, *inputs: np.ndarray) -> tuple[str, ...]:

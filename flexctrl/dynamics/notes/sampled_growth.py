@@ -11,6 +11,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.notes.fading import radius
+from flexctrl.dynamics.notes.limits import limited
 from flexctrl.dynamics.notes.moments import FEW, PARTLY, PARTS, moments, step_about
 from flexctrl.dynamics.notes.sampled_loop import Answers, SampledLoop
 from flexctrl.dynamics.run import Run, Status
@@ -31,8 +32,6 @@ held by limits that a loop about one place does not have; poles that turn togeth
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
 _HALVINGS, _ENDS = 10, 2
 _GROWING = 1.0 + 1e-9
-_NEARBY, _FAR, _HALF = 1e-4, 0.1, 0.5
-"""Shares of what readings go through, and of slopes."""
 _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
 _SAID = (
@@ -151,16 +150,9 @@ def grows(journey: Journey, feed: Feed | None) -> bool:
 
 
 def _limited(run: Run, journey: Journey, feed: Feed) -> bool:
-    """Tell whether a law answers by half, for their size, to readings a tenth of their range away, and holds growth."""
+    """Tell whether a law holds growth by answering less to much."""
     t, x, y = journey.point.state.t, journey.point.supply.x, feed.measured(journey.point.state)
-    way = np.diag(np.ptp(run.y[:, feed.reads], axis=0))
-
-    def slopes(share: float) -> np.ndarray:
-        both = ([feed.told(t, x, y + side * share * d)[0] for d in way if d.any()] for side in (1.0, -1.0))
-        return np.abs(np.subtract(*(np.array(told) for told in both))) / share
-
-    near, far = slopes(_NEARBY), slopes(_FAR)
-    return bool((far < _HALF * near)[near > _FAR * near.max(initial=0.0)].any())
+    return limited(lambda read: feed.told(t, x, read)[0], y, np.ptp(run.y[:, feed.reads], axis=0))
 
 
 def _noted(run: Run, note: str) -> Run:
