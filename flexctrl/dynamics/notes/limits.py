@@ -29,7 +29,7 @@ def limited(told: Callable[[np.ndarray], np.ndarray], y: np.ndarray, way: np.nda
 
     def slopes(share: float) -> np.ndarray:
         both = ([told(y + side * share * d) for d in np.diag(way) if d.any()] for side in (1.0, -1.0))
-        return np.abs(np.subtract(*(np.array(said) for said in both))) / share
+        return np.abs(np.subtract(*map(np.array, both))) / share
 
     near, far = slopes(_NEARBY), slopes(_FAR)
     return bool((far < _HALF * near)[near > _FAR * near.max(initial=0.0)].any())

@@ -152,7 +152,7 @@ def grows(journey: Journey, feed: Feed | None) -> bool:
 def _limited(run: Run, journey: Journey, feed: Feed) -> bool:
     """Tell whether a law holds growth by answering less to much."""
     t, x, y = journey.point.state.t, journey.point.supply.x, feed.measured(journey.point.state)
-    return limited(lambda read: feed.told(t, x, read)[0], y, np.ptp(run.y[:, feed.reads], axis=0))
+    return limited(lambda read: np.array(feed.told(t, x, read)[0]), y, np.ptp(run.y[:, feed.reads], axis=0))
 
 
 def _noted(run: Run, note: str) -> Run:
