@@ -113,6 +113,8 @@ def simulate(
     ControllerError
         If the controller's names are not the model's, or if it fails when it is first asked, before there is a run: it
         raises an exception (the cause of this one), or commands what is no column of finite numbers.
+    EventError
+        If the function of an event fails where the run begins.
     MechanismError
         If a freedom has neither mass nor stiffness.
     """

@@ -164,7 +164,7 @@ def test_every_touch_of_zero_is_in_doubt():
         table = np.column_stack([t[1:], y[1:], 0.0 * t[1:]])
         touch = int(at / h)
         first = fc.dynamics.steps.Point(start, np.zeros(model.n), None)
-        assert calm_steps(Held(y[0]), first, table, np.zeros((len(t), 1))) <= touch
+        assert calm_steps(Held(y[0]), first, table, np.zeros((len(t), 1)), np.zeros(2)) <= touch
 
 
 @pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-2)], ids=["adaptive", "fixed"])

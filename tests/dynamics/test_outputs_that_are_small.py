@@ -88,3 +88,23 @@ def test_the_speed_of_a_part_that_hardly_moves_is_told():
     for name in run.outputs:
         off = np.abs(run[name] - true[name]).max() / np.ptp(true[name])
         assert run.report.output_errors[name] > 0.5 * off
+
+
+@pytest.mark.parametrize(
+    ("mass", "stiffness", "frequency", "force"), [(0.01, 5.0, 1500.0, 0.05), (0.1, 5.0, 300.0, 0.005)]
+)
+def test_what_is_told_of_a_difference_of_speeds_is_of_that(mass, stiffness, frequency, force):
+    """A pull moves both masses alike on a soft spring: the stiff one between them rings by F/(m₁ ω) in closed form,
+    ω² = k (1/m₁ + 1/m₂), and steps that see it are short."""
+    a, b = fc.PointMass("a", (1, 0, 0), 1.0), fc.PointMass("b", (2, 0, 0), mass)
+    soft = fc.Spring("soft", (0, 0, 0), (1, 0, 0), stiffness=stiffness)
+    stiff = fc.Spring("stiff", (1, 0, 0), (2, 0, 0), stiffness=mass * frequency**2)
+    held = [fc.Support(soft.start), fc.Support(a.node, "v w"), fc.Support(b.node, "v w")]
+    joints = [fc.Pin(soft.end, a.node), fc.Pin(stiff.start, a.node), fc.Pin(stiff.end, b.node)]
+    apart = fc.Velocity("apart", b.node, "x", minus=a.node)
+    plan = fc.Structure([a, b, soft, stiff], held + joints, inputs=[fc.Force("push", a.node, "x")], outputs=[apart])
+    run = fc.simulate(fc.assemble(plan, [fc.LargeRotation()]), until=2.0, inputs={"push": force})
+    omega = frequency * np.sqrt(1.0 + mass)
+    (note,) = (note for note in run.report.notes if note.startswith("apart rings"))
+    assert float(note.split("by up to ")[1].split()[0]) == pytest.approx(force / omega, rel=0.1)
+    assert float(note.split("take steps of ")[1].split()[0]) == pytest.approx(0.2 / omega, rel=0.5)

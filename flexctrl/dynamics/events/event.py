@@ -55,7 +55,8 @@ class Event:
     densely that no node turns by more than half a radian between two, at all rows that ``every`` asks for, and where
     the parabola through three such values bends to zero. What a run's rows show to have crossed is found so, and what
     crosses and comes back where it shows in such a parabola. Steps in which signals stay clear of their values, by
-    twice what they bend, are not looked at closely. What crosses twice between two places and bends otherwise goes
+    twice what they bend (and, of `Exact`, by twice what vibrations move them that turn by more than half a radian in a
+    step), are not looked at closely. What crosses twice between two places and bends otherwise goes
     unseen (a function with a kink or a narrow peak); take shorter steps for that. What only touches the value counts
     where it does so just as an input jumps (a speed that comes to zero at the end of a braking torque). What is at its
     value when a run begins has not reached it: that is not told.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,10 +14,11 @@ from flexctrl.dynamics.steps import Point
 __all__ = ["calm_steps"]
 
 _DOUBT = 2.0
+_SEEN = 1e-3
 _FEWEST = 3
 
 
-def calm_steps(watch: Watch, before: Point, table: np.ndarray, inputs: np.ndarray) -> int:
+def calm_steps(watch: Watch, before: Point, table: np.ndarray, inputs: np.ndarray, within: np.ndarray) -> int:
     """Return how many steps are over before the first one in which an event may happen; gauges keep their sizes.
 
     A value may go through zero and back within a step if it bends towards zero by more than what it is from there. How
@@ -32,6 +34,8 @@ def calm_steps(watch: Watch, before: Point, table: np.ndarray, inputs: np.ndarra
         Time and outputs after each step.
     inputs : numpy.ndarray, shape (steps + 1, inputs)
         Inputs at the start and after each of them.
+    within : numpy.ndarray, shape (outputs,)
+        How far outputs may go to and fro within steps, which values after them do not show.
 
     Returns
     -------
@@ -48,7 +52,8 @@ def calm_steps(watch: Watch, before: Point, table: np.ndarray, inputs: np.ndarra
     ahead = watch.sides[: len(events)] * values
     sizes = np.maximum.accumulate(np.maximum(np.abs(values), watch.sizes[: len(events)]))
     clear = (ahead > watch.dust_of(sizes)) & (ahead > 0.0)
-    doubtful = ~(clear[:-1] & clear[1:] & (np.minimum(ahead[:-1], ahead[1:]) > _dips(t, ahead))).all(axis=1)
+    dips = _dips(t, ahead) + np.multiply(2.0, _unseen(watch, table[:, 1:], within))
+    doubtful = ~(clear[:-1] & clear[1:] & (np.minimum(ahead[:-1], ahead[1:]) > dips)).all(axis=1)
     calm = int(np.argmax(doubtful)) if doubtful.any() else len(found)
     watch.sizes[: len(events)] = sizes[calm]
     return calm
@@ -72,6 +77,20 @@ def _values(watch: Watch, events: Sequence[Event], outputs: np.ndarray, inputs: 
         columns.append(np.array(column))
     least = min(len(column) for column in columns)
     return np.column_stack([column[:least] for column in columns])
+
+
+def _unseen(watch: Watch, outputs: np.ndarray, within: np.ndarray) -> list[float]:
+    """By how much events may be elsewhere within steps; of functions that is not known, where signals are by much."""
+    names, inputs = watch.feed.model.outputs, watch.feed.model.inputs
+    far = bool((within > _SEEN * np.abs(outputs).max(axis=0)).any())
+    return [
+        float(within[names.index(event.of)])
+        if event.of in names
+        else math.inf
+        if far and event.of not in inputs
+        else 0.0
+        for event in watch.events
+    ]
 
 
 def _dips(t: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -83,7 +83,8 @@ def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
     ride.marcher.march.turned = 0.0
     status, done = ride.marcher.travel(pacing, min(count, span))
     far = ride.marcher.march.turned > FAR
-    calm = 0 if far else calm_steps(watch, begun.point, ride.marcher.rows[:done], ride.inputs(t, done))
+    within = ride.stepper.within(begun.point, j.mark.size)
+    calm = 0 if far else calm_steps(watch, begun.point, ride.marcher.rows[:done], ride.inputs(t, done), within)
     watch.span = next_span(span, calm, calm < done)
     fitting = int(np.searchsorted(ride.marcher.rows[:done, 0], ride.until + ride.tick, "right"))
     if fitting < calm and j.saved is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["Leaps", "Tables"]
 
 _DUST = 1e-12
+_FLAT = 1e-14
+_TURN = 0.5
 
 
 @frozen(eq=False)
@@ -66,6 +69,7 @@ class Leaps:
     def __init__(self, F: Flattened, equations: ModalEquations) -> None:
         first, n, padded, ways = equations.first, F.model.n, F.flat.padded, _ways(F)
         self._filled: tuple[Tables, tuple[bool, bool]] | None = None
+        self._first, self._outputs = first, _sums(F, first.C)
         self.pairs = pairs_of(first)
         self.modes, few = 2 * self.pairs.half, first.B.shape[1]
         self.size = self.modes + few
@@ -103,6 +107,37 @@ class Leaps:
     def modal(self, state: np.ndarray) -> None:
         self.record.state[:] = 0.0
         self.record.state[self.pairs.where] = self.pairs.inverse @ state
+
+    def within(self, modal: np.ndarray, w: np.ndarray, h: float) -> np.ndarray:
+        """Return the largest sums of vibrations that turn by more than half a radian in a step, in each output.
+
+        Parameters
+        ----------
+        modal : numpy.ndarray, shape (states,)
+        w : numpy.ndarray, shape (inputs + 1,)
+            Held from there on.
+        h : float
+            Of the steps [s].
+
+        Returns
+        -------
+        numpy.ndarray, shape (outputs,)
+        """
+        poles, inverse, seen = self._vibrations
+        fast = abs(poles) * h > _TURN
+        sizes = inverse[fast] @ modal + (inverse[fast] @ self._first.B @ w) / poles[fast]
+        return np.asarray(seen[:, fast] @ abs(sizes))
+
+    @cached_property
+    def _vibrations(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Poles, what is of each in a modal state, and by how much the outputs see it; none of what drifts."""
+        A = self._first.A
+        poles, inverse, vectors = np.zeros(len(A), complex), *np.zeros((2, *A.shape), complex)
+        for block in self._first.blocks:
+            poles[block], vectors[block, block] = np.linalg.eig(A[block, block])
+            if poles[block].any():
+                inverse[block, block] = np.linalg.pinv(vectors[block, block], rcond=_FLAT)
+        return poles, inverse, abs(self._outputs @ vectors)
 
     def _columns(self, rows: np.ndarray, padded: int) -> np.ndarray:
         """A matrix on the state, as loops read it: column by column."""
@@ -200,17 +235,17 @@ def _seen(F: Flattened, both: np.ndarray, ways: np.ndarray) -> tuple[bool, np.nd
         return False, np.zeros((0, both.shape[1]))
     along = ways @ both[: F.model.n]
     along[:, -1] += ways @ F.model.rest.q
-    return True, np.vstack([_sums(F, both), along, arms])
+    sums = _sums(F, both)
+    sums[:, -1] += F.gauges.levels
+    return True, np.vstack([sums, along, arms])
 
 
 def _sums(F: Flattened, both: np.ndarray) -> np.ndarray:
-    """The outputs, likewise."""
+    """The outputs, likewise, but for where they rest."""
     model, n = F.model, F.model.n
     T, still = model.motion.jacobian(model.rest), np.zeros(model.motion.raw)
     on_places, on_rates = model.signals.slopes(model.rest, still, still.size)
-    found = np.asarray((on_places @ T) @ both[:n] + (on_rates @ T) @ both[n:])
-    found[:, -1] += F.gauges.levels
-    return found
+    return np.asarray((on_places @ T) @ both[:n] + (on_rates @ T) @ both[n:])
 
 
 def _arms(F: Flattened, both: np.ndarray) -> np.ndarray | None:

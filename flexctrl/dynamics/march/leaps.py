@@ -122,6 +122,10 @@ class LeapingStepper(MarchingStepper):
         """Steps are of one length."""
         return 0.0
 
+    def within(self, point: Any, h: float) -> np.ndarray:
+        """Return how far outputs may go to and fro within steps: by vibrations that turn by much in one."""
+        return self.marcher.leaps.within(point.modal, self.plain.forcing(point.supply.u), h)
+
     def enter(self, point: Any) -> None:
         """Put the march at a point, unless it is there."""
         if point is not self._here:

@@ -203,6 +203,10 @@ class MarchingStepper:
         """Return the local error of the step just taken over what is allowed."""
         return self.plain.error(before, after, h, moved, tolerance)
 
+    def within(self, point: AlphaPoint, h: float) -> np.ndarray:
+        """Return how far outputs may go to and fro within steps of a length beside what their ends show."""
+        return np.zeros(len(self.plain.model.outputs))
+
     def enter(self, point: AlphaPoint) -> None:
         """Put the march at a point, unless it is there."""
         if point is not self._here:

@@ -190,6 +190,6 @@ def _told(method: Integrator, swing: Swing, of: _Ringing) -> tuple[float, str]:
     if missed > _MORE * of.beside * of.way:  # something else ends it, or runs that lag unlike would be apart
         return 0.0, ""
     if missed > max(_FADED, _MORE * of.told) * of.way:
-        finer = of.step * np.sqrt(_AIM / (faded + lag))
+        finer = of.step * np.sqrt(_AIM * min(1.0 / (faded + lag), of.way / missed))  # a swing may be seen in part
         return missed, _FADING.format(**said, step=of.step, lost=-np.expm1(-faded), lag=lag, finer=finer)
     return missed, ""

@@ -155,6 +155,8 @@ class Shock:
             return Swing(part.gain * float(size), part.frequency, part.rates, part.gain)
 
         speed = isinstance(output, Velocity | AngularVelocity)
+        if speed and self._modes:  # a line by itself moves one end alone, which others may hold to its neighbours
+            return [seen(part) for part in self._modes]
         alone = [seen(part) for part in self._vibrations if speed or part.part == _source(output)]
         most = sorted(alone, key=lambda swing: swing.size)[-1:]
         if isinstance(output, Tension):
@@ -162,7 +164,7 @@ class Shock:
                 return most
             handed = [seen(part)._replace(handed_on=True) for part in self._modes]
             return [*most, *(swing for swing in handed if swing.size > _DIRECT * sum(each.size for each in most))]
-        return [*most, *map(seen, self._modes if speed else ())]
+        return most
 
     def decay(self, swing: Swing | _Vibration) -> float:
         """Return the rate at which damping, friction, a law in time have it ring out [1/s]; 0 where they drive it."""
