@@ -22,7 +22,7 @@ from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.misreading import misread
-from flexctrl.dynamics.notes.answers import answers
+from flexctrl.dynamics.notes.answers import Manner, answers
 from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
 from flexctrl.dynamics.notes.leaving import leaves
 from flexctrl.dynamics.notes.rates import are_asked, said_of_rates
@@ -191,13 +191,23 @@ def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning |
     if not journey.mark.steps:
         return run
     if beginning and can_be_told(journey):
-        law = answers(run, journey, beginning.again)
+        law = _manner(run, journey, beginning)
         asked = always or may_grow(journey, law) or are_asked(run, journey)
         if asked or leaves(run, journey, beginning.again):
-            told = laid_beside(run, journey, check, beginning, shorter(journey, law))
+            told = laid_beside(run, journey, check, beginning, shorter(run, journey, law))
             told = loosened(misread(told, run, journey, beginning, law), run, journey, beginning)
             run = bounced(told, run, journey, beginning)
     return turned_over(said_of_rates(ringing(run, journey), journey), journey)
+
+
+def _manner(run: Run, journey: Journey, beginning: Beginning) -> Manner:
+    """How a sampled law answers; one that holds what would run away goes to and fro between its limits."""
+    if journey.plan.feed.sample_time:
+        from flexctrl.dynamics.notes.sampled_growth import passed_over
+
+        if passed_over(run):
+            return Manner.HUNTING
+    return answers(run, journey, beginning.again)
 
 
 def _cut(run: Run) -> Run:

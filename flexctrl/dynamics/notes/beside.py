@@ -10,6 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.gap import Gap
+from flexctrl.dynamics.notes.heard import heard
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.notes.peaks import unresolved
 from flexctrl.dynamics.notes.percent import percent
@@ -89,7 +90,7 @@ def kept_short(journey: Journey) -> bool:
     return sample > 0.0 and journey.mark.steps < _MORE * journey.point.state.t / sample
 
 
-def shorter(journey: Journey, law: Manner) -> float:
+def shorter(run: Run, journey: Journey, law: Manner) -> float:
     """Return by how much steps of the run beside are to be shorter; 1 where they are to be longer.
 
     Parameters
@@ -113,7 +114,9 @@ def shorter(journey: Journey, law: Manner) -> float:
         return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
     cornered = fixed and (journey.plan.feed.reacting or _cornered(journey, {*journey.watch.corner_names}))
-    return 0.5 if kept_short(journey) or _flows(journey) or cornered or unresolved(journey) else 1.0
+    if kept_short(journey) or _flows(journey) or cornered or unresolved(journey):
+        return 0.5
+    return 0.5 if law is Manner.LIMITED and heard(run, journey) else 1.0
 
 
 def _flows(journey: Journey) -> bool:

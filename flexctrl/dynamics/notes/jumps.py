@@ -23,6 +23,8 @@ _ABOUT = 0.98, 0.99, 1.0, 1.01, 1.02
 _MOST, _BESIDE, _WATCHED = 16, 1e-9, 1024
 """Breaks of a law that are looked at, and how far on either side, in parts of the run; samples that are."""
 _LITTLE = 1e-6
+_PARTS, _PART = 4, 0.1
+"""In how many parts of a run samples are looked at for the largest jump, as lines lie otherwise there; what counts."""
 
 
 class Train(NamedTuple):
@@ -91,7 +93,7 @@ class Jump(NamedTuple):
 
 
 def input_jumps(run: Run, journey: Journey) -> Iterator[Jump]:
-    """Return where inputs jump: at breaks of a continuous law, as far as they are known, and at samples.
+    """Return where inputs jump: at breaks of a continuous law, as far as they are known, and at samples, most by parts.
 
     Parameters
     ----------
@@ -116,7 +118,10 @@ def input_jumps(run: Run, journey: Journey) -> Iterator[Jump]:
         return
     samples, u = _commands(run, journey)
     leaps = np.abs(np.diff(u, axis=0))
-    for row in np.unique(1 + np.argmax(leaps, axis=0)).tolist() if leaps.any() else []:
+    leaps[leaps < _PART * leaps.max(axis=0, initial=0.0)] = 0.0
+    parts = np.array_split(np.arange(len(leaps)), _PARTS)
+    rows = [1 + part[np.argmax(leaps[part], axis=0)][leaps[part].any(axis=0)] for part in parts if part.size]
+    for row in np.unique(np.concatenate([*rows, []])).astype(int).tolist():
         state = track.state(float(samples[row] * feed.sample_time))[0]
         yield Jump(state, u[row - 1], u[row], u, feed.sample_time)
 

@@ -29,8 +29,8 @@ __all__ = ["ringing"]
 _SEEN, _SEEN_BY_MANY, _LITTLE, _STEADY, _RESOLVED = 1.0, 2.0, 0.05, 0.01, 0.2
 """Radians in a step, and in one of many stages; what counts, of what an output goes through and of its largest; a step
 that sees all."""
-_BY_MANY = 0.2
-"""Of that counts where shocks follow each other: no short first steps see them."""
+_TELLING = 0.01
+"""Of what an output goes through, is told without a note: no other run sees it either."""
 _LAG = 0.3
 """Radians by which two runs part in phase from where on an extrapolation of them is larger than either."""
 _TOLD, _DUST = 1e-3, 1e-9
@@ -113,11 +113,11 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
         values = run[output.name]
         way, most = float(np.ptp(values)), float(np.abs(values).max())
         swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
-        share, note, by_many = 0.0, "", False
+        share, note, counts = 0.0, "", False
         much = max(_LITTLE * way, _STEADY * most)
         dust = (SURE if isinstance(output, Tension) else _DUST) * yards[model.outputs.index(output.name)]
         for swing, shock in sorted(swings, key=lambda each: -each[0].size):
-            if not swing.size > max(_BY_MANY * much if swing.gain > 1.0 else much, dust):
+            if not swing.size > max(_TELLING * way, dust):
                 continue
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
             step = _step(run, journey, shock, swing, lasts)
@@ -125,8 +125,8 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
             ringing = _Ringing(output.name, shock.since, lasts, step, way, told, beside)
             off, said = _told(journey.plan.method, swing, ringing)
             share = max(share, min(off / way, 1.0) if way else 1.0)
-            note, by_many = note or (said if swing.size > much else ""), by_many or swing.gain > 1.0
-        yield _Judged(output.name, share, note, bool(note) or by_many)
+            note, counts = note or (said if swing.size > much else ""), counts or swing.gain > 1.0 or off == swing.size
+        yield _Judged(output.name, share, note, bool(note) or counts)
 
 
 def _lasting(decay: float, left: float) -> float:

@@ -23,7 +23,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["grows", "of_sampled_loop"]
+__all__ = ["grows", "of_sampled_loop", "passed_over"]
 
 _MOST = 400
 _GROWN, _LOST, _BOUNDED, _TURNED = 1.0, 3.0, 20.0, 0.5
@@ -34,8 +34,9 @@ _HALVINGS, _ENDS = 10, 2
 _GROWING = 1.0 + 1e-9
 _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
+_UNSTABLE = "the sampled loop is unstable"
 _SAID = (
-    "the sampled loop is unstable{when}, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, of which "
+    _UNSTABLE + "{when}, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, of which "
     "steps of {step:.2g} s see e^{seen:.2g}; look at the gains and the sample time, or take steps of {finer:.1g} s "
     "at most"
 )
@@ -123,6 +124,20 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
         return replace(run, status=Status.FAILED, report=replace(run.report, message=missed[-1].said()))
     said = missed[0].said() if missed else between
     return _noted(run, said) if said else run
+
+
+def passed_over(run: Run) -> bool:
+    """Tell whether a run has a note of growth that its steps do not see: others in steps as long go as it does.
+
+    Parameters
+    ----------
+    run : Run
+
+    Returns
+    -------
+    bool
+    """
+    return any(note.startswith(_UNSTABLE) for note in run.report.notes)
 
 
 def grows(journey: Journey, feed: Feed | None) -> bool:

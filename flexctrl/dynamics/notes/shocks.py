@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from flexctrl.dynamics.notes.contacts import Contacts
 from flexctrl.dynamics.notes.heavy import without_light
-from flexctrl.dynamics.notes.jumps import Jump, Train, input_jumps
+from flexctrl.dynamics.notes.jumps import Train, input_jumps
 from flexctrl.dynamics.notes.outputs import Fast
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import yardsticks
@@ -38,6 +38,8 @@ _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
 _ROUND_OFF, _LITTLE, _SLACK, _AHEAD = 1e-12, 1e-6, 0.1, 1e-6
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
+_OTHERS = 0.1
+"""Of the largest jump of a command: what counts of others, at samples."""
 _DIRECT = 10.0
 """How much larger than by itself a line rings with a mode that is looked at."""
 
@@ -166,6 +168,17 @@ class Shock:
             return [*most, *(swing for swing in handed if swing.size > _DIRECT * sum(each.size for each in most))]
         return most
 
+    def unseen(self, least: float) -> np.ndarray:
+        """Return by how much outputs swing with modes that are as fast, the sum of them [1/s → size of outputs]."""
+        model, state, raw = self.model, self.state, self.model.motion.raw
+        on_place, on_rate = model.signals.slopes(state, model.rates(state), raw)
+        T, found = model.motion.jacobian(state)[:raw], np.zeros(len(model.outputs))
+        for mode in self._modes:
+            if mode.frequency > least:
+                moved = T @ mode.rates
+                found += mode.gain * np.hypot(on_place @ moved / mode.frequency, on_rate @ moved)
+        return found
+
     def decay(self, swing: Swing | _Vibration) -> float:
         """Return the rate at which damping, friction, a law in time have it ring out [1/s]; 0 where they drive it."""
         rates = swing.rates
@@ -268,7 +281,9 @@ def _source(output: Fast) -> str:
 
 
 def shocks(run: Run, journey: Journey) -> Iterator[Shock]:
-    """Return what sets a machine vibrating: what is out of balance where it begins, and the largest jump of each input.
+    """Return what sets a machine vibrating: what is out of balance where it begins, and each input's largest jumps.
+
+    At samples these are the largest of some parts of the run: what moves a cart hits no rope that hangs straight.
 
     Parameters
     ----------
@@ -281,14 +296,13 @@ def shocks(run: Run, journey: Journey) -> Iterator[Shock]:
     iterator of Shock
     """
     yield Shock.of(run, journey, journey.origin.state, [journey.origin.u], "the start", Train())
-    largest: dict[int, Jump] = {}
-    for jump in input_jumps(run, journey):
-        for i, leap in enumerate(np.abs(jump.after - jump.before).tolist()):
-            if leap > (largest[i].size(i) if i in largest else 0.0):
-                largest[i] = jump
-    for i, jump in largest.items():  # one that is the largest of several inputs has another train for each
-        since = f"t = {jump.state.t:.3g} s"
-        yield Shock.of(run, journey, jump.state, [jump.before, jump.after], since, jump.train(i))
+    found = list(input_jumps(run, journey))
+    for i in range(len(journey.plan.model.inputs)):
+        sizes = [jump.size(i) for jump in found]
+        for jump in (jump for jump in found if jump.size(i) >= (_OTHERS if jump.apart else 1.0) * max(sizes)):
+            if jump.size(i):  # one that is the largest of several inputs has another train for each
+                since = f"t = {jump.state.t:.3g} s"
+                yield Shock.of(run, journey, jump.state, [jump.before, jump.after], since, jump.train(i))
 
 
 def _later(run: Run, since: float) -> Iterator[State]:
