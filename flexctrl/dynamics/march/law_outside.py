@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["samples"]
 
 _AT_ONCE = 1000
-"""Steps from one look at the clock to the next: asking a law takes longer than that."""
+"""Steps from one look at the clock to the next, if these are several samples': asking a law takes longer than that."""
 
 
 def samples(ride: Ride, deadline: float) -> bool:
@@ -31,8 +31,7 @@ def samples(ride: Ride, deadline: float) -> bool:
     With a controller at every step this is most of a run, so what is done for a sample is done here at once.
     """
     marcher, stops, mark = ride.marcher, ride.journey.stops, ride.journey.mark
-    last, nearly, pace = ride.until + ride.tick, ride.until - ride.tick, ride.pace
-    room = min(marcher.room, _AT_ONCE)
+    last, nearly, pace, room = ride.until + ride.tick, ride.until - ride.tick, ride.pace, marcher.room
     told, reads, sample = ride.journey.plan.feed.told, ride.journey.plan.feed.reads, stops.sample
     clock, steps, times, y = marcher.clock, marcher.steps, marcher.times, marcher.readings
     held, first = Held(ride.supply.rate, []), ride.supply.u
@@ -44,7 +43,7 @@ def samples(ride: Ride, deadline: float) -> bool:
         stop = (stops.passed + 1) * sample
         count = math.ceil((stop - t) / pace - 1e-6) or 1
         wanted = done + count
-        if wanted > room or stop > last:
+        if wanted > (min(room, _AT_ONCE) if done else room) or stop > last:
             break
         h, start = (stop - t) / count, done
         turned[0] = 0.0
