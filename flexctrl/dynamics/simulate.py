@@ -24,6 +24,7 @@ from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.misreading import misread
 from flexctrl.dynamics.notes.answers import Manner, answers
 from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
+from flexctrl.dynamics.notes.heeded import heeded
 from flexctrl.dynamics.notes.leaving import leaves
 from flexctrl.dynamics.notes.rates import are_asked, said_of_rates
 from flexctrl.dynamics.notes.ringing import ringing
@@ -197,7 +198,8 @@ def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning |
             told = laid_beside(run, journey, check, beginning, shorter(run, journey, law))
             told = loosened(misread(told, run, journey, beginning, law), run, journey, beginning)
             run = bounced(told, run, journey, beginning)
-    return turned_over(said_of_rates(ringing(run, journey), journey), journey)
+    told = turned_over(said_of_rates(ringing(run, journey), journey), journey)
+    return heeded(told, journey, beginning.again) if beginning else told
 
 
 def _manner(run: Run, journey: Journey, beginning: Beginning) -> Manner:
