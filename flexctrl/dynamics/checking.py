@@ -57,7 +57,8 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     Run
     """
     told, others = _by_all(run, journey, method, beginning, shorter)
-    if others and _may_be_lost(run, journey, method, others):
+    cut = any(other.run.status is Status.INTERRUPTED for other in others)
+    if others and not cut and _may_be_lost(run, journey, method, others):
         tolerance, sample = journey.plan.tolerance, journey.plan.feed.sample_time
         steady = isinstance(method.pace, Fixed)
         nearby = method.finer(tolerance, sample, 0.5) if steady else method.coarser(tolerance, _NEARER)
@@ -88,7 +89,7 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     coarser = method.coarser(tolerance)
     told, first = _told(run, journey, coarser, beginning)
     if not first or first[0].run.status is Status.INTERRUPTED:
-        return told, ()
+        return told, first
     other = first[0]
     alike = _SAMPLED if journey.plan.feed.sample_time else _ALIKE
     if isinstance(method.pace, Controlled) and other.run.report.steps > alike * run.report.steps:

@@ -40,12 +40,15 @@ class Beginning:
     feed : Feed
     spare : Controller or None
         As it was before the run, as a law in Python may remember what it is asked; None where it cannot be copied.
+    cost : float
+        Processor time that the run has taken: what else goes on, or a law waits for, is no measure of others [s].
     """
 
     start: State | Rest | Checkpoint | None
     spacing: float | None
     feed: Feed
     spare: Controller | None
+    cost: float = 0.0
 
     @staticmethod
     def of(start: State | Rest | Checkpoint | None, spacing: float | None, feed: Feed) -> Beginning:
@@ -154,10 +157,10 @@ def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tu
     if not isinstance(start, Checkpoint):  # the whole way, of which this run has gone the last part
         work = max(work, run.report.steps / max(run.report.steps - beginning.steps, 1))
     work /= min(beside.longer, 1.0)
-    latest = time.perf_counter() + _LONGER * work * run.report.wall_s + _SECONDS
+    latest = time.thread_time() + _LONGER * work * beginning.cost + _SECONDS
 
     def ended(share: float) -> None:
-        if time.perf_counter() > latest:
+        if time.thread_time() > latest:
             raise KeyboardInterrupt
 
     spacing = beginning.spacing if len(run.t) > 1 else end  # a run that keeps no rows is compared where it ends

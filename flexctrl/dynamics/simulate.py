@@ -147,7 +147,9 @@ def simulate(
         time.perf_counter(),
     )
     with Interruption() as kept, np.errstate(all="ignore"):  # what is beyond all numbers is told by the status
+        began = time.thread_time()
         journey, run = travelled(plan, start, events_of(events), record, spacing)
+        beginning = replace(beginning, cost=time.thread_time() - began) if beginning else None
         looked, cut = run, False
         try:
             looked = _growing(run, journey, beginning)

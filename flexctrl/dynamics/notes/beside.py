@@ -54,7 +54,10 @@ _ELSEWHERE = (
     "{where} goes elsewhere in a run {how} ({far:.2g} of the motion away, from t = {t:.3g} s): {grown}, and what is "
     "told of errors here may be too little: see whether {remedy} agrees"
 )
-_EARLY = "the {kind} run beside it ended at t = {t:.3g} s: how far small differences have grown since is not told"
+_EARLY = (
+    "the {kind} run beside it ended at t = {t:.3g} s: how far small differences have grown since is not told, nor what "
+    "outputs are off by: see whether {remedy} agrees"
+)
 
 
 def can_be_told(journey: Journey) -> bool:
@@ -230,9 +233,10 @@ def told_beside(
     early = coarse.status not in (Status.FINISHED, Status.STOPPED) and coarse.final.t < (1.0 - 1e-9) * run.final.t
     error = max(told, origin.error, report.drift if early else journey.drift.ran)
     kind = "coarser" if longer > 1.0 else "finer"
+    ended = (_EARLY.format(kind=kind, t=coarse.final.t, remedy=agreeing(journey)),) if early else ()
     if summed:  # nobody knows which share of what the two are apart is this one's
         outputs = by_rows(journey, run.y, gap.outputs, report.drift, kind)
-        notes = tuple(note for note in report.notes if note not in journey.outputs.notes) + outputs.notes
+        notes = tuple(note for note in report.notes if note not in journey.outputs.notes) + outputs.notes + ended
         return replace(run, report=replace(report, output_errors=outputs.shares, notes=notes))
     outputs = by_rows(journey, run.y, gap.outputs / left, error, kind)
     right = min(origin.right, _right(run, gap, left))
@@ -243,9 +247,7 @@ def told_beside(
         notes += (_note(journey, gap, error, right, kind),)
     elif journey.drift.note and error > told:  # a wrong speed, which both runs have alike; or nobody knows better
         notes += (journey.drift.note,)
-    if early:
-        notes += (_EARLY.format(kind=kind, t=coarse.final.t),)
-    known = replace(report, error=error, output_errors=outputs.shares, notes=notes + outputs.notes)
+    known = replace(report, error=error, output_errors=outputs.shares, notes=notes + ended + outputs.notes)
     so_far = replace(run.checkpoint.origin, error=max(told, origin.error), right=right)
     return replace(run, report=known, checkpoint=replace(run.checkpoint, origin=so_far))
 

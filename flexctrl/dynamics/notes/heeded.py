@@ -42,7 +42,7 @@ def heeded(run: Run, journey: Journey, feed: Feed | None) -> Run:
     -------
     Run
     """
-    if feed is None or not feed.reads.size or not len(run.y):
+    if feed is None or feed.controller is None or not feed.reads.size or not len(run.y):
         return run
     t, x, y, known = journey.point.state.t, journey.point.supply.x, run.y[-1, feed.reads], run.report.output_errors
     way, notes = np.ptp(run.u, axis=0), []
