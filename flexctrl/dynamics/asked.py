@@ -127,7 +127,7 @@ def events_of(given: Sequence[Event]) -> tuple[Event, ...]:
     Raises
     ------
     StructureError
-        For what is no list of them.
+        For what is no list of them, and for two of one name.
     """
     if isinstance(given, Event):
         raise StructureError(f"simulate: events = {given}; expected a list: events=[Event(…)]")
@@ -135,4 +135,7 @@ def events_of(given: Sequence[Event]) -> tuple[Event, ...]:
     for event in found:
         if not isinstance(event, Event):
             raise StructureError(f"simulate: events holds {shortened(event)}; expected Event('name', 'signal', at=…)")
+    names = [event.name for event in found]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise StructureError(f"simulate: two events are named {twice!r}; what happens is told by name: name them apart")
     return tuple(found)

@@ -34,6 +34,8 @@ from flexctrl.model.state import State
 
 __all__ = ["travelled"]
 
+_DIGITS = 12
+
 
 def travelled(
     plan: Plan,
@@ -148,7 +150,8 @@ def _first(plan: Plan, pace: Controlled, state: State, supply: Supply, span: flo
 
 def _check_going_on(plan: Plan, start: Checkpoint, watch: Watch, every: float | None) -> None:
     """Raise unless a run goes on as it was; its controller is asked later, on a model that is its own."""
-    check_same("model", machine_of(plan.model), start.machine)
+    digests = (digest[:_DIGITS] for digest in (machine_of(plan.model), start.machine))
+    check_same("model, by the digest of its names, effects and numbers", *digests)
     check_same("method", repr(plan.method), start.method)
     check_same("tolerance", plan.tolerance, start.tolerance)
     check_same("number of events", watch.count if start.passed != UNASKED else 0, len(start.sides))

@@ -262,3 +262,9 @@ def test_a_checkpoint_knows_its_tolerance(model, tmp_path: Path):
     stopped.save(tmp_path / "run.checkpoint")
     read = fc.load_checkpoint(tmp_path / "run.checkpoint")
     assert read.tolerance == tolerance
+
+
+def test_events_of_one_name_cannot_be_told_apart(model):
+    pair = [fc.Event("up", lambda y: 1.0, 0.5), fc.Event("up", lambda y: 1.0, 0.7)]
+    with pytest.raises(StructureError, match="two events are named 'up'"):
+        fc.simulate(model, until=1.0, events=pair)
