@@ -81,16 +81,11 @@ def _values(watch: Watch, events: Sequence[Event], outputs: np.ndarray, inputs: 
 
 def _unseen(watch: Watch, outputs: np.ndarray, within: np.ndarray) -> list[float]:
     """By how much events may be elsewhere within steps; of functions that is not known, where signals are by much."""
-    names, inputs = watch.feed.model.outputs, watch.feed.model.inputs
+    names = watch.feed.model.outputs
+    known = {**dict.fromkeys(watch.feed.model.inputs, 0.0), **dict(zip(names, within.tolist(), strict=True))}
     far = bool((within > _SEEN * np.abs(outputs).max(axis=0)).any())
-    return [
-        float(within[names.index(event.of)])
-        if event.of in names
-        else math.inf
-        if far and event.of not in inputs
-        else 0.0
-        for event in watch.events
-    ]
+    unknown = math.inf if far else 0.0
+    return [known.get(event.of, unknown) if isinstance(event.of, str) else unknown for event in watch.events]
 
 
 def _dips(t: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -16,15 +16,16 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Jump", "Train", "input_jumps"]
+__all__ = ["PART", "PARTS", "Jump", "Train", "input_jumps"]
 
 _ABOUT = 0.98, 0.99, 1.0, 1.01, 1.02
 """Frequencies of vibrations, over what they are found as if all else let go."""
 _MOST, _BESIDE, _WATCHED = 16, 1e-9, 1024
 """Breaks of a law that are looked at, and how far on either side, in parts of the run; samples that are."""
 _LITTLE = 1e-6
-_PARTS, _PART = 4, 0.1
-"""In how many parts of a run samples are looked at for the largest jump, as lines lie otherwise there; what counts."""
+PARTS, PART = 4, 0.1
+"""In how many parts of a run samples are looked at for the largest jump, as lines lie otherwise there; what counts of
+others beside it."""
 
 
 class Train(NamedTuple):
@@ -118,8 +119,8 @@ def input_jumps(run: Run, journey: Journey) -> Iterator[Jump]:
         return
     samples, u = _commands(run, journey)
     leaps = np.abs(np.diff(u, axis=0))
-    leaps[leaps < _PART * leaps.max(axis=0, initial=0.0)] = 0.0
-    parts = np.array_split(np.arange(len(leaps)), _PARTS)
+    leaps[leaps < PART * leaps.max(axis=0, initial=0.0)] = 0.0
+    parts = np.array_split(np.arange(len(leaps)), PARTS)
     rows = [1 + part[np.argmax(leaps[part], axis=0)][leaps[part].any(axis=0)] for part in parts if part.size]
     for row in np.unique(np.concatenate([*rows, []])).astype(int).tolist():
         state = track.state(float(samples[row] * feed.sample_time))[0]

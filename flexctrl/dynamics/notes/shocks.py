@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from flexctrl.dynamics.notes.contacts import Contacts
 from flexctrl.dynamics.notes.heavy import without_light
-from flexctrl.dynamics.notes.jumps import Train, input_jumps
+from flexctrl.dynamics.notes.jumps import PART, PARTS, Train, input_jumps
 from flexctrl.dynamics.notes.outputs import Fast
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import yardsticks
@@ -38,8 +38,6 @@ _FEW = 200
 """Degrees of freedom of a machine whose modes are looked at."""
 _ROUND_OFF, _LITTLE, _SLACK, _AHEAD = 1e-12, 1e-6, 0.1, 1e-6
 _LOOKED_AT = 0.1, 0.3, 0.6, 0.9
-_OTHERS = 0.1
-"""Of the largest jump of a command: what counts of others, at samples."""
 _DIRECT = 10.0
 """How much larger than by itself a line rings with a mode that is looked at."""
 
@@ -169,7 +167,7 @@ class Shock:
         return most
 
     def unseen(self, least: float) -> np.ndarray:
-        """Return by how much outputs swing with modes that are as fast, the sum of them [1/s → size of outputs]."""
+        """Return by how much outputs swing with modes of more than a frequency [rad/s], all of them together."""
         model, state, raw = self.model, self.state, self.model.motion.raw
         on_place, on_rate = model.signals.slopes(state, model.rates(state), raw)
         T, found = model.motion.jacobian(state)[:raw], np.zeros(len(model.outputs))
@@ -297,10 +295,10 @@ def shocks(run: Run, journey: Journey) -> Iterator[Shock]:
     """
     yield Shock.of(run, journey, journey.origin.state, [journey.origin.u], "the start", Train())
     found = list(input_jumps(run, journey))
-    for i in range(len(journey.plan.model.inputs)):
-        sizes = [jump.size(i) for jump in found]
-        for jump in (jump for jump in found if jump.size(i) >= (_OTHERS if jump.apart else 1.0) * max(sizes)):
-            if jump.size(i):  # one that is the largest of several inputs has another train for each
+    for i in range(len(journey.plan.model.inputs)):  # one that is the largest of several inputs has a train for each
+        jumps = sorted((jump for jump in found if jump.size(i)), key=lambda jump: -jump.size(i))[:PARTS]
+        for k, jump in enumerate(jumps):
+            if not k or (jump.apart and jump.size(i) >= PART * jumps[0].size(i)):
                 since = f"t = {jump.state.t:.3g} s"
                 yield Shock.of(run, journey, jump.state, [jump.before, jump.after], since, jump.train(i))
 
