@@ -86,3 +86,19 @@ def test_what_vibrates_too_fast_for_steps_counts_by_as_much_as_it_moves():
     assert rows.max() < level
     assert crossed.size
     np.testing.assert_allclose(simulated(2, 0.0, 1.0, step, "x1", level), t[crossed], atol=2e-4)
+
+
+@pytest.mark.parametrize("level", [-0.6, 0.2, 0.9])
+@pytest.mark.parametrize("step", [0.45, 0.6, 0.95, 1.3])
+def test_those_of_one_direction_are_half_of_them(step, level):
+    """A step may go through a level twice, of which one way is asked for: what comes next has its side from the end."""
+    mass = fc.PointMass("mass", (0, 0, 0), 1.0)
+    spring = fc.Spring("spring", (-5, 0, 0), (0, 0, 0), stiffness=(2.0 * np.pi) ** 2)
+    joints = [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")]
+    model = fc.assemble(fc.Structure([mass, spring], joints, outputs=[fc.Position("x", mass.node, "x")]), [])
+    start = model.displace([0]).with_(v=np.array([2.0 * np.pi]))
+    k, rises = np.arange(-1, 42), np.arcsin(level) / (2.0 * np.pi)
+    for direction, at in ((fc.Direction.RISING, k + rises), (fc.Direction.FALLING, k + 0.5 - rises)):
+        event = fc.Event("level", "x", level, direction)
+        run = fc.simulate(model, until=40.3, start=start, events=[event], method=fc.Exact(step))
+        np.testing.assert_allclose([e.t for e in run.events], at[(at > 1e-9) & (at < 40.3)], atol=1e-9)

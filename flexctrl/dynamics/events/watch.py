@@ -149,9 +149,8 @@ class Watch:
     def onlooking(self) -> Watch:
         """A watch for the events asked for alone: what these tell is nothing that switches and corners go by."""
         count, none = len(self.events), np.zeros(0)
-        return Watch(
-            self.feed, self.events, _nothing, (), _nothing, (), (), none, self.sides[:count], self.sizes[:count].copy()
-        )
+        sides, sizes = self.sides[:count].copy(), self.sizes[:count].copy()
+        return Watch(self.feed, self.events, _nothing, (), _nothing, (), (), none, sides, sizes)
 
     def left(self, after: Point, before: Point, crossing: Crossing) -> float:
         """Return how far a gauge is from zero after a step, on the side it comes from: below zero it has passed it."""

@@ -37,17 +37,20 @@ def looked_at(ride: Ride, before: Any, pacing: float | Pacing) -> tuple[int, int
     curve = j.track.curve(before, after)
     try:
         found = crossings(watch, curve, before, after, j.rows.every)
-        told = [(c, curve.at(c.t)) for c in found]
+        told, ended = [(c, curve.at(c.t)) for c in found], []
         if status in (TURNED, TURN):
-            told += [(c, after.state) for c in _at_corner(ride, watch, before, after) if c.gauge not in _gauges(found)]
-        if any(watch.stops(c.gauge) and not j.is_over(c) for c, _ in told):
+            ended = [c for c in _at_corner(ride, watch, before, after) if c.gauge not in _gauges(found)]
+        if any(watch.stops(c.gauge) and not j.is_over(c) for c in (*found, *ended)):
             return status, done, False
+        for crossing in found:  # where a step goes back over one that is not told of, it ends on the other side
+            watch.cross(crossing)
         watch.settle(after)
     except EventError:
         return status, done, False
     interval = Interval(before.state, after.state, curve.seen)
-    for crossing, state in told:
+    for crossing in ended:
         watch.cross(crossing)
+    for crossing, state in (*told, *((c, after.state) for c in ended)):
         j.happens(crossing, state, before.supply.u, interval)
     count = len(watch.events)
     j.watch.sides[:count], j.watch.sizes[:count] = watch.sides, watch.sizes
