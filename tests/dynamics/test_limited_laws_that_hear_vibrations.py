@@ -10,7 +10,7 @@ import flexctrl as fc
 from flexctrl.dynamics.feed import feed_of
 from flexctrl.dynamics.notes.shocks import Shock, Train
 
-MOTOR, LOAD = 1.0, 2.0
+MOTOR, LOAD = 1.2816, 1.2276
 
 
 class Limited:
@@ -18,14 +18,14 @@ class Limited:
 
     inputs, outputs = ("x", "v"), ("u",)
 
-    def __init__(self, sample: float, stiff: float, rate: float, most: float) -> None:
-        self.sample_time, self.stiff, self.rate, self.most = sample, stiff, rate, most
+    def __init__(self, sample: float, stiff: float, rate: float, most: float, lasts: float = 10.0) -> None:
+        self.sample_time, self.stiff, self.rate, self.most, self.lasts = sample, stiff, rate, most, lasts
 
     def initial(self) -> np.ndarray:
         return np.zeros(1)
 
     def command(self, t: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        omega, share = self.stiff / self.sample_time, min(t * self.stiff / self.sample_time / 10.0, 1.0)
+        omega, share = self.stiff / self.sample_time, min(t * self.stiff / self.sample_time / self.lasts, 1.0)
         wanted = 3.0 * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
         mass = MOTOR + LOAD
         most = self.most * mass * omega**2 * 3.0
@@ -62,14 +62,10 @@ def exact(A: np.ndarray, law: Limited, samples: int) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("seed", [2, 3, 5, 6, 7, 9, 12, 15])
-def test_errors_are_told(seed):
+def judged(omega: float, zeta: float, law: Limited) -> None:
     """What is off by more than a percent is told as a third of that at least, or there is a note; or it has failed."""
-    rng = np.random.default_rng(seed)
-    omega, zeta = rng.uniform(15.0, 60.0), rng.uniform(0.005, 0.05)
-    law = Limited(rng.uniform(2.0, 5.0) / omega, rng.uniform(0.1, 0.25), rng.uniform(0.02, 0.2), rng.uniform(0.2, 1.0))
     model, A = shaft(omega, zeta)
-    samples = round(20.0 / law.stiff)
+    samples = round(2.0 * law.lasts / law.stiff)
     run = fc.simulate(model, law, until=samples * law.sample_time, every=law.sample_time)
     true = exact(A, law, samples)
     for i, name in enumerate(("x", "v")):
@@ -77,6 +73,19 @@ def test_errors_are_told(seed):
         told = run.report.output_errors.get(name, 0.0)
         noted = run.status is fc.Status.FAILED or any(name in note.split() for note in run.report.notes)
         assert noted or off < max(0.01, 3.0 * told), (name, off, told)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 5, 46, 92, 244])
+def test_errors_are_told(seed):
+    rng = np.random.default_rng(seed)
+    omega, zeta = rng.uniform(15.0, 60.0), rng.uniform(0.005, 0.05)
+    law = Limited(rng.uniform(2.0, 5.0) / omega, rng.uniform(0.1, 0.25), rng.uniform(0.02, 0.2), rng.uniform(0.2, 1.0))
+    judged(omega, zeta, law)
+
+
+def test_what_is_kept_of_a_misread_sample_is_told():
+    """Its place was 2.3 % off, told as 0.5 without a note: nothing grows here, and steps are shorter than samples."""
+    judged(30.764, 0.0200127, Limited(0.069948, 0.314368, 0.027598, 0.709451, 6.49008))
 
 
 def test_what_is_unseen_is_what_modes_swing_by():

@@ -15,6 +15,7 @@ __all__ = ["calm_steps"]
 
 _DOUBT = 2.0
 _SEEN = 1e-3
+"""Of the largest value of a signal: vibrations that may count in a function of it."""
 _FEWEST = 3
 
 

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 __all__ = ["Leaps", "Tables"]
 
 _DUST = 1e-12
-_FLAT = 1e-14
-_TURN = 0.5
+_TURN, _FLAT = 0.5, 1e-14
+"""What turns by less in a step, its ends show [rad]. Vectors of critical damping are nearly
+one: what is of them may come out large, and steps are looked at then."""
 
 
 @frozen(eq=False)

@@ -31,6 +31,7 @@ _SAME = 1e-3
 _LOOP = "the continuous loop"
 _SMALL = 1e-7
 _OFTEN = 64
+"""Moments at which it is seen how far readings go."""
 
 
 class Growth(NamedTuple):
