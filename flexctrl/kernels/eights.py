@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, overload
 
 import numpy as np
 
-__all__ = ["Eight", "ahead", "eight", "larger", "largest", "lost", "put", "rounded", "total"]
+__all__ = ["Eight", "ahead", "eight", "larger", "largest", "lost", "put", "put_six", "rounded", "total"]
 
 SPLIT = 2.0**27 + 1.0
 
@@ -21,6 +21,11 @@ def eight(x: np.ndarray) -> Eight:
 def put(x: np.ndarray, value: Eight | float) -> None:
     """Write the first eight entries of a vector."""
     x[:8] = value
+
+
+def put_six(y: np.ndarray, x: np.ndarray) -> None:
+    """Copy the first six entries of one vector into another, in two moves."""
+    y[:6] = x[:6]
 
 
 def ahead(x: np.ndarray) -> None:

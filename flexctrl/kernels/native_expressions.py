@@ -28,7 +28,9 @@ from flexctrl.kernels.native_types import (
 
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _ORDER = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
-_EIGHTS = {getattr(eights, n): n for n in ("ahead", "eight", "put", "larger", "largest", "total", "rounded", "lost")}
+_EIGHTS = {
+    getattr(eights, n): n for n in ("ahead", "eight", "put", "put_six", "larger", "largest", "total", "rounded", "lost")
+}
 _BUILT_IN = ("float", "int", "abs", "min", "max")
 
 
@@ -50,6 +52,7 @@ class Expressions:
         self.libraries: set[str] = set()
         self.lines: list[str] = []
         self.slots: dict[str, Value] = {}
+        self.fetched: dict[tuple[str, str], Value] = {}
         self.count = 0
         self.line = 0
 
@@ -171,6 +174,8 @@ class Expressions:
             return self._constant(getattr(math, e.attr))
         if self._is_absent(e):
             return Value("int", "0")
+        if isinstance(e.value, ast.Name) and (e.value.id, e.attr) in self.fetched:
+            return self.fetched[e.value.id, e.attr]
         kind, place, attributes = self._place(e)
         return self._value(kind, f"load {llvm_type(kind)}, ptr {place}{attributes}")
 
@@ -277,6 +282,9 @@ class Expressions:
         if name == "put":
             self._put(f"store {EIGHT} {self._cast(arguments[1], 'Eight').text}, ptr {a}, align 8")
             return Value(None, "")
+        if name == "put_six":
+            self._put_six(a, arguments[1].text)
+            return Value(None, "")
         if name in ("rounded", "lost"):
             kind = "Eight" if name == "lost" or "Eight" in (arguments[0].type, arguments[1].type) else "float"
             one, other = (self._cast(value, kind).text for value in arguments)
@@ -290,6 +298,14 @@ class Expressions:
         if name == "largest":
             return self._value("float", f"call double @llvm.vector.reduce.fmax.v8f64({EIGHT} {a})")
         return self._value("float", f"call reassoc double @llvm.vector.reduce.fadd.v8f64(double 0.0, {EIGHT} {a})")
+
+    def _put_six(self, goal: str, source: str) -> None:
+        """Read all of it before any is written, which LLVM may not do by itself: goal and source might overlap."""
+        ends = [self._value("ptr", f"getelementptr double, ptr {at}, i64 4").text for at in (goal, source)]
+        moves = (("<4 x double>", goal, source), ("<2 x double>", *ends))
+        values = [self._value("Eight", f"load {kind}, ptr {start}, align 8").text for kind, _, start in moves]
+        for (kind, to, _), value in zip(moves, values, strict=True):
+            self._put(f"store {kind} {value}, ptr {to}, align 8")
 
     def _calling(self, callee: Callable[..., Any], arguments: list[Value]) -> Value:
         parameters, result = signature(callee)

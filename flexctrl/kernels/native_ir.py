@@ -116,10 +116,25 @@ class Translation(Expressions):
 
     def _while(self, s: ast.While) -> None:
         head, body, end = self._new("while"), self._new("do"), self._new("done")
+        known = self._fetch(s)
         self._label(head)
         self.lines += [f"  br i1 {self._truth(s.test)}, label %{body}, label %{end}", f"{body}:"]
         self._looped(s.body, head, end)
         self.lines += [f"  br label %{head}", f"{end}:"]
+        self.fetched = known
+
+    def _fetch(self, loop: ast.For | ast.While) -> dict[tuple[str, str], Value]:
+        """Load where vectors of records are before the loop that reads them; return what had been before.
+
+        They stay where they are, and LLVM's passes would have to prove that nothing is written there.
+        """
+        before, inside = dict(self.fetched), list(ast.walk(loop))
+        given = {node.id for node in inside if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+        fields = [e for e in inside if isinstance(e, ast.Attribute) and self._kind(e) in VECTORS]
+        for e in fields:
+            if isinstance(e.value, ast.Name) and e.value.id not in given and not self._is_absent(e):
+                self.fetched[e.value.id, e.attr] = self._e_attribute(e)
+        return before
 
     def _looped(self, body: list[ast.stmt], again: str, end: str) -> None:
         self.loops.append((again, end))
@@ -137,6 +152,7 @@ class Translation(Expressions):
         head, body, more, end = (self._new(label) for label in ("for", "do", "next", "done"))
         hidden = f"{s.target.id}.{head}"
         self._set(hidden, first)
+        known = self._fetch(s)
         self._label(head)
         now = self._value("int", f"load i64, ptr %{hidden}.slot")
         going = self._value("bool", f"icmp {'sgt' if step.startswith('-') else 'slt'} i64 {now.text}, {last.text}")
@@ -146,6 +162,7 @@ class Translation(Expressions):
         self._label(more)
         self._set(hidden, self._value("int", f"add nsw i64 {now.text}, {step}"))
         self.lines += [f"  br label %{head}", f"{end}:"]
+        self.fetched = known
 
     def _break(self, s: ast.Break) -> None:
         self._go(self.loops[-1][1])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from flexctrl.frozen import frozen
 from flexctrl.mechanics.matrices import PlaneMass
-from flexctrl.mechanics.rotation import rotation_vector
+from flexctrl.mechanics.rotation import bend_vector
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -206,7 +206,7 @@ def beam_motion(
         chord,
         tuple(axes),
         tuple(sides),
-        tuple(rotation_vector(ca.horzcat(x, y, ca.cross(x, y))) for x, y in zip(axes, sides, strict=True)),
+        tuple(bend_vector(ca.horzcat(x, y, ca.cross(x, y))) for x, y in zip(axes, sides, strict=True)),
         tuple(frame.T @ v for v in middle),
         tuple(frame.T @ v for v in rates),
         tuple(frame.T @ a for a in accelerations),

@@ -14,19 +14,23 @@ if TYPE_CHECKING:
     from flexctrl.kernels.kernel import Kernel
 
 _ETA = (
-    *(3.289868133696453, -0.02850219777172536, -8.338566123256363e-05, -4.312023764386688e-07),
-    *(-2.5382465538976533e-09, -1.5610372429650683e-11, -9.766765671552154e-14, -6.129969711162813e-16),
-    *(-4.0302193226631364e-18, -1.8599932105651072e-20, -2.885337836317998e-22),
+    *(0.08333333333333333, 0.0013888888888888493, 3.3068783069078855e-05, 8.267195758525202e-07),
+    *(2.0876758315209403e-08, 5.28417794137108e-10, 1.3383265242757227e-11, 3.386709585497541e-13),
+    *(8.671092499832682e-15, 2.0016174875509711e-16, 8.022753758112899e-18, -1.1632690148455092e-19),
+    *(2.1135102640476063e-20, -6.650216022370511e-22, 1.8721620991907154e-23),
 )
-"""(1 − (x/2) cot(x/2)) (4π² − x²)/x² as a polynomial in x², by Chebyshev's points of 0 ≤ x² ≤ 17."""
+"""(1 − (x/2) cot(x/2))/x² as a polynomial in x², by Chebyshev's points of 0 ≤ x² ≤ 10."""
 
 
-_TURN = (
-    *(1.0, 0.33333333333334036, 0.13333333333219086, 0.057142857215233975, 0.02539682303408617, 0.011544056909281333),
-    *(0.005327455445300316, 0.0024907644081634196, 0.0011471969717270361, 0.0006322710850999908),
-    *(0.0001001955206144391, 0.0003088008987001317),
+_ABOVE = (
+    *(0.1567005519014545, 0.37623227974137, 0.32500369379038174, 0.12213847162823188, 0.0190057068906299),
+    *(0.000916612748130235, 2.68329980173041e-06),
 )
-"""φ/sin φ as a polynomial in 1 − cos φ, by Chebyshev's points of 0 ≤ φ ≤ π/4."""
+_BELOW = (
+    *(0.09975866968137832, 0.30302524987053703, 0.3499363083130913, 0.191358408398208, 0.050152210334620646),
+    *(0.00558644680067099, 0.00018270660149372035),
+)
+"""φ/sin φ as a quotient of polynomials in cos φ, by Chebyshev's points of 0 ≤ φ ≤ π/2: right to 6e-17."""
 
 
 _SINE = (
@@ -46,17 +50,38 @@ NEAR = 0.8
 def rotation_vector(R: ca.SX) -> ca.SX:
     """Return θ with R = exp(θ×), |θ| < π (casadi).
 
-    θ = (|θ|/sin|θ|) s with 2 s the axial vector of R − Rᵀ. The quotient comes from the cosines of the half and the
-    quarter of the angle, a polynomial of the latter: smooth through zero, and no arctangent.
+    θ = (|θ|/sin|θ|) s with 2 s the axial vector of R − Rᵀ. The quotient is one of polynomials of the cosine of half
+    the angle: smooth through zero, and no arctangent.
     """
     import casadi as ca
 
-    s = 0.5 * ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
-    c = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+    s, c = _sine_and_cosine(R)
     # near half a turn, what 1 + c is, is in the sine alone
-    half = ca.sqrt(0.5 * ca.if_else(c > 0.0, 1.0 + c, ca.dot(s, s) / (1.0 + ca.fabs(c))))
-    quarter = ca.sqrt(0.5 + 0.5 * half)
-    return _polynomial(1.0 - quarter, _TURN) / (half * quarter) * s
+    return _vector(s, 0.5 * ca.if_else(c > 0.0, 1.0 + c, ca.dot(s, s) / (1.0 + ca.fabs(c))))
+
+
+def bend_vector(R: ca.SX) -> ca.SX:
+    """Return the same of what is not turned by nearly half a turn (casadi), without a quotient for that.
+
+    It is right to 1e-13 of itself up to 3.1 rad.
+    """
+    s, c = _sine_and_cosine(R)
+    return _vector(s, 0.5 + 0.5 * c)
+
+
+def _sine_and_cosine(R: ca.SX) -> tuple[ca.SX, ca.SX]:
+    import casadi as ca
+
+    s = 0.5 * ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
+    return s, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+
+
+def _vector(s: ca.SX, square: ca.SX) -> ca.SX:
+    """The rotation vector along s; ``square`` is that of the cosine of half its angle."""
+    import casadi as ca
+
+    half = ca.sqrt(square)
+    return _polynomial(half, _ABOVE) / (half * _polynomial(half, _BELOW)) * s
 
 
 def _polynomial(x: ca.SX, coefficients: tuple[float, ...]) -> ca.SX:
@@ -104,13 +129,12 @@ def inverse_tangent(theta: ca.SX, v: ca.SX) -> ca.SX:
     """Return T(θ)⁻ᵀ v = v + ½ θ×v + η θ×(θ×v) (casadi), with η = (1 − (|θ|/2) cot(|θ|/2))/|θ|².
 
     T maps the rate of the rotation vector to the spatial spin, so T⁻ᵀ carries a moment conjugate to
-    the rotation vector to a moment about space axes (Cardona & Géradin 1988). η's nearest pole, a whole turn, is
-    divided out; what is left is a polynomial in |θ|², right to 1e-17 up to four radians.
+    the rotation vector to a moment about space axes (Cardona & Géradin 1988). η is a polynomial in |θ|², right to
+    1e-16 up to half a turn, beyond which no rotation vector goes.
     """
     import casadi as ca
 
-    square = ca.dot(theta, theta)
-    eta = _polynomial(square, _ETA) / (4.0 * ca.pi**2 - square)
+    eta = _polynomial(ca.dot(theta, theta), _ETA)
     turned = ca.cross(theta, v)
     return v + 0.5 * turned + eta * ca.cross(theta, turned)
 

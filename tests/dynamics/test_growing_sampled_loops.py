@@ -115,7 +115,24 @@ def test_the_steps_it_names_see_it():
         run = fc.simulate(carts(), law(1, sent=True), until=22.2, method=method, every=SAMPLE)
         assert run.status is fc.Status.FINISHED
         assert np.ptp((run["far"] - run["near"])[-40:]) > 0.3
-        assert not any("sampled loop" in note for note in run.report.notes)
+        assert not any("of which steps" in note and "sampled loop" in note for note in run.report.notes)
+        grows = 22.2 / SAMPLE * np.log(abs(by_hand(1)).max())
+        told = [note for note in run.report.notes if "the sampled loop is unstable" in note]
+        if isinstance(method, fc.GeneralizedAlpha):  # what is not checked is not told of
+            assert f"grows by e^{grows:.3g} over the run, and what steps err by with it" in told[0]
+
+
+@pytest.mark.parametrize("limit", [None, 0.05])
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.Checked(fc.ExplicitRungeKutta())])
+def test_a_law_of_the_wrong_sign_is_said_to_be_unstable(method, limit):
+    """Its numbers show it, all right; with limits it drives the machine off at full force."""
+    own = fc.Sampled(pd(-4.0, -1.0, measured="near", rate="rate", command="push"), SAMPLE)
+    wrong = fc.Saturated(own, {"push": limit}) if limit else own
+    start = carts().rest.with_(v=np.array([0.01, 0.0]))
+    run = fc.simulate(carts(), wrong, until=10.0, start=start, method=method)
+    assert run.status is fc.Status.FINISHED
+    said = [note for note in run.report.notes if "the sampled loop is unstable" in note]
+    assert [("limits" in note, "its end" in note) for note in said] == [(limit is not None, limit is None)]
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3])
@@ -186,6 +203,5 @@ def test_a_law_that_answers_little_to_much_holds_what_grows(steep, limited):
 
     state, t = np.zeros(2), np.linspace(0.0, 3.0, 50)
     feed = SimpleNamespace(reads=np.arange(2), told=told, measured=lambda _: state)
-    point = SimpleNamespace(state=SimpleNamespace(t=3.0), supply=SimpleNamespace(x=np.zeros(0)))
     run = SimpleNamespace(y=np.column_stack([0.2 * np.sin(t), 0.2 * np.cos(t)]))
-    assert _limited(run, SimpleNamespace(point=point), feed) is limited
+    assert _limited(run, SimpleNamespace(t=3.0), np.zeros(0), feed) is limited

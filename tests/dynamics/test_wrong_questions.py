@@ -88,7 +88,8 @@ def test_what_is_no_model_is_refused():
         (lambda: fc.Autosave(None), "Autosave: path = None; expected the name of a file"),
         (lambda: fc.Event("top", 3), "event 'top': of = 3; expected the name of a signal or a function"),
         (lambda: fc.Event("top", "swing", direction="up"), "direction = 'up'; expected one of Direction.RISING"),
-        (lambda: fc.Event(3, "swing"), "event 3: its name is no text"),
+        (lambda: fc.Event(3, "swing"), "event 3: expected a name"),
+        (lambda: fc.Event("", "swing"), "event '': expected a name"),
     ],
 )
 def test_values_that_cannot_be_are_refused_where_they_are_made(make, message):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flexctrl.errors import KernelError
-from flexctrl.kernels.eights import Eight, ahead, eight, larger, largest, lost, put, rounded, total
+from flexctrl.kernels.eights import Eight, ahead, eight, larger, largest, lost, put, put_six, rounded, total
 from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel
 from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly, lasting_zeros
 from flexctrl.model.flat.flat import clear as cleared
@@ -127,6 +127,18 @@ def products(m: Record) -> int:
     return 0
 
 
+def moves(m: Record) -> int:
+    inner = m.inner
+    for i in range(3):
+        put_six(m.y[8 * i :], m.x[6 * i :])
+        for j in range(2):
+            m.x[j] += m.y[inner.table[j]]
+    while inner.table[1] != m.flag:
+        put_six(m.x[2:], m.x)
+        m.flag = inner.table[1]
+    return inner.table[0] if inner.weight > 0.5 else 0
+
+
 def scaled(a: Eight) -> float:
     return largest(a * 0.5)
 
@@ -141,7 +153,7 @@ def len_of(x: Reals) -> int:
     return 2
 
 
-@pytest.mark.parametrize("function", [sums, turns, shares, eights, products])
+@pytest.mark.parametrize("function", [sums, turns, shares, eights, products, moves])
 def test_compiled_functions_do_what_python_does(function):
     plain, packed = record(), Packed(record())
     assert packed.bound(function)() == function(plain)

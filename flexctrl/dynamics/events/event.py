@@ -70,8 +70,8 @@ class Event:
 
     def __post_init__(self) -> None:
         owner = f"event {self.name!r}"
-        if not isinstance(self.name, str):
-            raise StructureError(f"{owner}: its name is no text")
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise StructureError(f"{owner}: expected a name, a text that is not empty: what happens is told by it")
         if not isinstance(self.of, str) and not callable(self.of):
             raise StructureError(f"{owner}: of = {self.of!r}; expected the name of a signal or a function of signals")
         check_finite(self.at, "at", owner)

@@ -26,15 +26,20 @@ if TYPE_CHECKING:
 __all__ = ["grows", "of_sampled_loop", "passed_over"]
 
 _MOST = 400
-_GROWN, _LOST, _BOUNDED, _TURNED = 1.0, 3.0, 20.0, 0.5
-"""Powers of e over the run: what steps may miss, beyond which nothing is right, and what of growth that steps see is
-held by limits that a loop about one place does not have; poles that turn together [rad]."""
+_GROWN, _LOST, _FAR, _BOUNDED, _TURNED = 1.0, 3.0, 4.0, 20.0, 0.5
+"""Powers of e over the run: what steps may miss, beyond which nothing is right, what is said though steps see it, and
+what of growth that steps see is held by limits that a loop about one place does not have; poles that turn together
+[rad]."""
 _SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
 _HALVINGS, _ENDS = 10, 2
 _GROWING = 1.0 + 1e-9
 _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
 _UNSTABLE = "the sampled loop is unstable"
+_SEEN = (
+    "{where} the sampled loop is unstable, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, and what "
+    "steps err by with it{held}; look at the signs, the gains and the sample time"
+)
 _SAID = (
     _UNSTABLE + "{when}, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, of which "
     "steps of {step:.2g} s see e^{seen:.2g}; look at the gains and the sample time, or take steps of {finer:.1g} s "
@@ -68,10 +73,17 @@ class Missed(NamedTuple):
 
     def said(self, when: str = "") -> str:
         """What is to be said."""
-        z = self.pole
-        pole = f"{z.real:.4g}" + (f" ± {abs(z.imag):.4g}i" if abs(z.imag) > 1e-9 else "")
         told = {"whole": self.whole, "seen": max(self.seen, 0.0), "step": self.step, "finer": self.finer}
-        return _SAID.format(pole=pole, when=when, **told)
+        return _SAID.format(pole=self._pole, when=when, **told)
+
+    def told(self, where: str, held: str) -> str:
+        """What is to be said of growth that steps see."""
+        return _SEEN.format(where=where, pole=self._pole, whole=self.whole, held=held)
+
+    @property
+    def _pole(self) -> str:
+        z = self.pole
+        return f"{z.real:.4g}" + (f" ± {abs(z.imag):.4g}i" if abs(z.imag) > 1e-9 else "")
 
 
 class Counts(NamedTuple):
@@ -110,14 +122,19 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
     Run
     """
     rho, model, steps = radius(journey.plan.method), journey.plan.model, run.report.steps
+    end = journey.point
     ended = run.status in (Status.FINISHED, Status.STOPPED) and steps > 0
-    if feed is None or not feed.sample_time or math.isnan(rho) or not (ended and isinstance(model, Model)):
+    if feed is None or not feed.sample_time or not (ended and isinstance(model, Model)):
         return run
     try:
         found = [_missed(loop, _samples(loop, journey), _counts(loop, journey), rho) for loop in _loops(journey, feed)]
         missed = [one for one in found if one and one.whole - one.seen > _GROWN]
-        lost = len(missed) == _ENDS and all(one.lost for one in missed) and not _limited(run, journey, feed)
-        between = "" if missed else _between(run, journey, feed, rho)
+        lost = (
+            len(missed) == _ENDS
+            and all(one.lost for one in missed)
+            and not _limited(run, end.state, end.supply.x, feed)
+        )
+        between = "" if missed else _between(run, journey, feed, rho) or _unstable(found, run, journey, feed)
     except (FlexctrlError, ArithmeticError, ValueError) as error:  # beside where it was, a law may say nothing
         return _noted(run, f"whether the sampled loop grows could not be told: {error}")
     if lost:
@@ -164,10 +181,29 @@ def grows(journey: Journey, feed: Feed | None) -> bool:
         return False
 
 
-def _limited(run: Run, journey: Journey, feed: Feed) -> bool:
+def _unstable(found: list[Missed | None], run: Run, journey: Journey, feed: Feed) -> str:
+    """What is to be said of a loop whose growth steps see: all along, or at the start, until a law's limits hold it."""
+    growing = [one for one in found if one and one.whole > _FAR]
+    if len(growing) == _ENDS:
+        return growing[0].told("about its start and its end", "")
+    if found and growing[:1] == found[:1] and _limited(run, *_outset(journey, feed), feed):
+        return growing[0].told("about its start", ", as long as limits do not hold it")
+    return ""
+
+
+def _outset(journey: Journey, feed: Feed) -> tuple[State, np.ndarray]:
+    law = feed.controller
+    assert law is not None
+    return journey.origin.state, np.asarray(law.initial(), dtype=float)
+
+
+def _limited(run: Run, state: State, x: np.ndarray, feed: Feed) -> bool:
     """Tell whether a law holds growth by answering less to much."""
-    t, x, y = journey.point.state.t, journey.point.supply.x, feed.measured(journey.point.state)
-    return limited(lambda read: np.array(feed.told(t, x, read)[0]), y, np.ptp(run.y[:, feed.reads], axis=0))
+    return limited(
+        lambda read: np.array(feed.told(state.t, x, read)[0]),
+        feed.measured(state),
+        np.ptp(run.y[:, feed.reads], axis=0),
+    )
 
 
 def _noted(run: Run, note: str) -> Run:
@@ -176,9 +212,8 @@ def _noted(run: Run, note: str) -> Run:
 
 def _loops(journey: Journey, feed: Feed) -> Iterator[SampledLoop]:
     """The loop about the start and about the end, but where contacts stick and where a law has no slope."""
-    law, end = feed.controller, journey.point
-    assert law is not None
-    for state, x in ((journey.origin.state, np.asarray(law.initial(), dtype=float)), (end.state, end.supply.x)):
+    end = journey.point
+    for state, x in (_outset(journey, feed), (end.state, end.supply.x)):
         yield from _loop_at(feed, state, x, end.supply.u)
 
 
@@ -237,6 +272,8 @@ def _counts(loop: SampledLoop, journey: Journey) -> Counts:
 
 def _between(run: Run, journey: Journey, feed: Feed, rho: float) -> str:
     """What is to be said of growth in the midst of a run, summed up over its parts; empty if steps see it."""
+    if math.isnan(rho):
+        return ""
     found: list[tuple[float, Missed]] = []
     for moment in moments(run.track, run.final.t, PARTS):
         state, supply = moment.state, moment.supply
@@ -260,6 +297,10 @@ def _missed(loop: SampledLoop, samples: float, counts: Counts, rho: float) -> Mi
     growing = loop.poles(_GROWING)
     if not growing.size:
         return None
+    if math.isnan(rho):  # explicit steps are as short as what grows
+        worst = max(growing, key=abs)
+        whole, step = samples * math.log(abs(worst)), loop.sample / counts.mostly
+        return Missed(complex(worst), whole, whole, whole, step, step)
     stepped = {count: loop.stepped(rho, count, 1.0) for count in {counts.fewest, counts.mostly, *counts.others}}
 
     def seen(z: complex) -> dict[int, float]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from flexctrl.kernels.eights import eight, larger, largest, put
+from flexctrl.kernels.eights import eight, larger, largest, put, put_six
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.mechanics.rotation import NEAR
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
@@ -270,8 +270,8 @@ def drive(f: Flat) -> None:
     """Give nodes and drives the rates and accelerations of the step's end."""
     for k in range(f.wholes):
         slot = f.z[NODE_SLOT * f.whole[2 * k] + _POSE :]
-        six(f.v[f.whole[2 * k + 1] :], slot)
-        six(f.rate[f.whole[2 * k + 1] :], slot[6:])
+        put_six(slot, f.v[f.whole[2 * k + 1] :])
+        put_six(slot[6:], f.rate[f.whole[2 * k + 1] :])
     for k in range(f.rates):
         f.z[f.slots[k]] = f.v[f.sources[k]]
         f.z[f.slots[k] + 6] = f.rate[f.sources[k]]
@@ -287,16 +287,6 @@ def drive(f: Flat) -> None:
             f.rating[k](f.z, f.z)
         for k in range(f.levers):
             f.changing[k](f.z, f.z)
-
-
-def six(x: Reals, y: Reals) -> None:
-    """Copy the first six entries."""
-    y[0] = x[0]
-    y[1] = x[1]
-    y[2] = x[2]
-    y[3] = x[3]
-    y[4] = x[4]
-    y[5] = x[5]
 
 
 def push(f: Flat) -> None:
@@ -388,8 +378,8 @@ def keep(f: Flat) -> None:
     """Take the end of the step as the start of the next."""
     for k in range(f.wholes):
         i = f.whole[2 * k]
-        six(f.z[NODE_SLOT * i :], f.pose[_POSE * i :])
-        six(f.z[NODE_SLOT * i + 6 :], f.pose[_POSE * i + 6 :])
+        put_six(f.pose[_POSE * i :], f.z[NODE_SLOT * i :])
+        put_six(f.pose[_POSE * i + 6 :], f.z[NODE_SLOT * i + 6 :])
     for k in range(f.moving):
         i = f.moved[k]
         for j in range(3):
