@@ -43,6 +43,8 @@ def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:
         if pivots == NODE and size == 2 * NODE:
             fetch(pivots * size, down[below + _FORTH :])
             node_forward(own, b, others, down[below:], work)
+        elif pivots == 2 * NODE and size == 3 * NODE:
+            pair_forward(own, b, others, down[below:], work)
         else:
             forward(pivots, size, own, down[below:], work)
             copy_on(pivots, work, own)
@@ -91,6 +93,31 @@ def node_forward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) ->
         own[i] = work[i]
     for i in range(NODE):
         b[others[i]] += work[NODE + i]
+
+
+def pair_forward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) -> None:
+    """Go forward from two nodes to the next, in twice three sums; of twelve unknowns eight are written at once."""
+    one = own[0] * eight(a)
+    two = own[0] * eight(a[8:])
+    three = own[0] * eight(a[16:])
+    four = own[1] * eight(a[3 * NODE :])
+    five = own[1] * eight(a[3 * NODE + 8 :])
+    six = own[1] * eight(a[3 * NODE + 16 :])
+    for k in range(2, 2 * NODE, 2):
+        column = a[3 * NODE * k :]
+        one = one + own[k] * eight(column)
+        two = two + own[k] * eight(column[8:])
+        three = three + own[k] * eight(column[16:])
+        four = four + own[k + 1] * eight(column[3 * NODE :])
+        five = five + own[k + 1] * eight(column[3 * NODE + 8 :])
+        six = six + own[k + 1] * eight(column[3 * NODE + 16 :])
+    put(own, one + four)
+    put(work, two + five)
+    put(work[8:], three + six)
+    for i in range(4):
+        own[8 + i] = work[i]
+    for i in range(NODE):
+        b[others[i]] += work[4 + i]
 
 
 def node_backward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) -> None:
