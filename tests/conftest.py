@@ -162,7 +162,7 @@ _FAMILY, _LARGE = 3, ("tests/dynamics/", "tests/effects/", "tests/model/", "test
 
 _LATER = ("tests/dynamics/",)
 _LAST = ("tests/study/", "tests/examples/", "tests/test_howto", "tests/test_cli", "tests/test_report")
-"""Rooms that take the longest: where time runs out, all others have been through."""
+"""Rooms that take the longest: where time runs out, all others have been through, and one case of every test."""
 _END = float(os.environ.get("FLEXCTRL_TESTS_END", "inf"))
 """When whatever is left is skipped [s since 1970]: CI has twenty minutes, and its machines are not alike."""
 
@@ -175,19 +175,20 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the long cases, and those between their like; what takes longest comes last."""
-    items.sort(key=lambda item: (item.nodeid.startswith(_LAST), item.nodeid.startswith(_LATER)))
+    """Mark the long cases, and those between their like; first one case of each test, and what takes longest last."""
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.nodeid.endswith(LONG):
             item.add_marker("long")
-        elif item.nodeid.startswith(_LARGE):
+        elif not item.get_closest_marker("long"):
             families.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    for cases in families.values():
+    for name, cases in families.items():
         run = {round(i * (len(cases) - 1) / (_FAMILY - 1)) for i in range(_FAMILY)}
         for i, item in enumerate(cases):
-            if len(cases) > _FAMILY and i not in run:
+            if name.startswith(_LARGE) and len(cases) > _FAMILY and i not in run:
                 item.add_marker("long")
+    first = {cases[0] for cases in families.values()}
+    items.sort(key=lambda item: (item not in first, item.nodeid.startswith(_LAST), item.nodeid.startswith(_LATER)))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
