@@ -154,8 +154,9 @@ def _confirmed(
     """
     if max(told.report.error, *told.report.output_errors.values(), 0.0) < least:
         return told, others
-    again = replace(run, checkpoint=told.checkpoint)
-    finer, finest = _told(again, journey, method.finer(journey.plan.tolerance, 0.0, shorter), beginning)
+    again, plan = replace(run, checkpoint=told.checkpoint), journey.plan
+    sample = plan.feed.sample_time if isinstance(method.pace, Fixed) else 0.0  # no step of one length goes beyond one
+    finer, finest = _told(again, journey, method.finer(plan.tolerance, sample, shorter), beginning)
     if finer.report.error > told.report.error:
         return _as_much(finer, told), (*others, *finest)
     notes = (*told.report.notes, *(note for note in finer.report.notes if note not in run.report.notes))
