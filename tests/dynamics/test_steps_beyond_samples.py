@@ -26,7 +26,7 @@ def crane() -> fc.Model:
         [fc.MotorTorque("torque", drive), fc.Force("lift", load.node, "z")],
         [
             *(fc.DriveAngle("angle", drive), fc.DriveSpeed("speed", drive)),
-            *(fc.Velocity("vz", load.node, "z"), fc.Tension("tension", rope)),
+            *(fc.Position("z", load.node, "z"), fc.Velocity("vz", load.node, "z"), fc.Tension("tension", rope)),
         ],
     )
     return fc.assemble(plan, [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
