@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -261,8 +262,39 @@ def tree(folder: str, elements: str) -> None:
     _falls(branches, joints)
 
 
-def _falls(parts: list[fc.Beam], joints: list[fc.Support | fc.Hinge | fc.Weld]) -> None:
-    machine = fc.Structure(parts, joints, outputs=[fc.Position("tip", parts[-1].end, "z")])
+def net(folder: str, elements: str) -> None:
+    """The same of a net of welded beams: what is eliminated fills in."""
+    section = fc.Section.tube(fc.STEEL, radius=0.05, thickness=0.004)
+    side = round((int(elements) / 2) ** 0.5)
+    beams = [
+        fc.Beam(f"b{i}_{j}_{k}", (i, j, 0), (i + (k == 0), j + (k == 1), 0), section, 1)
+        for i, j, k in itertools.product(range(side), range(side), range(2))
+    ]
+    at: dict[tuple[float, ...], fc.Node] = {}
+    joints = []
+    for node in (node for beam in beams for node in (beam.start, beam.end)):
+        first = at.setdefault(tuple(node.position), node)
+        joints += [] if first is node else [fc.Weld(first, node)]
+    _falls(beams, [fc.Support(at[0.0, 0.0, 0.0]), *joints])
+
+
+def mesh(folder: str, elements: str) -> None:
+    """The same of springs between point masses, held all around: as many lines as there are elements."""
+    side = round((int(elements) / 2) ** 0.5)
+    places = list(itertools.product(range(side), range(side)))
+    masses = {at: fc.PointMass(f"p{at[0]}_{at[1]}", (*at, 0), 1.0) for at in places}
+    springs, joints = [], [fc.Support(masses[at].node) for at in places if {0, side - 1} & set(at)]
+    for (i, j), (di, dj) in itertools.product(places, ((1, 0), (0, 1))):
+        if (i + di, j + dj) in masses:
+            ends = masses[i, j].node, masses[i + di, j + dj].node
+            springs.append(fc.Spring(f"s{i}_{j}_{di}", *ends, stiffness=5e3, length=0.9, damping=5.0))
+            joints += [fc.Pin(ends[0], springs[-1].start), fc.Pin(ends[1], springs[-1].end)]
+    _falls([*masses.values(), *springs], joints)
+
+
+def _falls(parts: list[Any], joints: list[fc.Support | fc.Hinge | fc.Weld | fc.Pin]) -> None:
+    tip = parts[-1].end
+    machine = fc.Structure(parts, joints, outputs=[fc.Position("tip", tip, "z"), fc.Velocity("speed", tip, "z")])
     model = fc.assemble(machine, [fc.LargeRotation(), fc.Gravity(), fc.Flexible()])
     run = fc.simulate(model, until=20e-4, method=fc.GeneralizedAlpha(1e-4))
     print(run.status.name, run.report.steps, most_resident())

@@ -43,7 +43,8 @@ from flexctrl.model.state import State
 __all__ = ["Marcher", "Pacing", "can_march"]
 
 
-_SPARE = 2
+_SPARE, _HEAVY = 2, 8_000_000
+"""Marches kept for other runs; numbers of a matrix with which one is not: there is to be room for what is told."""
 
 
 def can_march(model: Plant) -> TypeGuard[Model]:
@@ -113,7 +114,7 @@ class Marcher(Loops):
         """Leave the march to another run."""
         self.forget()
         self._heeded = None
-        if len(self._idle(self.model)) < _SPARE:
+        if len(self._idle(self.model)) < _SPARE and len(self.march.entries) < _HEAVY:
             self._idle(self.model).append(self)
 
     @property

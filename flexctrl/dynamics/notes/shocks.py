@@ -250,8 +250,13 @@ class Shock:
     def _lines(self) -> Iterator[_Vibration]:
         """About where forces balance: they part by s̈/ω² and by ṡ/ω."""
         soon = _AHEAD / max(float((np.abs(self.moves) / yardsticks(self.model)).max(initial=0.0)), 1.0)
-        ahead = lengthening(self.model, self.model.advance(self.state, soon * self.moves, self.moves, self.state.t))
-        for (name, arm, frequency), (_, later, _) in zip(lengthening(self.model, self.state), ahead, strict=True):
+        names, arms, frequencies = lengthening(self.model, self.state)
+        _, ahead, _ = lengthening(
+            self.model, self.model.advance(self.state, soon * self.moves, self.moves, self.state.t)
+        )
+        for i in self._of_interest(names, arms).tolist():
+            name, frequency = names[i], float(frequencies[i])
+            arm, later = (rows[[i]].toarray().ravel() for rows in (arms, ahead))
             free = arm / self.mass
             along = self.contacts.still(free)
             parted = float(arm @ along)
@@ -261,6 +266,14 @@ class Shock:
                 parting = arm @ self.rates + (later - arm) @ self.moves / soon  # what passes by a line parts, too
                 speed = np.hypot(parting / frequency, arm @ self.moves)
                 yield _Vibration(name, speed / parted * along, frequency)
+
+    def _of_interest(self, names: list[str], arms: sp.csr_matrix) -> np.ndarray:
+        """Numbers of the lines that outputs tell of, as far as what moves with each is what they see."""
+        told = [output.line for output in self.model.structure.outputs if isinstance(output, Tension)]
+        by_place, by_rate = self._sights
+        seen = np.diff((by_place + by_rate).tocsc().indptr) > 0
+        touches = np.asarray(abs(arms) @ seen > 0.0) | bool(self.model.switches.names)  # what sticks hands it on
+        return np.flatnonzero(touches | np.isin(names, told))
 
     def _motors(self) -> Iterator[_Vibration]:
         motion, square = self.model.motion, np.maximum(self.stiffness.diagonal(), 0.0) / self.mass

@@ -1,7 +1,8 @@
-"""Rotations whose axis comes close to its opposite: on which side it passes decides of whole turns."""
+"""Angles whose whole turns hang on the last digits: rotations whose axis comes near its opposite, and sway past ±π."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from flexctrl.dynamics.run import Run
 from flexctrl.model.model import Model
-from flexctrl.structure.outputs import Rotation
+from flexctrl.structure.outputs import Rotation, SwayAngle
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -26,9 +27,14 @@ _SAID = (
     "a node that turns along (minus)"
 )
 
+_OVER = (
+    "{name} goes over the top at t = {t:.4g} s, where it jumps from π to −π: a row stands within {near:.1g} rad of "
+    "that, less than steps may err by, and may be on the other side; compare such rows up to whole turns"
+)
+
 
 def turned_over(run: Run, journey: Journey) -> Run:
-    """Return a run with a note on the rotations whose whole turns hang on the errors of steps.
+    """Return a run with a note on the angles whose whole turns hang on the errors of steps.
 
     Parameters
     ----------
@@ -42,16 +48,33 @@ def turned_over(run: Run, journey: Journey) -> Run:
     Run
     """
     model = journey.plan.model
-    if not (isinstance(model, Model) and len(model.motion.twists) and run.track.stretches and len(run.t) > 1):
+    if not (isinstance(model, Model) and run.track.stretches and len(run.t) > 1):
         return run
+    notes = (*_opposite(run, model, journey.plan.tolerance.relative), *_over(run, model))
+    return replace(run, report=replace(run.report, notes=(*run.report.notes, *notes)))
+
+
+def _opposite(run: Run, model: Model, least: float) -> Iterator[str]:
+    """Of rotations; they are told apart by what turns, of which a model of small motion has none."""
     angles = [i for i, output in enumerate(model.structure.outputs) if isinstance(output, Rotation)]
-    error, notes = max(run.report.error, journey.plan.tolerance.relative), []
-    for number, i in enumerate(angles):
+    for number, i in enumerate(angles if len(model.motion.twists) else ()):
         passed = [_nearest(run, model, number, k) for k in _leaps(run.y[:, i])]
         near, t = min(passed, default=(np.inf, 0.0))
-        if near < min(_NEAR * error, _AT_MOST):
-            notes.append(_SAID.format(name=run.outputs[i], t=t, near=near))
-    return replace(run, report=replace(run.report, notes=(*run.report.notes, *notes)))
+        if near < min(_NEAR * max(run.report.error, least), _AT_MOST):
+            yield _SAID.format(name=run.outputs[i], t=t, near=near)
+
+
+def _over(run: Run, model: Model) -> Iterator[str]:
+    """Of sway."""
+    for i, output in enumerate(model.structure.outputs):
+        sway = run.y[:, i]
+        jumps = np.flatnonzero(np.abs(np.diff(sway)) > np.pi)
+        if isinstance(output, SwayAngle) and jumps.size:
+            rows = np.unique([jumps, jumps + 1])
+            near = np.pi - np.abs(sway[rows])
+            errs = max(run.report.output_errors.get(output.name, 0.0), run.report.error) * np.ptp(sway)
+            if near.min() < min(_NEAR * errs, _AT_MOST):
+                yield _OVER.format(name=output.name, t=run.t[rows[near.argmin()]], near=near.min())
 
 
 def _leaps(angle: np.ndarray) -> list[int]:

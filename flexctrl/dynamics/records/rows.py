@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,6 +13,7 @@ from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.inputs import Inputs
 from flexctrl.dynamics.march.weaving import Weaver
 from flexctrl.dynamics.records.dense import Curve, Hermite
+from flexctrl.dynamics.records.digest import Digested
 from flexctrl.dynamics.records.frames import Frames, Later
 from flexctrl.dynamics.records.record import Recorder
 from flexctrl.dynamics.records.tensions import Interval, Tensions
@@ -20,7 +22,8 @@ from flexctrl.model.state import State
 
 __all__ = ["Rows"]
 
-_FRAMES = 120
+_FRAMES, _FEWEST, _BYTES = 120, 24, 48e6
+"""States kept for drawing: so many, fewer of large machines."""
 _NEAR = 1e-9
 _ROUND_OFF = 1e-15
 _UNREAD = np.zeros(0)
@@ -36,7 +39,7 @@ class Rows:
     every : float or None
         Spacing [s]; None: every step.
     until : float
-        End of the run [s]; some 120 states on the way are kept for drawing.
+        End of the run [s]; some 120 states on the way are kept for drawing, 24 at the least.
     recorder : Recorder
     curve : callable
         (point before, point after) → the motion over that step.
@@ -146,9 +149,16 @@ class Rows:
         )
 
     def due(self) -> tuple[float, float]:
-        """Return when the next state for drawing is due, and their spacing."""
-        spacing = self.until / _FRAMES * (1 - _NEAR)
-        return (self.frames.last + spacing if self.frames else 0.0), spacing
+        """Return when the next state for drawing is due, and their spacing; runs that are laid beside are not drawn."""
+        if isinstance(self.recorder, Digested):
+            return math.inf, self.until
+        return (self.frames.last + self._spacing if self.frames else 0.0), self._spacing
+
+    @cached_property
+    def _spacing(self) -> float:
+        rest = self.feed.model.rest
+        size = 8.0 * (12 * len(rest.x) + 5 * rest.q.size)
+        return self.until / min(_FRAMES, max(_FEWEST, int(_BYTES / size))) * (1 - _NEAR)
 
     def ridden(
         self,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -28,7 +26,7 @@ _HELD = 1e-10
 """Share of its own that a line's matrix is firmer by, where lines side by side are one too many."""
 
 
-def lengthening(model: Model, state: State) -> Iterator[tuple[str, np.ndarray, float]]:
+def lengthening(model: Model, state: State) -> tuple[list[str], sp.csr_matrix, np.ndarray]:
     """Return how each degree of freedom lengthens each line that gives way.
 
     Parameters
@@ -38,14 +36,17 @@ def lengthening(model: Model, state: State) -> Iterator[tuple[str, np.ndarray, f
 
     Returns
     -------
-    iterator of (str, numpy.ndarray of shape (n,), float)
-        The line's name, and its frequency as if all others let go [rad/s].
+    list of str
+        The lines' names.
+    scipy.sparse.csr_matrix, shape (lines, n)
+    numpy.ndarray, shape (lines,)
+        The frequency of each as if all others let go [rad/s].
     """
     lines = giving_way(model)
-    if lines:
-        rows = (pulls_of(model, lines, state) @ model.motion.jacobian(state)).tocsr()
-        for i, (line, frequency) in enumerate(zip(lines, once(model, own_frequencies).tolist(), strict=True)):
-            yield line.name, rows[[i]].toarray().ravel(), frequency
+    if not lines:
+        return [], sp.csr_matrix((0, model.n)), np.zeros(0)
+    rows = (pulls_of(model, lines, state) @ model.motion.jacobian(state)).tocsr()
+    return [line.name for line in lines], rows, once(model, own_frequencies)
 
 
 def lengths_of(model: Model, state: State) -> np.ndarray:
