@@ -178,6 +178,21 @@ class Fixed:
 
     step: float
 
+    def between(self, sample: float) -> float:
+        """Return how long steps are between samples.
+
+        Parameters
+        ----------
+        sample : float
+            Time between two [s]; 0 where there are none.
+
+        Returns
+        -------
+        float
+            [s]
+        """
+        return sample / max(1, math.ceil(sample / self.step - 1e-6)) if sample > 0.0 else self.step
+
 
 @frozen
 class Controlled:

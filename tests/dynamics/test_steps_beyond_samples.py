@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import flexctrl as fc
 from flexctrl.design import MinimumJerk, OpenLoop, Table, Together, pd
+from flexctrl.dynamics.notes.beside import agreeing
 
 SAMPLE = 2e-3
 
@@ -57,3 +60,27 @@ def test_what_is_told_does_not_hang_on_how_long_steps_could_be(runs):
         assert run.report.output_errors == told[0].report.output_errors
         assert run.report.notes == told[0].report.notes
         assert run.report.output_errors["tension"] > 0.5 * off
+
+
+def test_steps_that_samples_even_out_are_told_of_alike(runs):
+    """Two steps a sample, whether half or 0.7 of one was asked for."""
+    model, how = runs
+    one, other = (fc.simulate(model, law(), method=fc.GeneralizedAlpha(share * SAMPLE), **how) for share in (0.5, 0.7))
+    assert np.array_equal(one.y, other.y)
+    assert one.report.output_errors == other.report.output_errors
+    assert one.report.notes == other.report.notes
+
+
+@pytest.mark.parametrize(
+    ("share", "taken"), [(20.0, 1.0), (1.0, 1.0), (0.99, 0.5), (0.5, 0.5), (0.3, 0.25), (0.1, 0.1)]
+)
+def test_what_is_advised_goes_by_the_steps_that_are_taken(share, taken):
+    """A step of a quarter of what was asked for was the same run again, wherever that was four samples or more."""
+    plan = SimpleNamespace(
+        tolerance=fc.Tolerance(),
+        method=fc.GeneralizedAlpha(share * SAMPLE),
+        feed=SimpleNamespace(sample_time=SAMPLE),
+    )
+    assert agreeing(SimpleNamespace(plan=plan)) == f"a step of {0.25 * taken * SAMPLE:.1g} s"
+    plan.feed.sample_time = 0.0
+    assert agreeing(SimpleNamespace(plan=plan)) == f"a step of {0.25 * share * SAMPLE:.1g} s"

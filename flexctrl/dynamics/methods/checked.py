@@ -16,6 +16,7 @@ from flexctrl.model.plant import Plant
 
 __all__ = ["Beside", "Checked", "Unchecked", "bare", "checked"]
 
+_FINER = "in steps {share:g} times as long"
 _LOOSER = 27.0
 """Under such a tolerance steps of a method of second order are three times as long, and errors nine times as large."""
 
@@ -182,10 +183,15 @@ class Checked(_Wrapped):
         """
         if not _changeable(self.method):
             return self.coarser(tolerance)
+        if isinstance(self.pace, Fixed):
+            less = share * self.pace.between(sample) / self.pace.step  # runs of the same steps are told of alike
+            return Beside(
+                _stepping(self.method, lambda step: less * step), tolerance, share, _FINER.format(share=share)
+            )
         shortened = _stepping(self.method, lambda step: share * min(step, sample or math.inf))
         tight = share**self.pace.steepness if isinstance(self.pace, Controlled) else 1.0
         asked = Tolerance(tight * tolerance.relative, tight * tolerance.absolute)
-        return Beside(shortened, asked, share, f"in steps {share:g} times as long")
+        return Beside(shortened, asked, share, _FINER.format(share=share))
 
 
 def _changeable(method: Any) -> bool:

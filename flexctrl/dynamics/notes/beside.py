@@ -290,7 +290,7 @@ def agreeing(journey: Journey) -> str:
     asked, pace = journey.plan.tolerance, journey.plan.method.pace
     if isinstance(pace, Controlled):
         return f"Tolerance({0.01 * asked.relative:.1g}, {0.01 * asked.absolute:.1g})"
-    return f"a step of {0.25 * pace.step:.1g} s"
+    return f"a step of {0.25 * pace.between(journey.plan.feed.sample_time):.1g} s"
 
 
 def _right(run: Run, gap: Gap, left: float) -> float:
@@ -312,5 +312,5 @@ def _note(journey: Journey, gap: Gap, error: float, right: float, kind: str) -> 
         less, asked = finer**pace.steepness, plan.tolerance
         remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
-        remedy = f"take steps of {finer * pace.step:.1g} s"
+        remedy = f"take steps of {finer * pace.between(plan.feed.sample_time):.1g} s"
     return f"{said}; places are right to {TOLD:.0%} until t = {right:.3g} s: {remedy}"

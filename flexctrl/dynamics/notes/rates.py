@@ -19,6 +19,7 @@ from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.steps import Fixed
 from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
+from flexctrl.structure.outputs import AngularVelocity, Velocity
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -193,9 +194,28 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     steady = isinstance(journey.plan.method.pace, Fixed)
     off, known = _off(apart, ways(journey, run.y), run.report.order, steady), run.report.output_errors
     found = {run.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in way}
-    shares = {name: max(share, known.get(name, 0.0)) for name, share in found.items()}
+    late = _late(run, journey, way)
+    shares = {name: max(share, known.get(name, 0.0), late.get(name, 0.0)) for name, share in found.items()}
     notes = (*run.report.notes, *_jumps(run, way, shares, min(apart, key=lambda a: a.longer).struck))
     return replace(run, report=replace(run.report, output_errors={**known, **shares}, notes=notes))
+
+
+def _late(run: Run, journey: Journey, way: dict[int, float]) -> dict[str, float]:
+    """By what share speeds may be off where a wrong speed has led what no law leads astray: as late as places are."""
+    model, sums, drift = journey.plan.model, journey.books.sums, journey.drift
+    span = journey.point.state.t - journey.origin.state.t
+    if not (drift.ran > 0.0 and drift.late.size and isinstance(model, Model) and span > 0.0):
+        return {}
+    state, raw = journey.point.state, model.motion.raw
+    rows, steps = np.diff(run.t), np.abs(np.diff(run.y, axis=0))
+    steep = (steps[rows > 0.0] / rows[rows > 0.0, None]).max(axis=0, initial=0.0)
+    speed = np.sqrt(sums.swept / span)
+    delay = np.divide(drift.late, speed, out=np.zeros_like(speed), where=speed > 0.0)
+    sight = model.signals.slopes(state, model.rates(state), raw)[1] @ model.motion.jacobian(state)[:raw]
+    shown = {i: sight[[i]].indices for i in way if isinstance(model.structure.outputs[i], Velocity | AngularVelocity)}
+    return {
+        model.outputs[i]: min(float(delay[own].max(initial=0.0) * steep[i] / way[i]), 1.0) for i, own in shown.items()
+    }
 
 
 def _jumps(run: Run, way: dict[int, float], shares: Mapping[str, float], struck: np.ndarray) -> tuple[str, ...]:

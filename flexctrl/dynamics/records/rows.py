@@ -23,7 +23,7 @@ from flexctrl.model.state import State
 __all__ = ["Rows"]
 
 _FRAMES, _FEWEST, _BYTES = 120, 24, 48e6
-"""States kept for drawing: so many, fewer of large machines."""
+"""States kept for drawing: about so many, fewer of large machines."""
 _NEAR = 1e-9
 _ROUND_OFF = 1e-15
 _UNREAD = np.zeros(0)
@@ -39,7 +39,7 @@ class Rows:
     every : float or None
         Spacing [s]; None: every step.
     until : float
-        End of the run [s]; some 120 states on the way are kept for drawing, 24 at the least.
+        End of the run [s]; some 120 states on the way are kept for drawing, some 24 of large machines.
     recorder : Recorder
     curve : callable
         (point before, point after) → the motion over that step.
