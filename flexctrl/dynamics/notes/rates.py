@@ -16,6 +16,7 @@ from flexctrl.dynamics.notes.outputs import fast, told_from, ways
 from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.notes.striking import at_events, in_both, struck
 from flexctrl.dynamics.run import Run
+from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Fixed
 from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
@@ -29,6 +30,8 @@ __all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "sa
 _POINTS, _NEAR = 4, 1e-9
 _STEEP, _MOST, _JUMP, _SHARED = 0.1, 8, 0.01, 0.3
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
+_ROUND = np.pi
+"""How far goes what does not only swing, in radians or sizes of the machine."""
 _LITTLE, _DUST, _FAINT = 1e-3, 1e-6, 1e-2
 """What is told, of its largest value; of what is noted a larger share. What is told is fainter than what is noted."""
 _ALIKE = 0.97
@@ -201,7 +204,7 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
 
 
 def _late(run: Run, journey: Journey, way: dict[int, float]) -> dict[str, float]:
-    """By what share speeds may be off where a wrong speed has led what no law leads astray: as late as places are."""
+    """By what share speeds may be off of what goes round by itself, at a wrong speed: as late as places are."""
     model, sums, drift = journey.plan.model, journey.books.sums, journey.drift
     span = journey.point.state.t - journey.origin.state.t
     if not (drift.ran > 0.0 and drift.late.size and isinstance(model, Model) and span > 0.0):
@@ -210,7 +213,8 @@ def _late(run: Run, journey: Journey, way: dict[int, float]) -> dict[str, float]
     rows, steps = np.diff(run.t), np.abs(np.diff(run.y, axis=0))
     steep = (steps[rows > 0.0] / rows[rows > 0.0, None]).max(axis=0, initial=0.0)
     speed = np.sqrt(sums.swept / span)
-    delay = np.divide(drift.late, speed, out=np.zeros_like(speed), where=speed > 0.0)
+    rounds = (speed > 0.0) & (sums.moved > _ROUND * yardsticks(model))
+    delay = np.divide(drift.late, speed, out=np.zeros_like(speed), where=rounds)
     sight = model.signals.slopes(state, model.rates(state), raw)[1] @ model.motion.jacobian(state)[:raw]
     shown = {i: sight[[i]].indices for i in way if isinstance(model.structure.outputs[i], Velocity | AngularVelocity)}
     return {
