@@ -107,7 +107,7 @@ def of_sampled_loop(run: Run, journey: Journey, feed: Feed | None) -> Run:
 
     Linear about the start and about the end: where that is so at both, the run has failed; at one, or where limits must
     have held what steps do see grow by far, or the law answers far less to much, a note says so. Small loops are looked
-    at between them, too, as gains may be high there alone.
+    at between them, too, as gains may be high there alone. Growth that steps see is right as far as it goes, and noted.
 
     Parameters
     ----------
