@@ -162,7 +162,7 @@ _FAMILY, _LARGE = 3, ("tests/dynamics/", "tests/effects/", "tests/model/", "test
 
 _LATER = ("tests/dynamics/",)
 _LAST = ("tests/study/", "tests/examples/", "tests/test_howto", "tests/test_cli", "tests/test_report")
-"""Rooms that take the longest: where time runs out, all others have been through, and one case each of many tests."""
+"""Rooms that take the longest: where time runs out, some of each file have been through, and most others."""
 _END = float(os.environ.get("FLEXCTRL_TESTS_END", "inf"))
 """When whatever is left is skipped [s since 1970]: CI has twenty minutes, and its machines are not alike."""
 
@@ -175,7 +175,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the long cases, and those between their like; of what takes longest one case of each test comes first."""
+    """Mark the long cases, and those between their like; what takes longest comes last, but for one of each file."""
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.nodeid.endswith(LONG):
@@ -188,10 +188,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             if name.startswith(_LARGE) and len(cases) > _FAMILY and i not in run:
                 item.add_marker("long")
     first = {cases[0] for cases in families.values()}
+    sample = set({item.nodeid.partition("::")[0]: item for item in reversed(items) if item in first}.values())
 
     def rank(item: pytest.Item) -> tuple[int, bool]:
         last = item.nodeid.startswith(_LAST)
-        return (1 + (item not in first) if last or item.nodeid.startswith(_LATER) else 0), last
+        if not (last or item.nodeid.startswith(_LATER)):
+            return 1, False
+        return (0 if item in sample else 2 if item in first else 3), last
 
     items.sort(key=rank)
 
