@@ -37,7 +37,7 @@ _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
 _UNSTABLE = "the sampled loop is unstable"
 _SEEN = (
-    "{where} the sampled loop is unstable, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, and what "
+    "{where} " + _UNSTABLE + ", with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, and what "
     "steps err by with it{held}; look at the signs, the gains and the sample time"
 )
 _SAID = (
@@ -186,7 +186,8 @@ def _unstable(found: list[Missed | None], run: Run, journey: Journey, feed: Feed
     growing = [one for one in found if one and one.whole > _FAR]
     if len(growing) == _ENDS:
         return growing[0].told("about its start and its end", "")
-    if found and growing[:1] == found[:1] and _limited(run, *_outset(journey, feed), feed):
+    about_start = len(found) == _ENDS and growing[:1] == found[:1]  # one that sticks there has no loop
+    if about_start and _limited(run, *_outset(journey, feed), feed):
         return growing[0].told("about its start", ", as long as limits do not hold it")
     return ""
 
