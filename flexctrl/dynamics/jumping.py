@@ -27,7 +27,7 @@ def coming(journey: Journey, t: float) -> float:
     pace, left = journey.plan.method.pace, journey.stops.next - t
     if not isinstance(pace, Fixed):
         return journey.mark.size
-    return left / max(1, math.ceil(left / pace.step - 1e-6)) if math.isfinite(left) else pace.step
+    return pace.between(left) if math.isfinite(left) else pace.step
 
 
 def under(journey: Journey, u: np.ndarray) -> State:

@@ -179,12 +179,12 @@ class Fixed:
     step: float
 
     def between(self, sample: float) -> float:
-        """Return how long steps are between samples.
+        """Return how long steps are between samples, or until the next stop.
 
         Parameters
         ----------
         sample : float
-            Time between two [s]; 0 where there are none.
+            Time between two, or until then [s]; 0 where there are none.
 
         Returns
         -------
