@@ -27,7 +27,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "Origin", "check_same", "load_checkpoint", "machine_of"]
 
-_FORMAT = 15
+_FORMAT = 16
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 

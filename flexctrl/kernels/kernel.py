@@ -8,7 +8,7 @@ code through LLVM (the extra ``fast``).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -210,6 +210,12 @@ class Run(Protocol):
 
     def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
         """Return the run on these two arrays, checked once; it keeps them alive and sees what is written to them."""
+
+    def parts(self, ends: Sequence[int] | np.ndarray) -> tuple[Run, ...]:
+        """Return runs of its items up to each of these numbers, the last of all that are left; tables are shared.
+
+        Items that are computed at once stay together: such a part ends earlier.
+        """
 
 
 class Backend(Protocol):

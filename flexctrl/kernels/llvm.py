@@ -13,8 +13,9 @@ import ctypes
 import itertools
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import addressof
+from dataclasses import replace
 from functools import cache, cached_property, partial
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
@@ -237,8 +238,7 @@ class CompiledRun:
         gather = _blocked(tables.gather[:, row_order(kernel.n_in, lanes, code.chunks)[0]], order)
         scatter = np.ascontiguousarray(tables.scatter[:, row_order(kernel.n_out, lanes, code.written)[0]])
         blocks, places = _shared(_blocked(parameter_table(kernel, params, n), order))
-        addresses = [table.ctypes.data for table in (gather, blocks, scatter, places)]
-        block = np.array([n, *addresses], dtype=np.int64)
+        block = _block(n, gather, blocks, scatter, places)
         return cls(kernel, code, tables, gather, scatter, blocks, places, block)
 
     @property
@@ -277,6 +277,20 @@ class CompiledRun:
         """Return the same run with other parameters, (n, n_par)."""
         return CompiledRun.of(self.kernel, self.code, self.tables, params)
 
+    def parts(self, ends: Sequence[int] | np.ndarray) -> tuple[CompiledRun, ...]:
+        """Return runs of its items up to each of these numbers, whole blocks of them; the last of all that are left."""
+        lanes = self.code.lanes
+        bounds = [0, *(int(end) // lanes for end in ends[:-1]), len(self.places)]
+        return tuple(self._part(a, b) for a, b in itertools.pairwise(bounds))
+
+    def _part(self, first: int, last: int) -> CompiledRun:
+        """Blocks of it."""
+        known, items = self.tables, slice(first * self.code.lanes, last * self.code.lanes)
+        tables = replace(known, gather=known.gather[items], scatter=known.scatter[items])
+        gather, scatter, places = self.gather[first:last], self.scatter[items], self.places[first:last]
+        block = _block(len(tables.gather), gather, self.blocks, scatter, places)
+        return replace(self, tables=tables, gather=gather, scatter=scatter, places=places, block=block)
+
     def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
         """Return the run on these two arrays, checked once; it keeps them alive."""
         frame = np.array([self.arguments, *self._addresses(z, r)], dtype=np.int64)
@@ -289,6 +303,11 @@ class _Fixed(partial):
     """A call on raw addresses, and who owns the memory there."""
 
     owners: tuple[object, ...]
+
+
+def _block(n: int, *tables: np.ndarray) -> np.ndarray:
+    """The ``tables`` argument of the code."""
+    return np.array([n, *(table.ctypes.data for table in tables)], dtype=np.int64)
 
 
 def _blocked(rows: np.ndarray, order: np.ndarray) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -46,6 +47,16 @@ class VMRun:
     def with_params(self, params: np.ndarray) -> VMRun:
         """Return the same run with other parameters, (n, n_par)."""
         return replace(self, params=parameter_table(self.kernel, params, len(self.gather)).copy())
+
+    def parts(self, ends: Sequence[int] | np.ndarray) -> tuple[VMRun, ...]:
+        """Return runs of its items up to each of these numbers, the last of all that are left."""
+        bounds = [0, *ends[:-1], len(self.gather)]
+        return tuple(self._part(a, b) for a, b in itertools.pairwise(bounds))
+
+    def _part(self, first: int, last: int) -> VMRun:
+        table = self.tables
+        some = replace(table, gather=table.gather[first:last], scatter=table.scatter[first:last])
+        return VMRun.of(self.kernel, some, self.params[first:last])
 
     def fixed(self, z: np.ndarray, r: np.ndarray) -> Callable[[], Any]:
         """Return the run on these two arrays, checked once; it keeps them alive."""

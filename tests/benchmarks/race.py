@@ -246,7 +246,7 @@ def bytes_an_element(elements: int) -> float:
     F = flatten(chain_model(elements, SWINGS["easy"]))
     f, fronts = F.flat, F.plan.fronts
     tables = sum(a.nbytes for run in f.forces for a in (run.gather, run.tables.scatter, run.blocks, run.places))
-    return (tables + 8 * (f.size + f.padded + fronts.below + fronts.right)) / elements
+    return (tables + 8 * (f.z.size + f.padded + fronts.below + fronts.right)) / elements
 
 
 def full_swing(quick: bool) -> dict[str, object]:

@@ -366,6 +366,22 @@ def test_parameters_can_be_replaced(backend):
         batch.with_params(second[:4])
 
 
+@pytest.mark.parametrize("backend", BACKENDS, ids=repr)
+@pytest.mark.parametrize("ends", [(37,), (16, 37), (3, 9, 9, 30, 37)], ids=repr)
+def test_parts_of_a_run_are_the_run(backend, ends):
+    """Each of the parts goes no further than it is to."""
+    kernel, rng = kernel_of(lambda x, p: x * p, n_in=2, n_par=1), np.random.default_rng(5)
+    table = np.arange(74).reshape(37, 2)
+    z, params = rng.standard_normal(74), rng.standard_normal((37, 1))
+    run = backend.bind(kernel, table, params, table)
+    whole, summed = np.zeros(74), np.zeros(74)
+    run(z, whole)
+    for end, part in zip(ends, run.parts(ends), strict=True):
+        part(z, summed)
+        assert not summed[2 * end :].any()
+    assert summed.tobytes() == whole.tobytes()
+
+
 def test_code_is_shared_by_content_never_by_name():
     first, same = (kernel_of(lambda x, p: ca.sin(x) * p, name=name) for name in ("one", "two"))
     other = kernel_of(lambda x, p: ca.sin(x) * p * (1 + EPS), name="one")

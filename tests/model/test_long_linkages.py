@@ -148,7 +148,9 @@ def test_what_long_chains_take_grows_with_their_length(rope):
         tangents = sum(run.gather.size + run.scatter.size for run in F.flat.tangents)
         loops = sum(run.gather.size for runs in (F.flat.placing, F.flat.rating, F.flat.changing) for run in runs)
         fronts = F.plan.fronts
-        taken.append([F.plan.length, fronts.below + fronts.right, F.flat.size, tangents, loops, 1 + F.axes.pair_count])
+        taken.append(
+            [F.plan.length, fronts.below + fronts.right, F.flat.z.size, tangents, loops, 1 + F.axes.pair_count]
+        )
     growth = np.log2(np.array(taken[1:]) / np.array(taken[:-1]))
     assert (growth <= 1.05).all(), growth
 

@@ -144,7 +144,7 @@ class Loops:
         made = m.factorisations
         for kept, mass in ((memory.tangent, False), (memory.mass, True)):
             if kept.size and not self._whole:
-                f.z[:], m.h = kept[: f.z.size], memory.made_for
+                f.z[: f.posed], m.h = kept[: f.posed], memory.made_for
                 self._make(mass)
             if kept.size:
                 parts = self._parts(mass)

@@ -10,8 +10,8 @@ import numpy as np
 from flexctrl.dynamics.events.nearing import Bracket
 from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.kernels.native import Reals, Wholes
-from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.flattened import Flattened
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 __all__ = [

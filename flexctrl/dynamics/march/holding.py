@@ -19,7 +19,8 @@ from flexctrl.dynamics.march.contacts import (
 from flexctrl.dynamics.march.record import Factors, March
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import Flat, drive, push
+from flexctrl.model.flat.flat import drive, push
+from flexctrl.model.flat.workspace import Flat
 
 __all__ = ["begun", "follows", "held", "lets_go", "settled_lead"]
 

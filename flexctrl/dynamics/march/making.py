@@ -172,5 +172,5 @@ def _factors(F: Flattened) -> Factors:
         made=np.zeros(9 * axes.count),
         turned=np.zeros(9 * axes.count),
         angles=np.zeros(axes.angle_count),
-        place=np.zeros(F.flat.size),
+        place=np.zeros(F.flat.posed),
     )

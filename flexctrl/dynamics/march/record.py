@@ -17,8 +17,8 @@ from flexctrl.dynamics.march.law import Law
 from flexctrl.dynamics.march.probing import Probes
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
-from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.fronts import Fronts
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.gauges import Gauges
 
 DONE, WANTS_TANGENT, WANTS_MASS, FAILED, SINGULAR, SHORT, CORNER, SILENT = 0, 1, 2, 3, 4, 5, 6, 7

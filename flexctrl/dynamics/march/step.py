@@ -20,7 +20,7 @@ from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRES
 from flexctrl.dynamics.swift.stiff_lines import SHORT, STIFF, SURE, TURNING
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, rounded, total
 from flexctrl.kernels.native import Reals, seldom
-from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, push, tangent
+from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, press_tiles, push, tangent
 from flexctrl.model.flat.fronts import factor, whose
 
 __all__ = ["blended", "newton", "press_all", "refactored", "restore", "sloped", "step", "to_rate", "to_v"]
@@ -61,6 +61,7 @@ def predict(m: March) -> None:
     h = m.h
     if m.lags.count > 0:
         hasten(m)
+    spun = 0.0 * eight(m.turns)
     for i in range(0, f.padded, 8):
         rate = eight(m.rate[i:]) + m.lean * eight(m.trend[i:])
         own = eight(m.algorithmic[i:])
@@ -68,8 +69,9 @@ def predict(m: March) -> None:
         put(f.rate[i:], rate)
         put(f.step[i:], h * eight(m.v[i:]) + h * h * ((0.5 - m.beta) * own + m.beta * lead))
         put(f.v[i:], eight(m.v[i:]) + h * ((1.0 - m.gamma) * own + m.gamma * lead))
+        spun = larger(spun, abs(eight(m.v[i:])) * eight(m.turns[i:]))
     if m.coning > 0:
-        m.fastest = fastest(m)
+        m.fastest = largest(spun)
         cone(m, f.v, -1.0)
     m.phase = EVALUATE
     m.iteration = 0
@@ -108,14 +110,6 @@ def restore(m: March) -> None:
             put(m.v[i:], eight(m.left[i:]))
             put(m.algorithmic[i:], eight(m.own[i:]))
     m.lagging = 0.0
-
-
-def fastest(m: March) -> float:
-    """Return the largest rate of what turns at the start of the step."""
-    most = 0.0 * eight(m.turns)
-    for i in range(0, m.flat.padded, 8):
-        most = larger(most, abs(eight(m.v[i:])) * eight(m.turns[i:]))
-    return largest(most)
 
 
 def cone(m: March, spins: Reals, share: float) -> None:
@@ -186,6 +180,9 @@ def press_all(m: March) -> None:
     f = m.flat
     if m.whole == 1:
         press_entire(f)
+        return
+    if f.tiles.count > 0 and m.contacts.count == 0:
+        press_tiles(f)
         return
     place(f)
     drive(f)

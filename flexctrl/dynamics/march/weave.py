@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 from flexctrl.kernels.native import Reals, Wholes
-from flexctrl.model.flat.flat import Flat, clear, drive, place
+from flexctrl.model.flat.flat import clear, drive, place
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.gauges import Gauges, read
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.turned import face

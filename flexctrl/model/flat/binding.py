@@ -31,12 +31,13 @@ __all__ = [
 
 
 def forces(layout: Layout) -> list[Run]:
-    """Sums of the forces of all pieces."""
+    """Sums of the forces of all pieces, in the order of tiles."""
     base, sources = layout.forces.drive_base, layout.motion.source_base
     goal = layout.starts["force"] + layout.targets
     bind = layout.backend.bind
     return [
-        bind(f.kernels.force, f.gather(base), f.parameters, goal[f.scatter(sources)]) for f in layout.forces.families
+        bind(f.kernels.force, f.gather(base)[order], f.parameters[order], goal[f.scatter(sources)[order]])
+        for f, order in zip(layout.forces.families, layout.tiling.orders, strict=True)
     ]
 
 

@@ -20,7 +20,9 @@ import numpy as np
 
 from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Kernel, Run
-from flexctrl.model.flat.flat import HIDDEN, Flat, clear, drive, energy, load, place, pull, push
+from flexctrl.model.flat.flat import clear, drive, energy, load, place, pull, push
+from flexctrl.model.flat.tiles import NO_TILES
+from flexctrl.model.flat.workspace import HIDDEN, Flat
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 
 if TYPE_CHECKING:
@@ -182,7 +184,7 @@ class _Drawing:
         part: dict[str, Any] = {
             name: z[s : s + layout.sizes[name]] for name, s in layout.starts.items() if name not in HIDDEN
         }
-        return Flat(z=z, **part, **self.numbers, **self.runs)
+        return Flat(z=z, **part, **self.numbers, **self.runs, tiles=NO_TILES)
 
     def _lasting(self, fixed: dict[int, float]) -> dict[int, float]:
         """Those entries of poses that stay what they are wherever the machine goes."""

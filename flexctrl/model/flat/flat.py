@@ -9,11 +9,11 @@ degrees of freedom, except those on the nodes of a linkage, which its levers car
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from flexctrl.kernels.eights import eight, larger, largest, put, put_six
-from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
+from flexctrl.kernels.native import Reals, seldom
 from flexctrl.mechanics.rotation import NEAR
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.kinds import DRIVE_SLOT, NODE_SLOT
 from flexctrl.model.motion import FAST
 
@@ -30,161 +30,16 @@ __all__ = [
     "load",
     "place",
     "press_entire",
+    "press_tiles",
     "pull",
     "push",
     "tangent",
 ]
 
-HIDDEN = frozenset({"slots", "drawn", "back", "units"})
-"""Parts of the workspace that only kernels read."""
-
 _TURN = 2.0 * math.pi
 _POSE = 12
 _FAST = FAST
 _NEAR = NEAR
-
-
-@dataclass
-class Flat:
-    """A model on flat vectors. Vectors marked * are parts of the workspace.
-
-    Attributes
-    ----------
-    n, padded : int
-        Degrees of freedom; length of their vectors, a multiple of eight and more than n.
-    size, nodes : int
-        Length of the workspace; nodes, the ground included.
-    z : Reals
-        The workspace, slots first.
-    seeds, pose, step, v, rate : Reals *
-        The tangent's seeds (3), poses at the start of the step (12 a node), and the step under way: increments,
-        rates and accelerations at its end.
-    force, load : Reals *
-        Sums of forces on the degrees of freedom, then raw ones on the linkage; the same of inputs that keep
-        their directions.
-    q : Reals *
-        Sums of the degrees of freedom at the start of the step.
-    driven, found, about : Reals *
-        Driven coordinates at the start of the step, at its end, and about what the step adds to them.
-    whole : Wholes
-        Nodes whose six degrees of freedom are their own and follow each other, and the first of these.
-    moved, turned, linked : Wholes
-        Other nodes that move and that turn by degrees of freedom of their own, and those of the linkage.
-    cells : Wholes
-        Degree of freedom of each of a node's six.
-    slots, sources : Wholes
-        Velocities of other nodes among the slots, and the degrees of freedom they are.
-    shafts, rigid, rotary : Wholes
-        Degrees of freedom of source angles, then of modes; which shafts are rigid; which joints turn.
-    ratios : Reals
-    inputs : Wholes
-        Where unit loads act, then the inputs they are of.
-    unit : Reals
-        Their values.
-    spun : Wholes
-        Degrees of freedom that turn what is driven.
-    follows : Wholes
-        Of each load that turns with a node: the input, the node, and where its three components act.
-    toward : Reals
-        Their directions at rest.
-    u : Reals *
-        Inputs.
-    shift : Reals *
-        How far all nodes are shifted and turned from the drawn shape, for models in small motion.
-    turn : Runs
-        Kernels that turn nodes by a step: by little, and by any.
-    winding, forces, tangents, energies, shifts : Runs
-        Kernels; of the linkage's drives: driven coordinates, and what steps add to them.
-    placing, rating, changing, carrying : Runs
-        What levers do: places, rates, accelerations; forces.
-    placed, levers, slopes : int
-        How many kernels place; how many do each of the others; how many tangents there are.
-    gusts : Runs
-        Kernels of the forces of gusts.
-    books : Reals *
-        Kinetic energy, stored energy, dissipated power.
-    answer : Reals *
-        Accelerations; see `accelerate`.
-    entire : Runs
-        Kernels of the whole machine, where it has few freedoms; see `flexctrl.model.flat.entire`.
-    quick : int
-        How many there are.
-    pressing : int
-        Whether the first of them gives forces (`press_entire`) rather than accelerations.
-    """
-
-    LASTING = ("linking", "placed", "levers", "carried", "quick")
-
-    n: int
-    padded: int
-    size: int
-    nodes: int
-    wholes: int
-    moving: int
-    turning: int
-    turns: int
-    linking: int
-    placed: int
-    levers: int
-    slopes: int
-    rates: int
-    drives: int
-    spinning: int
-    inner: int
-    pieces: int
-    unit_loads: int
-    following: int
-    gusting: int
-    carried: int
-    shifting: int
-    entries: int
-    drive_base: int
-    z: Reals
-    seeds: Reals
-    pose: Reals
-    step: Reals
-    v: Reals
-    rate: Reals
-    force: Reals
-    load: Reals
-    q: Reals
-    driven: Reals
-    found: Reals
-    about: Reals
-    whole: Wholes
-    moved: Wholes
-    turned: Wholes
-    linked: Wholes
-    cells: Wholes
-    slots: Wholes
-    sources: Wholes
-    shafts: Wholes
-    rigid: Wholes
-    rotary: Wholes
-    ratios: Reals
-    spun: Wholes
-    inputs: Wholes
-    unit: Reals
-    follows: Wholes
-    toward: Reals
-    u: Reals
-    shift: Reals
-    turn: Runs
-    placing: Runs
-    rating: Runs
-    changing: Runs
-    carrying: Runs
-    winding: Runs
-    forces: Runs
-    tangents: Runs
-    energies: Runs
-    shifts: Runs
-    gusts: Runs
-    books: Reals
-    answer: Reals
-    entire: Runs = ()
-    quick: int = 0
-    pressing: int = 0
 
 
 def load(f: Flat) -> None:
@@ -197,19 +52,14 @@ def load(f: Flat) -> None:
 
 def place(f: Flat) -> None:
     """Put the nodes where the step takes them."""
+    if f.tiles.count > 0:
+        place_tiles(f)
+        return
     for k in range(f.wholes):
-        x = f.pose[_POSE * f.whole[2 * k] :]
-        step = f.step[f.whole[2 * k + 1] :]
-        slot = f.z[NODE_SLOT * f.whole[2 * k] :]
-        slot[0] = x[0] + step[0]
-        slot[1] = x[1] + step[1]
-        slot[2] = x[2] + step[2]
-    for k in range(f.moving):
-        i = f.moved[k]
-        for j in range(3):
-            f.z[NODE_SLOT * i + j] = f.pose[_POSE * i + j] + f.step[f.cells[6 * i + j]]
+        move(f, k)
+    move_parted(f)
     if f.turns > 0:
-        f.turn[turned_far(f)](f.z, f.z)
+        f.turn[turned_far(f, 0, f.padded)](f.z, f.z)
     if f.shifting > 0:
         clear(f.shifting, f.shift)
         f.shifts[0](f.z, f.z)
@@ -225,10 +75,28 @@ def place(f: Flat) -> None:
         f.z[f.drive_base + DRIVE_SLOT * i] = f.q[f.shafts[i]] + f.step[f.shafts[i]]
 
 
-def turned_far(f: Flat) -> int:
-    """Return 1 where the step may turn nodes far, 0 elsewhere: which kernel turns them."""
-    most = abs(eight(f.step))
-    for i in range(8, f.padded, 8):
+def move(f: Flat, k: int) -> None:
+    """Move a whole node by the step."""
+    x = f.pose[_POSE * f.whole[2 * k] :]
+    step = f.step[f.whole[2 * k + 1] :]
+    slot = f.z[NODE_SLOT * f.whole[2 * k] :]
+    slot[0] = x[0] + step[0]
+    slot[1] = x[1] + step[1]
+    slot[2] = x[2] + step[2]
+
+
+def move_parted(f: Flat) -> None:
+    """Move nodes whose degrees of freedom stand apart."""
+    for k in range(f.moving):
+        i = f.moved[k]
+        for j in range(3):
+            f.z[NODE_SLOT * i + j] = f.pose[_POSE * i + j] + f.step[f.cells[6 * i + j]]
+
+
+def turned_far(f: Flat, first: int, last: int) -> int:
+    """Return 1 where the step may turn nodes far by these freedoms, 0 elsewhere: which kernel turns them."""
+    most = abs(eight(f.step[first:]))
+    for i in range(first + 8, last, 8):
         most = larger(most, abs(eight(f.step[i:])))
     return 0 if largest(most) <= _NEAR else 1
 
@@ -269,12 +137,8 @@ def fast(f: Flat) -> bool:
 def drive(f: Flat) -> None:
     """Give nodes and drives the rates and accelerations of the step's end."""
     for k in range(f.wholes):
-        slot = f.z[NODE_SLOT * f.whole[2 * k] + _POSE :]
-        put_six(slot, f.v[f.whole[2 * k + 1] :])
-        put_six(slot[6:], f.rate[f.whole[2 * k + 1] :])
-    for k in range(f.rates):
-        f.z[f.slots[k]] = f.v[f.sources[k]]
-        f.z[f.slots[k] + 6] = f.rate[f.sources[k]]
+        rate(f, k)
+    rate_parted(f)
     for i in range(f.drives + f.inner):
         slot = f.z[f.drive_base + DRIVE_SLOT * i :]
         slot[1] = f.v[f.shafts[i]]
@@ -287,6 +151,54 @@ def drive(f: Flat) -> None:
             f.rating[k](f.z, f.z)
         for k in range(f.levers):
             f.changing[k](f.z, f.z)
+
+
+def rate(f: Flat, k: int) -> None:
+    """Give a whole node its rates and accelerations."""
+    slot = f.z[NODE_SLOT * f.whole[2 * k] + _POSE :]
+    put_six(slot, f.v[f.whole[2 * k + 1] :])
+    put_six(slot[6:], f.rate[f.whole[2 * k + 1] :])
+
+
+def rate_parted(f: Flat) -> None:
+    """Give them to nodes whose degrees of freedom stand apart."""
+    for k in range(f.rates):
+        f.z[f.slots[k]] = f.v[f.sources[k]]
+        f.z[f.slots[k] + 6] = f.rate[f.sources[k]]
+
+
+def place_tiles(f: Flat) -> None:
+    """Put the nodes where the step takes them, tile by tile."""
+    move_parted(f)
+    for k in range(f.tiles.count):
+        for i in range(f.tiles.nodes[k], f.tiles.nodes[k + 1]):
+            move(f, i)
+        turn_tile(f, k)
+
+
+def turn_tile(f: Flat, k: int) -> None:
+    """Turn the nodes of a tile by the step."""
+    first = max(f.tiles.freedoms[k] - 8, 0)
+    f.tiles.turn[2 * k + turned_far(f, first, f.tiles.freedoms[k + 1])](f.z, f.z)
+
+
+def press_tiles(f: Flat) -> None:
+    """Place the nodes and sum up all forces at the end of the step, tile by tile."""
+    tiles = f.tiles
+    move_parted(f)
+    rate_parted(f)
+    for k in range(tiles.count):
+        for i in range(tiles.freedoms[k], tiles.freedoms[k + 1], 8):
+            put(f.force[i:], eight(f.load[i:]))
+        for i in range(tiles.nodes[k], tiles.nodes[k + 1]):
+            move(f, i)
+            rate(f, i)
+        turn_tile(f, k)
+        for i in range(k * tiles.families, (k + 1) * tiles.families):
+            tiles.forces[i](f.z, f.z)
+    for k in range(tiles.families, f.pieces):
+        f.forces[k](f.z, f.z)
+    press_following(f)
 
 
 def push(f: Flat) -> None:
@@ -342,6 +254,11 @@ def press(f: Flat) -> None:
         put(f.force[i:], eight(f.load[i:]))
     for i in range(f.padded, f.padded + f.carried):
         f.force[i] = f.load[i]
+    press_following(f)
+
+
+def press_following(f: Flat) -> None:
+    """Add the forces of inputs that turn with nodes, and of gusts."""
     for k in range(f.following):
         at = f.follows[5 * k :]
         R = f.z[NODE_SLOT * at[1] + 3 :]

@@ -9,8 +9,8 @@ import numpy as np
 from flexctrl.frozen import frozen
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.entire import Entire
-from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.fronts import Plan
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.gauges import Gauges
 from flexctrl.model.model import Model
 from flexctrl.model.state import Dry, State

@@ -13,10 +13,11 @@ from flexctrl.kernels.kernel import Backend
 from flexctrl.model.flat import binding
 from flexctrl.model.flat.axes import Axes, axes_of
 from flexctrl.model.flat.entire import Entire, entire_of
-from flexctrl.model.flat.flat import HIDDEN, Flat
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.fronts import Plan, plan_of
+from flexctrl.model.flat.tiles import Tiling, tiles_of, tiling_of
 from flexctrl.model.flat.unfolding import lever_places, together, unfolded_plan
+from flexctrl.model.flat.workspace import HIDDEN, Flat
 from flexctrl.model.gauges import Gauges, gauges_of
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.linkages.levers import Levers, Places
@@ -45,6 +46,7 @@ class Layout:
     def _sizes(self) -> dict[str, int]:
         return {
             "slots": self.forces.slot_count,
+            "u": len(self.model.inputs),
             "seeds": 3,
             "pose": 12 * len(self.motion.place),
             **dict.fromkeys(("step", "v", "rate"), self.padded),
@@ -53,7 +55,6 @@ class Layout:
             **dict.fromkeys(("found", "about", "driven"), len(self.motion.drives)),
             "answer": self.padded,
             "books": 3,
-            "u": len(self.model.inputs),
             "shift": 0,
             "units": 9 if self.unfolds else 0,
         }
@@ -139,6 +140,7 @@ class Layout:
             **self.numbers,
             **self.tables,
             **self.runs,
+            tiles=tiles_of(self.tiling, self.runs["turn"], self.runs["forces"][: len(self.forces.families)]),
             entire=self.entire.runs,
             quick=len(self.entire.runs),
             pressing=int(self.entire.pressing),
@@ -200,21 +202,32 @@ class Layout:
         return lever_places(self)
 
     @cached_property
-    def _whole(self) -> np.ndarray:
-        """Nodes whose six degrees of freedom are their own and follow each other."""
+    def whole(self) -> np.ndarray:
+        """Nodes whose six degrees of freedom are their own and follow each other, in the order of elimination."""
         own = self.own[0]
         cells = self.position[self.owned[own]]
-        return own[(np.diff(cells, axis=1) == 1).all(axis=1) & (cells[:, -1] < self.motion.n)]
+        found = own[(np.diff(cells, axis=1) == 1).all(axis=1) & (cells[:, -1] < self.motion.n)]
+        return found[np.argsort(self.position[self.owned[found, 0]])]
+
+    @cached_property
+    def turned(self) -> np.ndarray:
+        """Nodes that turn by freedoms of their own alone, or beside what levers say; whole ones first."""
+        return np.concatenate([self.whole, np.setdiff1d(self.own[2], self.whole)])
+
+    @cached_property
+    def tiling(self) -> Tiling:
+        """How nodes and pieces are cut into tiles."""
+        return tiling_of(self)
 
     @cached_property
     def tables(self) -> dict[str, Any]:
         m, owned = self.motion, self.owned
-        own, moved, turned = (np.setdiff1d(nodes, self._whole) for nodes in (self.own[0], *self._kept))
+        own, moved, turned = (np.setdiff1d(nodes, self.whole) for nodes in (self.own[0], *self._kept))
         cells = self.position[owned[own]]
         nodes, freedoms = np.nonzero(cells < m.n)
         loads = self.model.signals.loads.tocoo()
         return {
-            "whole": np.column_stack([self._whole, self.position[owned[self._whole, 0]]]).ravel(),
+            "whole": np.column_stack([self.whole, self.position[owned[self.whole, 0]]]).ravel(),
             "moved": moved,
             "turned": turned,
             "linked": np.zeros(0, dtype=int) if m.plain or self.long else m.nodes,
@@ -238,9 +251,9 @@ class Layout:
         return {
             "n": m.n,
             "padded": self.padded,
-            "size": self.length,
+            "posed": self.starts["seeds"],
             "nodes": len(m.place),
-            "wholes": len(self._whole),
+            "wholes": len(self.whole),
             "moving": len(tables["moved"]),
             "turning": len(tables["turned"]),
             "turns": len(self.runs["turn"]),
@@ -264,7 +277,7 @@ class Layout:
 
     @cached_property
     def runs(self) -> dict[str, Any]:
-        m, turned = self.motion, self.own[2]
+        m, turned = self.motion, self.turned
         own_tangents = (m.plain and not self.model.signals.follows) or self.unfolds
         damped = bool(self.model.viscous.nnz)
         return {

@@ -9,10 +9,11 @@ import numpy as np
 
 from flexctrl.kernels.kernel import Run
 from flexctrl.mechanics.rotation import turn_kernel
-from flexctrl.model.flat.flat import Flat
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.flattening import layout_of
 from flexctrl.model.flat.layout import Layout
+from flexctrl.model.flat.tiles import NO_TILES
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.linkages.chart import Chart
 from flexctrl.model.linkages.levers import Levers
@@ -45,7 +46,7 @@ def widened(model: Model, chart: Chart | None) -> tuple[Flattened, np.ndarray, n
     places = np.append(layout.position[: model.n], layout.padded + np.arange(beyond))
     if chart is not None and beyond:
         turn, placing = _runs(layout, chart, found.flat)
-        found = replace(found, flat=replace(found.flat, turn=turn, placing=placing))
+        found = replace(found, flat=replace(found.flat, turn=turn, placing=placing, tiles=NO_TILES))
     return found, found.flat.z[layout.length :], places
 
 
@@ -56,7 +57,7 @@ def _runs(layout: Layout, chart: Chart, flat: Flat) -> tuple[Sequence[Run], Sequ
     beyond = layout.length + np.arange(wide.n - own.n)
     steps = np.concatenate([starts["step"] + layout.position[: own.n], beyond, [none]])
     turn, placing = flat.turn, flat.placing
-    if (turned := layout.own[2]).size:
+    if (turned := layout.turned).size:
         old, new = (start[:, None] + 3 + np.arange(9) for start in (starts["pose"] + 12 * turned, NODE_SLOT * turned))
         theta = steps[wide.owned[: wide.source_base].reshape(-1, 6)[turned, 3:]]
         turn = (bind(turn_kernel(), np.hstack([old, theta]), np.zeros((len(turned), 0)), new),) * 2
