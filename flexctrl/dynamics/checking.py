@@ -11,6 +11,7 @@ from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.answers import jumps
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
+from flexctrl.dynamics.notes.lengths import as_many, usual
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.peaks import peaked
 from flexctrl.dynamics.notes.rates import LOST, may_be_lost, rated
@@ -28,7 +29,9 @@ _ASTRAY, _FASTER = 0.1, 1.3
 _CHANCE = 2.0 / 3.0
 """What is nearer than that, of what it would be by its order, is so by chance."""
 _ALIKE, _SAMPLED = 0.7, 0.5
-"""A coarser run with more of the steps, or so many under samples, is much the same, and makes the same errors."""
+"""A coarser run with more of the steps, or so many between stops, is much the same, and makes the same errors."""
+_CUT = 0.8
+"""A run nearby with more of the steps is much the same where stops cut them."""
 _OFF, _NEARLY = 0.01, 0.001
 """What rates are apart by that counts, as all of it may be the first run's; and a thirtieth of what is noted: coarser
 runs have told of rattling too little by seven times."""
@@ -59,9 +62,8 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
     told, others = _by_all(run, journey, method, beginning, shorter)
     cut = any(other.run.status is Status.INTERRUPTED for other in others)
     if others and not cut and _may_be_lost(run, journey, method, others):
-        tolerance, sample = journey.plan.tolerance, journey.plan.feed.sample_time
-        steady = isinstance(method.pace, Fixed)
-        nearby = method.finer(tolerance, sample, 0.5) if steady else method.coarser(tolerance, _NEARER)
+        tolerance, steady = journey.plan.tolerance, isinstance(method.pace, Fixed)
+        nearby = method.finer(tolerance, usual(journey), 0.5) if steady else method.coarser(tolerance, _NEARER)
         told, nearer = made(told, journey, nearby, beginning)
         others = (*others, nearer) if nearer else others
     return rated(told, [(other.run, other.beside.longer) for other in others], journey)
@@ -82,7 +84,7 @@ _Known = tuple[Run, tuple[Other, ...]]
 def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, shorter: float) -> _Known:
     tolerance = journey.plan.tolerance
     if shorter < 1.0:
-        told, others = _told(run, journey, method.finer(tolerance, journey.plan.feed.sample_time, shorter), beginning)
+        told, others = _told(run, journey, method.finer(tolerance, usual(journey), shorter), beginning)
         if news(told, run) or not (others and isinstance(method.pace, Fixed) and rattles(journey)):
             return told, others
         return _confirmed(run, told, others, journey, method, beginning, 0.5 * shorter)
@@ -91,7 +93,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if not first or first[0].run.status is Status.INTERRUPTED:
         return told, first
     other = first[0]
-    alike = _SAMPLED if journey.plan.feed.sample_time else _ALIKE
+    stopped = journey.plan.feed.sample_time > 0.0 or as_many(journey, coarser.longer) * coarser.longer > 1.0
+    alike = _SAMPLED if stopped else _ALIKE
     if isinstance(method.pace, Controlled) and other.run.report.steps > alike * run.report.steps:
         halved, finer = _halved(replace(run, checkpoint=told.checkpoint), journey, method, beginning)
         return (halved, (other, *finer)) if finer else (told, (other,))
@@ -99,6 +102,9 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     nearby = method.coarser(tolerance, _NEARER)
     quiet = told.report.error < _LITTLE and not news(told, run)
     parted = not quiet and told.report.error > PARTED
+    if not quiet and as_many(journey, nearby.longer) > _CUT:
+        halved, finer = _halved(replace(run, checkpoint=told.checkpoint), journey, method, beginning)
+        return (halved, (other, *finer)) if finer else (told, (other,))
     if not quiet:
         told, nearer = _nearer(run, told, other, journey, nearby, beginning)
     if told.report.error > TOLD:
@@ -155,8 +161,8 @@ def _confirmed(
     if max(told.report.error, *told.report.output_errors.values(), 0.0) < least:
         return told, others
     again, plan = replace(run, checkpoint=told.checkpoint), journey.plan
-    sample = plan.feed.sample_time if isinstance(method.pace, Fixed) else 0.0  # no step of one length goes beyond one
-    finer, finest = _told(again, journey, method.finer(plan.tolerance, sample, shorter), beginning)
+    length = usual(journey) if isinstance(method.pace, Fixed) else 0.0  # no step of one length goes beyond it
+    finer, finest = _told(again, journey, method.finer(plan.tolerance, length, shorter), beginning)
     if finer.report.error > told.report.error:
         return _as_much(finer, told), (*others, *finest)
     notes = (*told.report.notes, *(note for note in finer.report.notes if note not in run.report.notes))
@@ -167,8 +173,10 @@ def _confirmed(
 def _halved(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
     """The run with what one in half the steps tells, also of those that are kept short."""
     mean = run.final.t / max(run.report.steps, 1)
-    usual = journey.plan.feed.sample_time or 2.0 ** round(math.log2(mean))  # the same when the run goes on
-    return _told(run, journey, method.finer(journey.plan.tolerance, usual, 0.5), beginning)
+    length = usual(journey) or math.inf
+    if isinstance(method.pace, Controlled) and not journey.plan.feed.sample_time:
+        length = min(length, 2.0 ** round(math.log2(mean)))  # the same when the run goes on
+    return _told(run, journey, method.finer(journey.plan.tolerance, length, 0.5), beginning)
 
 
 def _order(near: Other, far: Other, most: float) -> float:

@@ -79,8 +79,10 @@ def test_what_is_advised_goes_by_the_steps_that_are_taken(share, taken):
     plan = SimpleNamespace(
         tolerance=fc.Tolerance(),
         method=fc.GeneralizedAlpha(share * SAMPLE),
-        feed=SimpleNamespace(sample_time=SAMPLE),
+        feed=SimpleNamespace(sample_time=SAMPLE, breaks=()),
     )
-    assert agreeing(SimpleNamespace(plan=plan)) == f"a step of {0.25 * taken * SAMPLE:.1g} s"
-    plan.feed.sample_time = 0.0
-    assert agreeing(SimpleNamespace(plan=plan)) == f"a step of {0.25 * share * SAMPLE:.1g} s"
+    for length in (taken, share):
+        until = SimpleNamespace(state=SimpleNamespace(t=100.0 * SAMPLE))
+        journey = SimpleNamespace(plan=plan, point=until, mark=SimpleNamespace(steps=100.0 / length))
+        assert agreeing(journey) == f"a step of {0.25 * length * SAMPLE:.1g} s"
+        plan.feed.sample_time = 0.0

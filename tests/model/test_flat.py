@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 import flexctrl as fc
 from flexctrl.kernels.native import Packed, Reals
 from flexctrl.model.flat.flat import drive, energy, keep, load, place, pull, push, tangent
-from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.flat.flattening import Flattened, can_be_flat, flatten
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.gauges import Gauges, read
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))

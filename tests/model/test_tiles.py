@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,7 +62,7 @@ def trident() -> fc.Structure:
 def pinned() -> fc.Structure:
     """A cable of beams pinned together: nodes at one place turn by themselves."""
     links = [fc.Beam(f"link{k}", (k, 0, 0), (k + 1, 0, 0), SECTION, elements=40) for k in range(9)]
-    pins = [fc.Pin(a.end, b.start) for a, b in zip(links, links[1:], strict=False)]
+    pins = [fc.Pin(a.end, b.start) for a, b in itertools.pairwise(links)]
     return fc.Structure(links, [fc.Support(links[0].start, held="u v w"), *pins])
 
 

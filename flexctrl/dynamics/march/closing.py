@@ -13,8 +13,8 @@ import numpy as np
 from flexctrl.kernels.kernel import Kernel
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.flat.flat import clear, drive
-from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.flat.flattened import Flattened
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.kinds import NODE_SLOT
 from flexctrl.model.motion import APART
 

@@ -13,8 +13,8 @@ import numpy as np
 from flexctrl.kernels.eights import eight, total
 from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
 from flexctrl.model.flat.flat import carry, clear
-from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.flat.flattening import Flattened, layout_of
+from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.friction_kinds import STUCK
 from flexctrl.model.laws.kinds import DRIVE_SLOT
 from flexctrl.model.state import State

@@ -14,8 +14,8 @@ from flexctrl.dynamics.swift.easing import felt_rate, unresolved
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 from flexctrl.model.flat.flat import clear, drive, place, push
-from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.flat.flattened import Flattened
+from flexctrl.model.flat.workspace import Flat
 
 __all__ = ["Flows", "feel_mean", "flow_on", "flows_of", "pivot", "released"]
 

@@ -16,8 +16,8 @@ from flexctrl.dynamics.march.corners import Corners, value
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 from flexctrl.model.flat.flat import arrive, clear, drive, place, press_entire, push
-from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.flat.flattened import Flattened
+from flexctrl.model.flat.workspace import Flat
 
 __all__ = ["Probes", "probe", "probes_of"]
 

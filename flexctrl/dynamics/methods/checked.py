@@ -166,14 +166,14 @@ class Checked(_Wrapped):
         longer, said = 2.0**share, f"in steps {2.0**share:.2g} times as long"
         return Beside(_stepping(self.method, lambda step: longer * step), tolerance, longer, said)
 
-    def finer(self, tolerance: Tolerance, sample: float, share: float) -> Beside:
-        """Return how a run is made whose steps are shorter, also those that samples keep short.
+    def finer(self, tolerance: Tolerance, usual: float, share: float) -> Beside:
+        """Return how a run is made whose steps are shorter, also those that something keeps short.
 
         Parameters
         ----------
         tolerance : Tolerance
-        sample : float
-            Time between samples [s]; 0 where there are none.
+        usual : float
+            How long steps are that are kept short [s]; 0 where none are.
         share : float
             How long they are, of what they were.
 
@@ -184,11 +184,11 @@ class Checked(_Wrapped):
         if not _changeable(self.method):
             return self.coarser(tolerance)
         if isinstance(self.pace, Fixed):
-            less = share * self.pace.between(sample) / self.pace.step  # runs of the same steps are told of alike
+            less = share * (usual or self.pace.step) / self.pace.step
             return Beside(
                 _stepping(self.method, lambda step: less * step), tolerance, share, _FINER.format(share=share)
             )
-        shortened = _stepping(self.method, lambda step: share * min(step, sample or math.inf))
+        shortened = _stepping(self.method, lambda step: share * min(step, usual or math.inf))
         tight = share**self.pace.steepness if isinstance(self.pace, Controlled) else 1.0
         asked = Tolerance(tight * tolerance.relative, tight * tolerance.absolute)
         return Beside(shortened, asked, share, _FINER.format(share=share))

@@ -11,6 +11,7 @@ import numpy as np
 from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.gap import Gap
 from flexctrl.dynamics.notes.heard import heard
+from flexctrl.dynamics.notes.lengths import as_many, usual
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.notes.peaks import unresolved
 from flexctrl.dynamics.notes.percent import percent
@@ -47,6 +48,8 @@ _LEAST, _ALL = 0.1, 0.995
 _ASTRAY, PARTED = 0.1, 0.2
 """Runs that have parted by more may both be wrong: no share of that is sure to be the finer one's."""
 _MORE = 1.2
+_CUT = 0.6
+"""Where a run in twice the step takes more of the steps, it makes some errors alike."""
 _AGAIN = 4
 """So many corners: what follows the last hangs on all before."""
 _GROWN = "small differences grow, or steps are too long"
@@ -106,18 +109,18 @@ def shorter(run: Run, journey: Journey, law: Manner) -> float:
     Returns
     -------
     float
-        A half where samples keep steps short (all of them, or those between the short ones that bristles and lags take
-        after samples), in steps of one length past corners, which a law of one's own may have, too, and in those that
-        do not see a line vibrate whose tension is asked for: whether a contact with little to spare breaks loose is
-        decided by a finer run, where two coarse ones may be wrong alike. A quarter for what jumps at every sample: of
-        what half the steps round as the run itself does, they round a quarter otherwise. So it is under a law that
-        hunts between its limits, as it does in another phase in runs that are not far finer.
+        A half where samples, breaks of commands or the end keep steps short (most of them, or those between the short
+        ones that bristles and lags take after samples), in steps of one length past corners, which a law of one's own
+        may have, too, and in those that do not see a line vibrate whose tension is asked for: whether a contact with
+        little to spare breaks loose is decided by a finer run, where two coarse ones may be wrong alike. A quarter for
+        what jumps at every sample: of what half the steps round as the run itself does, they round a quarter otherwise.
+        So it is under a law that hunts between its limits, as it does in another phase in runs that are not far finer.
     """
     if law in (Manner.ABRUPT, Manner.HUNTING):
         return 0.25
     fixed = isinstance(journey.plan.method.pace, Fixed)
     cornered = fixed and (journey.plan.feed.reacting or _cornered(journey, {*journey.watch.corner_names}))
-    if kept_short(journey) or _flows(journey) or cornered or unresolved(journey):
+    if as_many(journey, 2.0) > _CUT or kept_short(journey) or _flows(journey) or cornered or unresolved(journey):
         return 0.5
     return 0.5 if law is Manner.LIMITED and heard(run, journey) else 1.0
 
@@ -290,7 +293,7 @@ def agreeing(journey: Journey) -> str:
     asked, pace = journey.plan.tolerance, journey.plan.method.pace
     if isinstance(pace, Controlled):
         return f"Tolerance({0.01 * asked.relative:.1g}, {0.01 * asked.absolute:.1g})"
-    return f"a step of {0.25 * pace.between(journey.plan.feed.sample_time):.1g} s"
+    return f"a step of {0.25 * usual(journey):.1g} s"
 
 
 def _right(run: Run, gap: Gap, left: float) -> float:
@@ -312,5 +315,5 @@ def _note(journey: Journey, gap: Gap, error: float, right: float, kind: str) -> 
         less, asked = finer**pace.steepness, plan.tolerance
         remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
-        remedy = f"take steps of {finer * pace.between(plan.feed.sample_time):.1g} s"
+        remedy = f"take steps of {finer * usual(journey):.1g} s"
     return f"{said}; places are right to {TOLD:.0%} until t = {right:.3g} s: {remedy}"
