@@ -100,7 +100,8 @@ class Checked(_Wrapped):
     fiftieth of its size, met corners of its laws of force or followed a continuous law, where forces or rates are
     among its outputs, of which errors of steps tell nothing, and wherever this is asked for, it is therefore run once
     more, under 27 times the tolerance (a third of the steps for `AdaptiveAlpha`) or in steps of twice the length, or
-    of half of it past corners. Of what the two are apart, a method of order p leaves
+    of half of it past corners and where knots of commands or the end of the run would cut steps of twice the length to
+    more than 0.6 of their number. Of what the two are apart, a method of order p leaves
     1/(rᵖ − 1) where steps are r times as long. It stands in ``report.error``; above 3 % a note says so, and
     until when the run is right to that. What would be noted is asked of a second run first, half as far away (in
     powers): its word counts. Where they tell little, a note says whether a third one, under 243 times the
@@ -109,7 +110,7 @@ class Checked(_Wrapped):
     that has met four corners and more, and of which 0.1 % or more is told, is laid beside a finer one too, in half the
     steps; so is one under a continuous law that jumps, or to which the second run is nearer than a power of its steps
     would have it, if nothing is noted. What that tells counts if it is more. Where the first takes more than 0.7 of the
-    steps (half of them under a sampled law), a finer one is all that follows; of machines with bristles it is all there
+    steps (half of them under a sampled law, or where knots keep steps short), a finer one is all that follows; of machines with bristles it is all there
     is.
 
     Where nothing of that is told, and dry contacts stick or break loose that slide with less than it takes to break
