@@ -66,9 +66,8 @@ torsion, Exudyn's cable has none.
 
 Our time per step between 100 and {largest} elements grows with an exponent of {growth};
 the goal is 1.05. {told} From 500 elements on nodes are eliminated one by one, not
-two at once: that is a third more work in solving, and a quarter fewer numbers; and they are placed, turned and pushed 64
-at a time, while they are near. 10,000 go through 16 MB an iteration, in
-a cache that processors share.
+two at once: that is a third more work in solving, and a quarter fewer numbers; and they are placed, turned and pushed
+64 at a time, while they are near. 10,000 go through 16 MB an iteration, in a cache that processors share.
 
 Ratios belong to a machine less than seconds do, and do all the same. On a host (AMD, AVX-512, a far cache of 32 MB)
 where nodes were eliminated one by one from 4,000 elements on, the crane came out at 0.27, 0.13 and 0.08, easy chains of

@@ -10,11 +10,12 @@ import math
 
 from flexctrl.dynamics.law_state import CLEAR, HALVINGS, LOOSE, NEARER, YOUNG
 from flexctrl.dynamics.march.answer import Answer
-from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
 from flexctrl.dynamics.march.step import step
 from flexctrl.kernels.eights import eight, larger, largest
 from flexctrl.model.flat.flat import clear, drive, load
+from flexctrl.model.flat.solving import copy_on
 from flexctrl.model.gauges import read
 
 __all__ = ["commanded", "forget", "recite", "strayed_off", "take"]
@@ -233,7 +234,7 @@ def correct_inputs(m: March) -> None:
         a.change[k] = change
         a.u[a.writes[k]] += change
     load(m.flat)
-    copy(m.flat.padded, m.flat.step, a.way)
+    copy_on(m.flat.padded, m.flat.step, a.way)
     m.phase = EVALUATE
     m.iteration = 0
     m.last = math.inf

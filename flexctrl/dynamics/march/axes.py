@@ -11,7 +11,7 @@ from flexctrl.kernels.eights import eight, larger, largest
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.fronts import Fronts
-from flexctrl.model.flat.solving import solve_own
+from flexctrl.model.flat.solving import copy_on, solve_own
 from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.kinds import NODE_SLOT
 
@@ -27,8 +27,7 @@ def mark(axes: Axes, factors: Factors, f: Flat) -> None:
             factors.turned[9 * k + i] = 1.0 if i % 4 == 0 else 0.0
     for k in range(axes.angle_count):
         factors.angles[k] = f.q[axes.angles[k]] + f.step[axes.angles[k]]
-    for i in range(f.posed):
-        factors.place[i] = f.z[i]
+    copy_on(f.posed, f.z, factors.place)
 
 
 def turned_too_far(axes: Axes, factors: Factors, f: Flat, most: float) -> bool:

@@ -10,11 +10,12 @@ from flexctrl.dynamics.march.record import DONE, March
 from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import ALIKE, FAR, OFTEN, absurd, borne_out, looking, missed, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
-from flexctrl.kernels.native import Reals, seldom
+from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import arrive, clear, dissipate, drive, energy, keep, load, place, pull
+from flexctrl.model.flat.solving import copy_on
 from flexctrl.model.gauges import read
 
-__all__ = ["accept", "copy", "draw", "drawn_now", "reach", "settle", "shelve"]
+__all__ = ["accept", "draw", "drawn_now", "reach", "settle", "shelve"]
 
 _TINY = 1e-300
 
@@ -126,7 +127,7 @@ def looked_at(m: March, lost: float) -> float:
         if lost > ALIKE * least:
             told = min(lost, max(least, m.made - gap))
             m.unseen += min(told, lost - told)
-    copy(f.padded, m.v, f.v)
+    copy_on(f.padded, m.v, f.v)
     drive(f)
     energy(f)
     return told
@@ -171,9 +172,9 @@ def halfway(m: March) -> float:
     energy(f)
     lost = f.books[2]
     clear(f.padded, f.step)
-    copy(f.padded, m.v, f.v)
+    copy_on(f.padded, m.v, f.v)
     reach(m)
-    copy(f.padded, f.force, f.step)
+    copy_on(f.padded, f.force, f.step)
     return lost
 
 
@@ -216,20 +217,14 @@ def shelve(m: March) -> None:
     angles = nodes + 2 * f.padded + f.drives
     width = angles + m.gauges.turning + 1
     state = m.states[width * m.kept :]
-    copy(nodes, f.pose, state)
-    copy(f.padded, f.q, state[nodes:])
-    copy(f.padded, m.v, state[nodes + f.padded :])
-    copy(f.drives, f.driven, state[nodes + 2 * f.padded :])
-    copy(m.gauges.turning, m.gauges.shown, state[angles:])
+    copy_on(nodes, f.pose, state)
+    copy_on(f.padded, f.q, state[nodes:])
+    copy_on(f.padded, m.v, state[nodes + f.padded :])
+    copy_on(f.drives, f.driven, state[nodes + 2 * f.padded :])
+    copy_on(m.gauges.turning, m.gauges.shown, state[angles:])
     state[width - 1] = m.t
     m.kept += 1
     m.due = m.t + m.spacing
-
-
-def copy(n: int, x: Reals, y: Reals) -> None:
-    """Copy entries."""
-    for i in range(n):
-        y[i] = x[i]
 
 
 @seldom
@@ -238,7 +233,7 @@ def settle(m: March) -> int:
     f = m.flat
     load(f)
     pull(f)
-    copy(f.padded, f.force, m.pulled)
+    copy_on(f.padded, f.force, m.pulled)
     if m.contacts.count > 0 and m.contacts.known == 0:
         begun(m)
     if m.losing == 1:

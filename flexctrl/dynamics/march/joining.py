@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexctrl.dynamics.march.axes import solved
-from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.flowing import released
 from flexctrl.dynamics.march.jumping import jump
 from flexctrl.dynamics.march.record import DONE, SINGULAR, March
@@ -12,6 +12,7 @@ from flexctrl.dynamics.march.tempering import at_rest_in, firm, may_throw, tempe
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, energy
+from flexctrl.model.flat.solving import copy_on
 
 __all__ = ["lengthen", "start_anew", "started"]
 
@@ -30,7 +31,7 @@ def start_anew(m: March) -> int:
     m.came = 0.0
     clear(f.padded, m.trend)
     clear(f.padded, f.step)
-    copy(f.padded, m.v, f.v)
+    copy_on(f.padded, m.v, f.v)
     reach(m)
     m.unsure = 1
     status = jump(m)
@@ -38,8 +39,8 @@ def start_anew(m: March) -> int:
     if status != DONE:
         return status
     clear(f.padded, f.step)
-    copy(f.padded, m.v, f.v)
-    copy(f.padded, m.rate, f.rate)
+    copy_on(f.padded, m.v, f.v)
+    copy_on(f.padded, m.rate, f.rate)
     at_rest_in(m)
     if m.losing == 1 and m.flows.count == 0:
         energy(f)
@@ -67,7 +68,7 @@ def started(m: March) -> int:
             return SINGULAR
         if temper(m):
             m.factorisations += 1
-            copy(f.padded, m.rate, m.algorithmic)
+            copy_on(f.padded, m.rate, m.algorithmic)
         at_rest_in(m)
     return status
 
@@ -77,10 +78,10 @@ def lengthen(m: March) -> None:
     """Make accelerations anew where those of a far shorter step would throw parts over the one about to be taken."""
     f = m.flat
     clear(f.padded, f.step)
-    copy(f.padded, m.v, f.v)
+    copy_on(f.padded, m.v, f.v)
     if may_throw(m) and firm(m) and temper(m):
         m.factorisations += 1
-        copy(f.padded, m.rate, m.algorithmic)
+        copy_on(f.padded, m.rate, m.algorithmic)
         clear(f.padded, m.trend)
         m.lean = 1.0
     at_rest_in(m)
@@ -102,7 +103,7 @@ def forces_change(m: March) -> None:
     for i in range(0, f.padded, 8):
         put(c.change[i:], (eight(c.change[i:]) - eight(f.force[i:])) * (0.5 / t))
     clear(f.padded, f.step)
-    copy(f.padded, m.v, f.v)
+    copy_on(f.padded, m.v, f.v)
 
 
 @seldom
@@ -121,7 +122,7 @@ def give_lead(m: March) -> None:
     c = m.corners
     f = m.flat
     released(m.flows, c.change)
-    copy(f.padded, c.change, f.force)
+    copy_on(f.padded, c.change, f.force)
     f.force[f.n] = 0.0
     solved(m.axes, m.tangent, m.fronts, f.force)
     released(m.flows, f.force)

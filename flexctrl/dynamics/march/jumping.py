@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
-from flexctrl.dynamics.march.books import copy
 from flexctrl.dynamics.march.contacts import bear_more, feel
 from flexctrl.dynamics.march.flowing import feel_mean, flow_on, pivot, released
 from flexctrl.dynamics.march.holding import follows, held, settled_lead
@@ -17,6 +16,7 @@ from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import accelerate, clear, drive, energy, load, press_entire, pull, push
 from flexctrl.model.flat.fronts import factor, seat
+from flexctrl.model.flat.solving import copy_on
 
 __all__ = ["jump", "weighed"]
 
@@ -40,7 +40,7 @@ def jump(m: March) -> int:
     """
     f = m.flat
     clear(f.padded, f.step)
-    copy(f.padded, m.v, f.v)
+    copy_on(f.padded, m.v, f.v)
     if m.swift == 1 and answered(m):
         if inputs_may_throw(m):
             load(f)
@@ -49,7 +49,7 @@ def jump(m: March) -> int:
     load(f)
     if m.leaping == 1:
         pull(f)
-        copy(f.padded, f.force, m.pulled)
+        copy_on(f.padded, f.force, m.pulled)
         return DONE
     if m.mass_for != 1.0 or spent(m) or turned_too_far(m.axes, m.mass, f, _MASS_TURNED):
         status = massed(m)
@@ -93,7 +93,7 @@ def changed(m: March) -> int:
         put(m.algorithmic[i:], eight(m.algorithmic[i:]) + change)
         put(m.rate[i:], eight(f.rate[i:]))
     pull(f)
-    copy(f.padded, f.force, m.pulled)
+    copy_on(f.padded, f.force, m.pulled)
     return DONE
 
 
@@ -200,7 +200,7 @@ def massed(m: March) -> int:
     if m.asking == 1:
         return WANTS_MASS
     if m.probes.groups > 0:  # whose last digits hang on where they start from
-        copy(m.flat.padded, m.rate, m.flat.rate)
+        copy_on(m.flat.padded, m.rate, m.flat.rate)
     drive(m.flat)
     sloped(m, 0.0, 0.0, 1.0)
     return weighed(m)
@@ -211,7 +211,7 @@ def balanced(m: March) -> bool:
     """Solve for the accelerations as exactly as steps are; tell whether the mass, of another shape maybe, was good."""
     f = m.flat
     share = m.made_for * m.made_for * m.beta if m.made_for > 0.0 else math.inf
-    copy(f.padded, m.rate, f.rate)
+    copy_on(f.padded, m.rate, f.rate)
     released(m.flows, f.rate)
     last = math.inf
     first = 0.0

@@ -22,13 +22,14 @@ from flexctrl.dynamics.events.nearing import (
     shorter,
     to_zero,
 )
-from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.corners import crossed, value, within
 from flexctrl.dynamics.march.record import DONE, FRESH, March
 from flexctrl.dynamics.march.siding import decided
 from flexctrl.dynamics.march.step import step
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
+from flexctrl.model.flat.solving import copy_on
 
 __all__ = ["shortened"]
 
@@ -62,7 +63,7 @@ def first_met(m: March) -> float:
     c = m.corners
     f = m.flat
     earliest = 2.0
-    copy(f.padded, f.step, c.step)
+    copy_on(f.padded, f.step, c.step)
     for k in range(c.lines + c.turns + c.rails):
         part_way(m, 1.0)
         end = c.sides[k] * value(c, f, k)
@@ -198,10 +199,10 @@ def time_left(m: March) -> float:
     """Return how much later than at the end of the step the corner is met, by the slope there."""
     c = m.corners
     f = m.flat
-    copy(f.padded, f.step, c.step)
+    copy_on(f.padded, f.step, c.step)
     here = distance(m)
     part_way(m, 1.0 - _SLOPE)
     slope = (here - distance(m)) / (_SLOPE * m.h)
-    copy(f.padded, c.step, f.step)
+    copy_on(f.padded, c.step, f.step)
     reach(m)
     return -here / slope if slope != 0.0 else math.inf

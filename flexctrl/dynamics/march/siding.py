@@ -6,12 +6,13 @@ the mass alone have no tangent.
 
 from __future__ import annotations
 
-from flexctrl.dynamics.march.books import copy, reach
+from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.corners import over_a_jump
 from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
 from flexctrl.dynamics.march.step import newton, step
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear
+from flexctrl.model.flat.solving import copy_on
 
 __all__ = ["decided"]
 
@@ -56,7 +57,7 @@ def set_back(m: March) -> None:
     """Put nodes where the step starts; forces of whole machines are those of a step from there."""
     if m.whole == 1:
         f = m.flat
-        copy(f.padded, f.step, m.corners.step)
+        copy_on(f.padded, f.step, m.corners.step)
         clear(f.padded, f.step)
         reach(m)
-        copy(f.padded, m.corners.step, f.step)
+        copy_on(f.padded, m.corners.step, f.step)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
-from flexctrl.dynamics.march.books import copy
 from flexctrl.dynamics.march.record import March
 from flexctrl.dynamics.march.step import press_all, sloped, to_rate
 from flexctrl.dynamics.swift.thrown import AT_HAND, BLURRED, CORRECTIONS, THROWN
@@ -11,6 +10,7 @@ from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, drive, place
 from flexctrl.model.flat.fronts import factor, whose
+from flexctrl.model.flat.solving import copy_on
 
 __all__ = ["at_rest_in", "firm", "inputs_may_throw", "may_throw", "temper", "temper_jump"]
 
@@ -35,8 +35,8 @@ def inputs_may_throw(m: March) -> bool:
 def temper_jump(m: March) -> None:
     """Let accelerations that have jumped with the inputs jump by less, where parts would be thrown."""
     f = m.flat
-    copy(f.padded, f.rate, m.fresh)
-    copy(f.padded, m.rate, m.before)
+    copy_on(f.padded, f.rate, m.fresh)
+    copy_on(f.padded, m.rate, m.before)
     if not felt(m):
         return
     at_hand = m.made_for <= m.h * AT_HAND and m.h <= m.made_for * AT_HAND
@@ -49,7 +49,7 @@ def temper_jump(m: March) -> None:
         share = 0.0
     if share > 0.0:
         lessened(m, share)
-    copy(f.padded, m.fresh, f.rate)
+    copy_on(f.padded, m.fresh, f.rate)
     drive(f)
 
 
@@ -60,11 +60,11 @@ def temper(m: March) -> bool:
     Tell whether they are.
     """
     f = m.flat
-    copy(f.padded, m.rate, m.fresh)
+    copy_on(f.padded, m.rate, m.fresh)
     clear(f.padded, m.before)
     less = felt(m) and lessened(m, 1.0 / (m.beta * m.h * m.h))
-    copy(f.padded, m.fresh, m.rate)
-    copy(f.padded, m.fresh, f.rate)
+    copy_on(f.padded, m.fresh, m.rate)
+    copy_on(f.padded, m.fresh, f.rate)
     return less
 
 
@@ -83,18 +83,18 @@ def lessened(m: March, share: float) -> bool:
     ``share`` makes forces held over a step of the tangent.
     """
     f = m.flat
-    copy(f.padded, m.before, f.rate)
+    copy_on(f.padded, m.before, f.rate)
     for k in range(CORRECTIONS):
         press_all(m)
         f.force[f.n] = 0.0
         if k == 0:
-            copy(f.padded, f.force, m.asked)
+            copy_on(f.padded, f.force, m.asked)
         solved(m.axes, m.tangent, m.fronts, f.force)
         if k == 0 and not thrown(m, share):
             return False
         for i in range(0, f.padded, 8):
             put(f.rate[i:], eight(f.rate[i:]) - share * eight(f.force[i:]))
-    copy(f.padded, f.rate, m.fresh)
+    copy_on(f.padded, f.rate, m.fresh)
     return True
 
 
@@ -125,7 +125,7 @@ def firm(m: March) -> bool:
     clear(f.padded, f.rate)
     at_rest_in(m)
     sloped(m, 1.0, m.gamma / (m.beta * m.h), 1.0 / (m.beta * m.h * m.h))
-    copy(f.padded, m.rate, f.rate)
+    copy_on(f.padded, m.rate, f.rate)
     for k in range(m.flows.count):
         m.entries[m.flows.cells[k]] = -_FIRM * m.flows.mass
     where = factor(m.fronts, m.entries, m.tangent.diagonal, m.tangent.down, m.tangent.up)

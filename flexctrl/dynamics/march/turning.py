@@ -7,7 +7,7 @@ ends, met at once or through a sheave; steps to one that fail) is left to them.
 from __future__ import annotations
 
 from flexctrl.dynamics.events.nearing import LEAST, NUDGES
-from flexctrl.dynamics.march.books import accept, copy, reach
+from flexctrl.dynamics.march.books import accept, reach
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import comes_through, value
 from flexctrl.dynamics.march.holding import lets_go
@@ -19,6 +19,7 @@ from flexctrl.dynamics.march.record import CORNER, DONE, FRESH, TURN, TURNED, Ma
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import seldom
 from flexctrl.model.flat.flat import clear, keep
+from flexctrl.model.flat.solving import copy_on
 
 __all__ = ["turn_corner"]
 
@@ -72,7 +73,7 @@ def nudged(m: March) -> bool:
     c = m.corners
     f = m.flat
     span = max(LEAST * m.h, c.when - m.t)
-    copy(f.padded, m.v, f.v)
+    copy_on(f.padded, m.v, f.v)
     for _ in range(NUDGES):
         for i in range(0, f.padded, 8):
             put(f.step[i:], span * eight(m.v[i:]))

@@ -58,12 +58,13 @@ def tangents(layout: Layout) -> list[Run]:
     places = np.full(layout.forces.entries, layout.plan.length)
     places[kept] = layout.plan.places(rows, columns)
     runs = []
-    for f, start in zip(layout.forces.families, layout.forces.block_starts, strict=True):
+    families = zip(layout.forces.families, layout.forces.block_starts, layout.tiling.orders, strict=True)
+    for f, start, order in families:
         size = f.kernels.kind.width**2
         seeds = np.tile(layout.starts["seeds"] + np.arange(3), (f.count, 1))
         gather = np.hstack([f.gather(layout.forces.drive_base), seeds])
         scatter = places[start : start + f.count * size].reshape(f.count, size)
-        runs.append(layout.backend.bind(f.kernels.tangent, gather, f.parameters, scatter))
+        runs.append(layout.backend.bind(f.kernels.tangent, gather[order], f.parameters[order], scatter[order]))
     return [*runs, _gust_slopes(layout, places)] if layout.model.gusts else runs
 
 

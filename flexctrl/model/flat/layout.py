@@ -15,7 +15,7 @@ from flexctrl.model.flat.axes import Axes, axes_of
 from flexctrl.model.flat.entire import Entire, entire_of
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.fronts import Plan, plan_of
-from flexctrl.model.flat.tiles import Tiling, tiles_of, tiling_of
+from flexctrl.model.flat.tiles import Tiles, Tiling, tiles_of, tiling_of
 from flexctrl.model.flat.unfolding import lever_places, together, unfolded_plan
 from flexctrl.model.flat.workspace import HIDDEN, Flat
 from flexctrl.model.gauges import Gauges, gauges_of
@@ -140,7 +140,7 @@ class Layout:
             **self.numbers,
             **self.tables,
             **self.runs,
-            tiles=tiles_of(self.tiling, self.runs["turn"], self.runs["forces"][: len(self.forces.families)]),
+            tiles=self.tiles,
             entire=self.entire.runs,
             quick=len(self.entire.runs),
             pressing=int(self.entire.pressing),
@@ -220,6 +220,13 @@ class Layout:
         return tiling_of(self)
 
     @cached_property
+    def tiles(self) -> Tiles:
+        """The tiles as loops read them."""
+        families = len(self.forces.families)
+        kernels = (self.runs["turn"], *(self.runs[name][:families] for name in ("forces", "tangents")))
+        return tiles_of(self.tiling, *kernels)
+
+    @cached_property
     def tables(self) -> dict[str, Any]:
         m, owned = self.motion, self.owned
         own, moved, turned = (np.setdiff1d(nodes, self.whole) for nodes in (self.own[0], *self._kept))
@@ -285,7 +292,7 @@ class Layout:
             **binding.linkage(self),
             "winding": binding.winding(self, "pose") if m.drives else (),
             "forces": (*binding.forces(self), *([binding.entry_forces(self)] if damped else [])),
-            "tangents": (*([binding.entry_slopes(self)] if damped else []), *binding.tangents(self))
+            "tangents": (*binding.tangents(self), *([binding.entry_slopes(self)] if damped else []))
             if own_tangents
             else (),
             "energies": (*binding.energies(self), *([binding.entry_energies(self)] if damped else [])),

@@ -10,7 +10,7 @@ from flexctrl.kernels.eights import ahead, eight, put
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.fronts import NODE, Fronts
 
-__all__ = ["solve", "solve_own"]
+__all__ = ["copy_on", "solve", "solve_own"]
 
 _SOON = 144
 """Numbers until what is read backwards is fetched: two fronts of a chain. Memory does not see that coming by itself."""

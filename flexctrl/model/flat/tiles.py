@@ -6,6 +6,7 @@ writes is still near when the next loop wants it. A piece is computed with the t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -34,13 +35,13 @@ class Tiles:
     ----------
     count : int
     families : int
-        How many of `Flat.forces` are in tiles.
-    nodes, freedoms : Wholes, (count + 1,)
-        The first of `Flat.whole` of each tile, and of the degrees of freedom.
+        How many of `Flat.forces` and `Flat.tangents` are in tiles.
+    nodes, freedoms, entries : Wholes, (count + 1,)
+        The first of `Flat.whole` of each tile, of the degrees of freedom, and of the tangent's entries.
     turn : Runs
         Kernels that turn the nodes of each tile, by little and by any step.
-    forces : Runs
-        Kernels of the pieces, tile by tile.
+    forces, tangents : Runs
+        Kernels of the pieces, tile by tile; without the latter where followers turn.
     """
 
     LASTING = ("count",)
@@ -49,11 +50,14 @@ class Tiles:
     families: int
     nodes: Wholes
     freedoms: Wholes
+    entries: Wholes
     turn: Runs
     forces: Runs
+    tangents: Runs
 
 
-NO_TILES = Tiles(0, 0, np.zeros(1, dtype=int), np.zeros(1, dtype=int), (), ())
+_NONE = np.zeros(1, dtype=int)
+NO_TILES = Tiles(0, 0, _NONE, _NONE, _NONE, (), (), ())
 
 
 @frozen(eq=False)
@@ -62,7 +66,7 @@ class Tiling:
 
     Attributes
     ----------
-    nodes, freedoms : numpy.ndarray of int, (tiles + 1,)
+    nodes, freedoms, entries : numpy.ndarray of int, (tiles + 1,)
         See `Tiles`.
     orders : tuple of numpy.ndarray of int
         The order of each family's pieces.
@@ -72,6 +76,7 @@ class Tiling:
 
     nodes: np.ndarray
     freedoms: np.ndarray
+    entries: np.ndarray
     orders: tuple[np.ndarray, ...]
     ends: tuple[np.ndarray, ...]
 
@@ -90,20 +95,22 @@ def tiling_of(layout: Layout) -> Tiling:
     m, whole, families = layout.motion, layout.whole, layout.forces.families
     count = min(len(whole) // _NODES, _MOST)
     if not m.plain or m.drives or m.inner.size or count < _LEAST:
-        none = np.zeros(1, dtype=int)
-        return Tiling(none, none, tuple(np.arange(f.count) for f in families), ())
+        return Tiling(_NONE, _NONE, _NONE, tuple(np.arange(f.count) for f in families), ())
     # kernels compute up to eight at once, and loops copy as many
     nodes = np.append(8 * (np.arange(count) * len(whole) // (8 * count)), len(whole))
     first = layout.position[layout.owned[whole[nodes[1:-1]], 0]]
     freedoms = np.concatenate([[0], -(-first // 8) * 8, [layout.padded]])
+    fronts = layout.plan.fronts
+    begins = fronts.base[np.searchsorted(fronts.first, first)]  # of two nodes in one front the first says where it is
+    entries = np.concatenate([[0], begins, [layout.plan.length]])
     tile = np.where((layout.owned < m.n).any(axis=1), count - 1, 0)
     tile[whole] = np.repeat(np.arange(count), np.diff(nodes))
     last = [tile[f.nodes].max(axis=1) for f in families]
     ends = tuple(np.cumsum(np.bincount(tiles, minlength=count)) for tiles in last)
-    return Tiling(nodes, freedoms, tuple(np.argsort(tiles, kind="stable") for tiles in last), ends)
+    return Tiling(nodes, freedoms, entries, tuple(np.argsort(tiles, kind="stable") for tiles in last), ends)
 
 
-def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...]) -> Tiles:
+def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...], tangents: tuple[Run, ...] = ()) -> Tiles:
     """Return the tiles as loops read them.
 
     Parameters
@@ -111,7 +118,7 @@ def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...]) -> 
     tiling : Tiling
     turn : tuple of Run
         Kernels that turn nodes, those in tiles first.
-    forces : tuple of Run
+    forces, tangents : tuple of Run
         Those of each family's pieces, in the order of the tiling.
 
     Returns
@@ -121,7 +128,12 @@ def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...]) -> 
     count = len(tiling.nodes) - 1
     if not count:
         return NO_TILES
-    turns = zip(*(run.parts(tiling.nodes[1:]) for run in turn), strict=True)
-    pieces = zip(*(run.parts(ends) for run, ends in zip(forces, tiling.ends, strict=True)), strict=True)
-    near_far, pushed = (tuple(run for tile in tiles for run in tile) for tiles in (turns, pieces))
-    return Tiles(count, len(forces), tiling.nodes, tiling.freedoms, near_far, pushed)
+    turns = _by_tiles(turn, [tiling.nodes[1:]] * len(turn))
+    pieces = (_by_tiles(kernels, tiling.ends) for kernels in (forces, tangents))
+    return Tiles(count, len(forces), tiling.nodes, tiling.freedoms, tiling.entries, turns, *pieces)
+
+
+def _by_tiles(runs: Sequence[Run], ends: Sequence[np.ndarray]) -> tuple[Run, ...]:
+    """Parts of runs, those of each tile together."""
+    parts = [run.parts(end) for run, end in zip(runs, ends, strict=False)]
+    return tuple(run for tile in zip(*parts, strict=True) for run in tile)
