@@ -28,8 +28,9 @@ _ASTRAY, _FASTER = 0.1, 1.3
 """It goes elsewhere where it is a tenth of the motion away, and so much farther than by its order."""
 _CHANCE = 2.0 / 3.0
 """What is nearer than that, of what it would be by its order, is so by chance."""
-_ALIKE, _SAMPLED = 0.7, 0.5
-"""A coarser run with more of the steps, or so many between stops, is much the same, and makes the same errors."""
+_ALIKE, _SAMPLED, _KNOTTED = 0.7, 0.5, 0.4
+"""A coarser run with more of the steps, or so many between samples or between knots that are more than a coarser run
+would take steps by itself, is much the same, and makes the same errors."""
 _CUT = 0.8
 """A run nearby with more of the steps is much the same where stops cut them."""
 _OFF, _NEARLY = 0.01, 0.001
@@ -93,8 +94,8 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
     if not first or first[0].run.status is Status.INTERRUPTED:
         return told, first
     other = first[0]
-    stopped = journey.plan.feed.sample_time > 0.0 or as_many(journey, coarser.longer) * coarser.longer > 1.0
-    alike = _SAMPLED if stopped else _ALIKE
+    knotted = as_many(journey, coarser.longer) * coarser.longer > 1.0
+    alike = _SAMPLED if journey.plan.feed.sample_time else _KNOTTED if knotted else _ALIKE
     if isinstance(method.pace, Controlled) and other.run.report.steps > alike * run.report.steps:
         halved, finer = _halved(replace(run, checkpoint=told.checkpoint), journey, method, beginning)
         return (halved, (other, *finer)) if finer else (told, (other,))

@@ -110,7 +110,7 @@ class Checked(_Wrapped):
     that has met four corners and more, and of which 0.1 % or more is told, is laid beside a finer one too, in half the
     steps; so is one under a continuous law that jumps, or to which the second run is nearer than a power of its steps
     would have it, if nothing is noted. What that tells counts if it is more. Where the first takes more than 0.7 of the
-    steps (half of them under a sampled law, or where knots keep steps short), a finer one is all that follows; of
+    steps (half of them under a sampled law, 0.4 where knots keep steps short), a finer one is all that follows; of
     machines with bristles it is all there is.
 
     Where nothing of that is told, and dry contacts stick or break loose that slide with less than it takes to break
