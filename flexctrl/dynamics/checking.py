@@ -89,44 +89,67 @@ def _by_all(run: Run, journey: Journey, method: Checked, beginning: Beginning, s
         if news(told, run) or not (others and isinstance(method.pace, Fixed) and rattles(journey)):
             return told, others
         return _confirmed(run, told, others, journey, method, beginning, 0.5 * shorter)
-    coarser = method.coarser(tolerance)
-    told, first = _told(run, journey, coarser, beginning)
+    told, first = _told(run, journey, method.coarser(tolerance), beginning)
     if not first or first[0].run.status is Status.INTERRUPTED:
         return told, first
-    other = first[0]
-    knotted = as_many(journey, coarser.longer) * coarser.longer > 1.0
+    if _much_the_same(run, first[0], journey):
+        return _halved(run, told, first[0], journey, method, beginning)
+    return _by_coarser(run, told, first[0], journey, method, beginning)
+
+
+def _much_the_same(run: Run, other: Other, journey: Journey) -> bool:
+    """Tell whether a coarser run has taken nearly as many steps, of those that are chosen."""
+    longer = other.beside.longer
+    knotted = as_many(journey, longer) * longer > 1.0
     alike = _SAMPLED if journey.plan.feed.sample_time else _KNOTTED if knotted else _ALIKE
-    if isinstance(method.pace, Controlled) and other.run.report.steps > alike * run.report.steps:
-        halved, finer = _halved(replace(run, checkpoint=told.checkpoint), journey, method, beginning)
-        return (halved, (other, *finer)) if finer else (told, (other,))
-    nearer: tuple[Other, ...] = ()
-    nearby = method.coarser(tolerance, _NEARER)
-    quiet = told.report.error < _LITTLE and not news(told, run)
-    parted = not quiet and told.report.error > PARTED
-    if not quiet and as_many(journey, nearby.longer) > _CUT:
-        halved, finer = _halved(replace(run, checkpoint=told.checkpoint), journey, method, beginning)
-        return (halved, (other, *finer)) if finer else (told, (other,))
-    if not quiet:
-        told, nearer = _nearer(run, told, other, journey, nearby, beginning)
+    return isinstance(journey.plan.method.pace, Controlled) and other.run.report.steps > alike * run.report.steps
+
+
+def _by_coarser(run: Run, told: Run, other: Other, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
+    """The run with what is told of it beside a coarser one: by one nearer where that is much, by one farther else."""
+    nearby = method.coarser(journey.plan.tolerance, _NEARER)
+    if told.report.error < _LITTLE and not news(told, run):
+        if isinstance(method.pace, Fixed):
+            return told, (other,)
+        return _by_farther(run, told, other, (), True, journey, method, beginning)
+    if as_many(journey, nearby.longer) > _CUT:
+        return _halved(run, told, other, journey, method, beginning)
+    parted = told.report.error > PARTED
+    told, nearer = _nearer(run, told, other, journey, nearby, beginning)
     if told.report.error > TOLD:
         return _rattled(run, told, (other, *nearer), journey, method, beginning)
     if parted:
-        run, told = (elsewhere(each, other.gap, journey, coarser.said) for each in (run, told))
+        run, told = (elsewhere(each, other.gap, journey, other.beside.said) for each in (run, told))
         return _confirmed(run, told, (other, *nearer), journey, method, beginning)
     if isinstance(method.pace, Fixed):
         return told, (other, *nearer)
-    farther = method.coarser(tolerance, _FARTHER)
+    return _by_farther(run, told, other, nearer, False, journey, method, beginning)
+
+
+def _by_farther(
+    run: Run,
+    told: Run,
+    other: Other,
+    nearer: tuple[Other, ...],
+    quiet: bool,
+    journey: Journey,
+    method: Checked,
+    beginning: Beginning,
+) -> _Known:
+    """The run with what one far coarser adds: how errors grow, if nobody nearer has been asked, and where it goes."""
+    farther = method.coarser(journey.plan.tolerance, _FARTHER)
     kept, third = made(told, journey, farther, beginning)
     if third is None:
         return told, (other, *nearer)
     if quiet:
+        nearby = method.coarser(journey.plan.tolerance, _NEARER)
         kept, nearer = _grown(run, kept, other, third, journey, nearby, beginning)
     others = (other, third, *nearer)
     if kept.report.error > TOLD:
         return _rattled(run, kept, others, journey, method, beginning)
-    grown = (farther.longer**run.report.order - 1.0) / (coarser.longer**run.report.order - 1.0)
-    astray = third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most)
-    if astray:
+    longer = farther.longer, other.beside.longer
+    grown = (longer[0] ** run.report.order - 1.0) / (longer[1] ** run.report.order - 1.0)
+    if third.gap.most > max(_ASTRAY, _FASTER * grown * other.gap.most):
         run, kept = (elsewhere(each, third.gap, journey, farther.said) for each in (run, kept))
         return _confirmed(run, kept, others, journey, method, beginning)
     by_chance = any(_by_chance(near, other, run.report.order) for near in nearer)
@@ -171,13 +194,15 @@ def _confirmed(
     return _as_much(known, finer), (*others, *finest)
 
 
-def _halved(run: Run, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
-    """The run with what one in half the steps tells, also of those that are kept short."""
+def _halved(run: Run, told: Run, other: Other, journey: Journey, method: Checked, beginning: Beginning) -> _Known:
+    """The run with what one in half the steps tells, also of those that are kept short; it has the last word."""
     mean = run.final.t / max(run.report.steps, 1)
     length = usual(journey) or math.inf
     if isinstance(method.pace, Controlled) and not journey.plan.feed.sample_time:
         length = min(length, 2.0 ** round(math.log2(mean)))  # the same when the run goes on
-    return _told(run, journey, method.finer(journey.plan.tolerance, length, 0.5), beginning)
+    beside = method.finer(journey.plan.tolerance, length, 0.5)
+    halved, finer = _told(replace(run, checkpoint=told.checkpoint), journey, beside, beginning)
+    return (halved, (other, *finer)) if finer else (told, (other,))
 
 
 def _order(near: Other, far: Other, most: float) -> float:
