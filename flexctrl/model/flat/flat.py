@@ -40,6 +40,8 @@ _TURN = 2.0 * math.pi
 _POSE = 12
 _FAST = FAST
 _NEAR = NEAR
+_SHARED = 16
+"""Freedoms before those of a tile that its first nodes may have."""
 
 
 def load(f: Flat) -> None:
@@ -182,8 +184,10 @@ def place_tiles(f: Flat) -> None:
 
 
 def turn_tile(f: Flat, k: int) -> None:
-    """Turn the nodes of a tile by the step."""
-    first = max(f.tiles.freedoms[k] - 8, 0)
+    """Turn the nodes of a tile by the step; with the last those whose freedoms stand apart, anywhere."""
+    first = max(f.tiles.freedoms[k] - _SHARED, 0)
+    if k + 1 == f.tiles.count and f.turning > 0:
+        first = 0
     f.tiles.turn[2 * k + turned_far(f, first, f.tiles.freedoms[k + 1])](f.z, f.z)
 
 

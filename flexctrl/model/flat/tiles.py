@@ -98,11 +98,13 @@ def tiling_of(layout: Layout) -> Tiling:
         return Tiling(_NONE, _NONE, _NONE, tuple(np.arange(f.count) for f in families), ())
     # kernels compute up to eight at once, and loops copy as many
     nodes = np.append(8 * (np.arange(count) * len(whole) // (8 * count)), len(whole))
-    first = layout.position[layout.owned[whole[nodes[1:-1]], 0]]
-    freedoms = np.concatenate([[0], -(-first // 8) * 8, [layout.padded]])
-    fronts = layout.plan.fronts
-    begins = fronts.base[np.searchsorted(fronts.first, first)]  # of two nodes in one front the first says where it is
-    entries = np.concatenate([[0], begins, [layout.plan.length]])
+    # welded nodes share their freedoms, also with the tile before, which has begun to sum up the forces on them
+    beyond = layout.position[layout.owned[whole[nodes[1:-1] - 1], -1]] + 1
+    freedoms = np.concatenate([[0], -(-beyond // 8) * 8, [layout.padded]])
+    fronts, length = layout.plan.fronts, layout.plan.length
+    # of several nodes in one front the first says where it is
+    begins = np.append(fronts.base, length)[np.searchsorted(fronts.first, beyond)]
+    entries = np.concatenate([[0], begins, [length]])
     tile = np.where((layout.owned < m.n).any(axis=1), count - 1, 0)
     tile[whole] = np.repeat(np.arange(count), np.diff(nodes))
     last = [tile[f.nodes].max(axis=1) for f in families]
