@@ -64,7 +64,9 @@ def plan(A: sp.csr_matrix) -> Plan:
         return Plan(A.indptr, A.indices, empty, 0, empty)
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    order = reverse_cuthill_mckee(A, symmetric_mode=False)
+    # entries that happen to be 0 count as well: a run that goes on elsewhere would be solved in another order
+    pattern = sp.csr_matrix((np.ones(A.nnz), A.indices, A.indptr), shape=A.shape)
+    order = reverse_cuthill_mckee(pattern, symmetric_mode=False)
     back = np.empty(n, dtype=int)
     back[order] = np.arange(n)
     rows, columns = back[np.repeat(np.arange(n), np.diff(A.indptr))], back[A.indices]
