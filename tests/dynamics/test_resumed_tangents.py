@@ -58,3 +58,21 @@ def test_a_chain_goes_on_over_a_knot_with_the_same_bits(method, stop):
     rest = fc.simulate(model, law, until=0.15, start=fc.simulate(model, law, until=stop, **how).checkpoint, **how)
     assert np.array_equal(rest.final.q, whole.final.q)
     assert np.array_equal(rest.final.v, whole.final.v)
+
+
+@pytest.mark.parametrize(("elements", "push", "step"), [(10, 100.0, 5e-3), (20, 300.0, 1e-2), (5, 300.0, 1e-2)])
+def test_a_damped_chain_goes_on_at_samples_with_the_same_bits(elements, push, step):
+    """Where a step was looked at halfway nodes were left a last digit off, where masses were made at a sample."""
+    section = fc.Section(EA=1e5, EI_y=10.0, EI_z=20.0, GJ=5.0, rhoA=1.0, rhoJ=1e-3)
+    chain = fc.Beam("chain", (0, 0, 0), (3, 0, -4), section, elements=elements)
+    support, pushed = fc.Support(chain.start, "u v w"), fc.Force("push", chain.end, "y")
+    effects = [fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(0.1, 1e-2)]
+    model = fc.assemble(fc.Structure([chain], [support], [], [pushed]), effects)
+    law = fc.Sampled(OpenLoop({"push": Table((0.0, 10 * step, 30 * step), (0.0, push, 0.0))}), step)
+    how = {"method": fc.Unchecked(fc.GeneralizedAlpha(step)), "every": step}
+    whole = fc.simulate(model, law, until=15 * step, **how)
+    for count in (6, 9, 12):
+        part = fc.simulate(model, law, until=count * step, **how)
+        rest = fc.simulate(model, law, until=15 * step, start=part.checkpoint, **how)
+        assert np.array_equal(rest.final.q, whole.final.q)
+        assert np.array_equal(rest.final.v, whole.final.v)

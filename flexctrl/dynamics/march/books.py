@@ -11,7 +11,7 @@ from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import ALIKE, FAR, OFTEN, absurd, borne_out, looking, missed, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import arrive, clear, dissipate, drive, energy, keep, load, place, pull
+from flexctrl.model.flat.flat import arrive, clear, dissipate, drive, energy, keep, load, place, pull, stand
 from flexctrl.model.flat.solving import copy_on
 from flexctrl.model.gauges import read
 
@@ -174,6 +174,7 @@ def halfway(m: March) -> float:
     clear(f.padded, f.step)
     copy_on(f.padded, m.v, f.v)
     reach(m)
+    stand(f)
     copy_on(f.padded, f.force, f.step)
     return lost
 

@@ -33,6 +33,7 @@ __all__ = [
     "press_tiles",
     "pull",
     "push",
+    "stand",
     "tangent",
 ]
 
@@ -310,6 +311,13 @@ def energy(f: Flat) -> None:
     clear(3, f.books)
     for k in range(f.pieces):
         f.energies[k](f.z, f.books)
+
+
+def stand(f: Flat) -> None:
+    """Put nodes where the step sets out from, to the last bit: a turn by nothing leaves one in the last digit."""
+    for i in range(f.nodes):
+        put_six(f.z[NODE_SLOT * i :], f.pose[_POSE * i :])
+        put_six(f.z[NODE_SLOT * i + 6 :], f.pose[_POSE * i + 6 :])
 
 
 def keep(f: Flat) -> None:
