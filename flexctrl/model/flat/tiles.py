@@ -112,7 +112,7 @@ def tiling_of(layout: Layout) -> Tiling:
     return Tiling(nodes, freedoms, entries, tuple(np.argsort(tiles, kind="stable") for tiles in last), ends)
 
 
-def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...], tangents: tuple[Run, ...] = ()) -> Tiles:
+def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...], tangents: tuple[Run, ...]) -> Tiles:
     """Return the tiles as loops read them.
 
     Parameters
@@ -121,7 +121,7 @@ def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...], tan
     turn : tuple of Run
         Kernels that turn nodes, those in tiles first.
     forces, tangents : tuple of Run
-        Those of each family's pieces, in the order of the tiling.
+        Those of each family's pieces, in the order of the tiling; of the latter maybe none.
 
     Returns
     -------
@@ -136,6 +136,6 @@ def tiles_of(tiling: Tiling, turn: tuple[Run, ...], forces: tuple[Run, ...], tan
 
 
 def _by_tiles(runs: Sequence[Run], ends: Sequence[np.ndarray]) -> tuple[Run, ...]:
-    """Parts of runs, those of each tile together."""
+    """Parts of runs, if there are any, those of each tile together."""
     parts = [run.parts(end) for run, end in zip(runs, ends, strict=False)]
     return tuple(run for tile in zip(*parts, strict=True) for run in tile)
