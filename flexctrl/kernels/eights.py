@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, overload
 
 import numpy as np
 
-__all__ = ["Eight", "ahead", "eight", "larger", "largest", "lost", "put", "put_six", "rounded", "total"]
+__all__ = ["Eight", "add_six", "ahead", "eight", "larger", "largest", "lost", "put", "put_six", "rounded", "total"]
 
 SPLIT = 2.0**27 + 1.0
 
@@ -26,6 +26,11 @@ def put(x: np.ndarray, value: Eight | float) -> None:
 def put_six(y: np.ndarray, x: np.ndarray) -> None:
     """Copy the first six entries of one vector into another, in two moves."""
     y[:6] = x[:6]
+
+
+def add_six(y: np.ndarray, x: np.ndarray) -> None:
+    """Add the first six entries of one vector to those of another, in two moves."""
+    y[:6] += x[:6]
 
 
 def ahead(x: np.ndarray) -> None:

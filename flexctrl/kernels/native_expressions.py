@@ -28,9 +28,7 @@ from flexctrl.kernels.native_types import (
 
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _ORDER = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
-_EIGHTS = {
-    getattr(eights, n): n for n in ("ahead", "eight", "put", "put_six", "larger", "largest", "total", "rounded", "lost")
-}
+_EIGHTS = {getattr(eights, name): name for name in eights.__all__ if name != "Eight"}
 _BUILT_IN = ("float", "int", "abs", "min", "max")
 
 
@@ -282,8 +280,8 @@ class Expressions:
         if name == "put":
             self._put(f"store {EIGHT} {self._cast(arguments[1], 'Eight').text}, ptr {a}, align 8")
             return Value(None, "")
-        if name == "put_six":
-            self._put_six(a, arguments[1].text)
+        if name in ("put_six", "add_six"):
+            self._six(a, arguments[1].text, name == "add_six")
             return Value(None, "")
         if name in ("rounded", "lost"):
             kind = "Eight" if name == "lost" or "Eight" in (arguments[0].type, arguments[1].type) else "float"
@@ -299,11 +297,17 @@ class Expressions:
             return self._value("float", f"call double @llvm.vector.reduce.fmax.v8f64({EIGHT} {a})")
         return self._value("float", f"call reassoc double @llvm.vector.reduce.fadd.v8f64(double 0.0, {EIGHT} {a})")
 
-    def _put_six(self, goal: str, source: str) -> None:
+    def _six(self, goal: str, source: str, added: bool) -> None:
         """Read all of it before any is written, which LLVM may not do by itself: goal and source might overlap."""
         ends = [self._value("ptr", f"getelementptr double, ptr {at}, i64 4").text for at in (goal, source)]
         moves = (("<4 x double>", goal, source), ("<2 x double>", *ends))
         values = [self._value("Eight", f"load {kind}, ptr {start}, align 8").text for kind, _, start in moves]
+        if added:
+            others = [self._value("Eight", f"load {kind}, ptr {to}, align 8").text for kind, to, _ in moves]
+            values = [
+                self._value("Eight", f"fadd {move[0]} {one}, {other}").text
+                for move, one, other in zip(moves, values, others, strict=True)
+            ]
         for (kind, to, _), value in zip(moves, values, strict=True):
             self._put(f"store {kind} {value}, ptr {to}, align 8")
 

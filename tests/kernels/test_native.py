@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flexctrl.errors import KernelError
-from flexctrl.kernels.eights import Eight, ahead, eight, larger, largest, lost, put, put_six, rounded, total
+from flexctrl.kernels.eights import Eight, add_six, ahead, eight, larger, largest, lost, put, put_six, rounded, total
 from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel
 from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly, lasting_zeros
 from flexctrl.model.flat.flat import clear as cleared
@@ -135,6 +135,7 @@ def moves(m: Record) -> int:
             m.x[j] += m.y[inner.table[j]]
     while inner.table[1] != m.flag:
         put_six(m.x[2:], m.x)
+        add_six(m.y[3:], m.y)
         m.flag = inner.table[1]
     return inner.table[0] if inner.weight > 0.5 else 0
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from flexctrl.dynamics.march.record import Factors
 from flexctrl.kernels.eights import eight, larger, largest
-from flexctrl.kernels.native import Reals, Wholes
+from flexctrl.kernels.native import Reals
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.fronts import Fronts
 from flexctrl.model.flat.solving import copy_on, solve_own
@@ -76,30 +76,40 @@ def tilt(a: Reals) -> float:
 
 def solved(axes: Axes, factors: Factors, fronts: Fronts, b: Reals) -> None:
     """Solve in place with the matrix as it would be now."""
-    turn_back(axes.triple_count, axes.triples, factors.turned, b)
+    turn_back(axes, factors.turned, b)
     solve_own(fronts, factors.down, factors.up, b, factors.work, factors.wide)
-    turn_on(axes.triple_count, axes.triples, factors.turned, b)
+    turn_on(axes, factors.turned, b)
 
 
-def turn_back(count: int, triples: Wholes, turned: Reals, b: Reals) -> None:
+def turn_back(axes: Axes, turned: Reals, b: Reals) -> None:
     """See forces from the axes as they were."""
-    for k in range(count):
-        x = b[triples[2 * k] :]
-        R = turned[9 * triples[2 * k + 1] :]
-        first = R[0] * x[0] + R[3] * x[1] + R[6] * x[2]
-        second = R[1] * x[0] + R[4] * x[1] + R[7] * x[2]
-        x[2] = R[2] * x[0] + R[5] * x[1] + R[8] * x[2]
-        x[0] = first
-        x[1] = second
+    for k in range(axes.count):
+        for i in range(2 * k, 2 * k + 2):
+            if axes.triples[i] >= 0:
+                back(turned[9 * k :], b[axes.triples[i] :])
 
 
-def turn_on(count: int, triples: Wholes, turned: Reals, b: Reals) -> None:
+def turn_on(axes: Axes, turned: Reals, b: Reals) -> None:
     """See motions in the axes as they were from space."""
-    for k in range(count):
-        x = b[triples[2 * k] :]
-        R = turned[9 * triples[2 * k + 1] :]
-        first = R[0] * x[0] + R[1] * x[1] + R[2] * x[2]
-        second = R[3] * x[0] + R[4] * x[1] + R[5] * x[2]
-        x[2] = R[6] * x[0] + R[7] * x[1] + R[8] * x[2]
-        x[0] = first
-        x[1] = second
+    for k in range(axes.count):
+        for i in range(2 * k, 2 * k + 2):
+            if axes.triples[i] >= 0:
+                on(turned[9 * k :], b[axes.triples[i] :])
+
+
+def back(R: Reals, x: Reals) -> None:
+    """Turn a vector back."""
+    first = R[0] * x[0] + R[3] * x[1] + R[6] * x[2]
+    second = R[1] * x[0] + R[4] * x[1] + R[7] * x[2]
+    x[2] = R[2] * x[0] + R[5] * x[1] + R[8] * x[2]
+    x[0] = first
+    x[1] = second
+
+
+def on(R: Reals, x: Reals) -> None:
+    """Turn a vector."""
+    first = R[0] * x[0] + R[1] * x[1] + R[2] * x[2]
+    second = R[3] * x[0] + R[4] * x[1] + R[5] * x[2]
+    x[2] = R[6] * x[0] + R[7] * x[1] + R[8] * x[2]
+    x[0] = first
+    x[1] = second

@@ -11,19 +11,22 @@ from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import ALIKE, FAR, OFTEN, absurd, borne_out, looking, missed, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom
-from flexctrl.model.flat.flat import arrive, clear, dissipate, drive, energy, keep, load, place, pull, stand
+from flexctrl.model.flat.flat import arrive, clear, dissipate, drive, energy, keep, keep_tiles, load, place, pull, stand
 from flexctrl.model.flat.solving import copy_on
 from flexctrl.model.gauges import read
 
-__all__ = ["accept", "draw", "drawn_now", "reach", "settle", "shelve"]
+__all__ = ["accept", "draw", "drawn_now", "reach", "settle", "shelve", "unseen"]
 
 _TINY = 1e-300
 
 
 def accept(m: March) -> None:
-    """Go on to the end of the step, where the nodes have been placed; enter it in the books and records."""
+    """Go on to the end of the step, where the nodes have been placed unless `unseen`; enter it in books and records."""
     f = m.flat
-    keep(f)
+    if unseen(m):
+        keep_tiles(f)
+    else:
+        keep(f)
     if m.leaping == 0 and looking(m.entered):
         miss(m)
     zero = 0.0 * eight(m.weight)
@@ -70,6 +73,13 @@ def accept(m: March) -> None:
     m.done += 1
     if m.swift < 0:
         m.swift = 1 if m.swift == -1 else m.swift + 1
+
+
+def unseen(m: March) -> bool:
+    """Tell whether nothing asks where nodes are before a step is accepted: tiles of them are placed with that."""
+    if m.flat.tiles.count == 0 or m.leaping == 1 or m.answering == 1:
+        return False
+    return m.watching == 0 and m.closing.looks == 0 and m.contacts.count == 0 and m.corners.jumping == 0
 
 
 def reach(m: March) -> None:

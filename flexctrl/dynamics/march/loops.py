@@ -6,7 +6,7 @@ import math
 
 from flexctrl.dynamics.events.nearing import SHORTEST, SMALLEST
 from flexctrl.dynamics.march.answering import commanded, strayed_off, take
-from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle, shelve
+from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle, shelve, unseen
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.gliding import back, glide, land, leap, level
@@ -186,14 +186,14 @@ def fixed(m: March) -> int:
 
 
 def advanced(m: March) -> int:
-    """Solve a step, and put nodes where it ends."""
+    """Solve a step, and put nodes where it ends if that is looked at."""
     if m.leaping == 1:
         status = leap(m)
     elif m.answering == 1:
         status = commanded(m)
     else:
         status = step(m)
-    if status != DONE:
+    if status != DONE or unseen(m):
         return status
     reach(m)
     if m.corners.jumping == 0 or m.leaping == 1 or m.answering == 1:

@@ -19,11 +19,11 @@ class Axes:
 
     Attributes
     ----------
-    count, triple_count, pair_count, angle_count : int
+    count, pair_count, angle_count : int
     nodes : Wholes
-        The nodes with axes.
-    triples : Wholes
-        First of three degrees of freedom, and the number of their axes.
+        The nodes with axes, in the order of elimination.
+    triples : Wholes, (2 count,)
+        First of the three rotations that are seen from each, and of the three displacements; −1: of none.
     pairs : Wholes
         Axes that meet in some piece; −1 for space.
     angles : Wholes
@@ -31,7 +31,6 @@ class Axes:
     """
 
     count: int
-    triple_count: int
     pair_count: int
     angle_count: int
     nodes: Wholes
@@ -57,38 +56,43 @@ def axes_of(model: Model, plan: Plan, pattern: tuple[np.ndarray, np.ndarray]) ->
     """
     motion, position = model.motion, plan.position
     of = np.full(motion.n, -1)
-    nodes: list[int] = []
-    triples: list[tuple[int, int]] = []
+    found: list[tuple[int, int, int]] = []
     ropes = {int(motion.nodes[i]) for i, _ in motion.linkage.lines}
     for node, row in enumerate(motion.place):
         if node in ropes or not (row[3:] < motion.n).all():
             continue
-        firsts = [p[0] for cells in (row[3:], row[:3]) if (p := _three(cells, of, position)).size]
-        if firsts:
-            triples += [(int(p), len(nodes)) for p in firsts]
-            of[plan.order[np.add.outer(firsts, np.arange(3)).ravel()]] = len(nodes)
-            nodes.append(node)
+        turning, moving = (_three(cells, of, position) for cells in (row[3:], row[:3]))
+        if max(turning, moving) >= 0:
+            of[plan.order[[p + i for p in (turning, moving) if p >= 0 for i in range(3)]]] = len(found)
+            found.append((node, turning, moving))
+    nodes, of = _in_order(np.array(found, dtype=int).reshape(-1, 3), of)
     alone = of < 0
     angles = position[np.flatnonzero(alone & _turning(model))]
     pairs = _pairs(model, pattern, of)
     return Axes(
         count=len(nodes),
-        triple_count=len(triples),
         pair_count=len(pairs),
         angle_count=len(angles),
-        nodes=np.array(nodes, dtype=int),
-        triples=np.array(triples, dtype=int).ravel(),
+        nodes=nodes[:, 0].copy(),
+        triples=nodes[:, 1:].ravel(),
         pairs=pairs.ravel(),
         angles=angles,
     )
 
 
-def _three(cells: np.ndarray, of: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Return where three degrees of freedom stand, if one after the other and without axes yet."""
+def _three(cells: np.ndarray, of: np.ndarray, position: np.ndarray) -> int:
+    """Return where three degrees of freedom begin, if one stands after the other, without axes yet; −1 elsewhere."""
     if not (cells < len(of)).all() or (of[cells] >= 0).any():
-        return np.zeros(0, dtype=int)
+        return -1
     places = position[cells]
-    return places if (np.diff(places) == 1).all() else np.zeros(0, dtype=int)
+    return int(places[0]) if (np.diff(places) == 1).all() else -1
+
+
+def _in_order(nodes: np.ndarray, of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return axes in the order of what is seen from them, and the ones of each degree of freedom (−1: none)."""
+    order = np.argsort(nodes[:, 1:].max(axis=1, initial=-1), kind="stable")
+    number = np.append(np.argsort(order), -1)
+    return nodes[order], number[of]
 
 
 def _pairs(model: Model, pattern: tuple[np.ndarray, np.ndarray], of: np.ndarray) -> np.ndarray:

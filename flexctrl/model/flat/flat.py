@@ -27,6 +27,7 @@ __all__ = [
     "drive",
     "energy",
     "keep",
+    "keep_tiles",
     "load",
     "place",
     "press_entire",
@@ -198,8 +199,7 @@ def press_tiles(f: Flat) -> None:
     move_parted(f)
     rate_parted(f)
     for k in range(tiles.count):
-        for i in range(tiles.freedoms[k], tiles.freedoms[k + 1], 8):
-            put(f.force[i:], eight(f.load[i:]))
+        begin_tile(f, tiles.freedoms[k], tiles.freedoms[k + 1])
         for i in range(tiles.nodes[k], tiles.nodes[k + 1]):
             move(f, i)
             rate(f, i)
@@ -209,6 +209,15 @@ def press_tiles(f: Flat) -> None:
     for k in range(tiles.families, f.pieces):
         f.forces[k](f.z, f.z)
     press_following(f)
+
+
+def begin_tile(f: Flat, first: int, last: int) -> None:
+    """Begin the sums of forces on the freedoms of a tile; loads that are nothing are not read."""
+    if f.unit_loads == 0:
+        clear(last - first, f.force[first:])
+        return
+    for i in range(first, last, 8):
+        put(f.force[i:], eight(f.load[i:]))
 
 
 def push(f: Flat) -> None:
@@ -323,9 +332,37 @@ def stand(f: Flat) -> None:
 def keep(f: Flat) -> None:
     """Take the end of the step as the start of the next."""
     for k in range(f.wholes):
-        i = f.whole[2 * k]
-        put_six(f.pose[_POSE * i :], f.z[NODE_SLOT * i :])
-        put_six(f.pose[_POSE * i + 6 :], f.z[NODE_SLOT * i + 6 :])
+        retain(f, k)
+    retain_parted(f)
+    for i in range(f.drives):
+        f.driven[i] = f.found[i]
+    for i in range(0, f.padded, 8):
+        put(f.q[i:], eight(f.q[i:]) + eight(f.step[i:]))
+
+
+def keep_tiles(f: Flat) -> None:
+    """Put the nodes where the step takes them, and take that as the start of the next, tile by tile."""
+    move_parted(f)
+    for k in range(f.tiles.count):
+        for i in range(f.tiles.nodes[k], f.tiles.nodes[k + 1]):
+            move(f, i)
+        turn_tile(f, k)
+        for i in range(f.tiles.nodes[k], f.tiles.nodes[k + 1]):
+            retain(f, i)
+        for i in range(f.tiles.freedoms[k], f.tiles.freedoms[k + 1], 8):
+            put(f.q[i:], eight(f.q[i:]) + eight(f.step[i:]))
+    retain_parted(f)
+
+
+def retain(f: Flat, k: int) -> None:
+    """Take the place of a whole node as the one at the start of the next step."""
+    i = f.whole[2 * k]
+    put_six(f.pose[_POSE * i :], f.z[NODE_SLOT * i :])
+    put_six(f.pose[_POSE * i + 6 :], f.z[NODE_SLOT * i + 6 :])
+
+
+def retain_parted(f: Flat) -> None:
+    """Take those of other nodes."""
     for k in range(f.moving):
         i = f.moved[k]
         for j in range(3):
@@ -339,7 +376,3 @@ def keep(f: Flat) -> None:
         after = f.z[NODE_SLOT * f.linked[k] :]
         put(before, eight(after))
         put(before[4:], eight(after[4:]))
-    for i in range(f.drives):
-        f.driven[i] = f.found[i]
-    for i in range(0, f.padded, 8):
-        put(f.q[i:], eight(f.q[i:]) + eight(f.step[i:]))

@@ -104,6 +104,9 @@ class Fronts:
         First pivot, number of pivots and of unknowns, length of a column (a multiple of eight), where the front
         begins in the entries (column by column) and where its other unknowns in ``others``, and the front that
         takes its Schur complement (−1: none).
+    onto : Wholes, (count,)
+        Of fronts of one or two nodes that touch one more, whose six unknowns follow each other, the first of these;
+        −1 of others.
     others, into : Wholes
         The other unknowns of all fronts, and their rows in the fronts' parents.
     diagonal : Wholes, (n,)
@@ -125,6 +128,7 @@ class Fronts:
     base: Wholes
     rest: Wholes
     parent: Wholes
+    onto: Wholes
     others: Wholes
     into: Wholes
     diagonal: Wholes
@@ -277,6 +281,7 @@ def _laid_out(n: int, own: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> 
         base=starts[1],
         rest=starts[2],
         parent=parent,
+        onto=np.array([_onto(*one) for one in zip(pivots, others, strict=True)], dtype=int),
         others=np.concatenate([np.zeros(0, dtype=int), *others]),
         into=np.zeros(int(rests.sum()), dtype=int),
         diagonal=np.zeros(n, dtype=int),
@@ -288,6 +293,12 @@ def _laid_out(n: int, own: int, fronts: list[tuple[np.ndarray, np.ndarray]]) -> 
     tables.into[:] = found.rows(up, tables.others)
     tables.diagonal[:] = found.places(order, order)  # of all unknowns
     return found
+
+
+def _onto(pivots: int, others: np.ndarray) -> int:
+    """The first of a node's unknowns, where a front of one or two nodes touches these alone."""
+    nodes = pivots in (NODE, 2 * NODE) and len(others) == NODE
+    return int(others[0]) if nodes and others[-1] - others[0] == NODE - 1 else -1
 
 
 @seldom

@@ -6,7 +6,7 @@ written one by one that are read eight at once. So rows are summed up side by si
 
 from __future__ import annotations
 
-from flexctrl.kernels.eights import ahead, eight, put
+from flexctrl.kernels.eights import add_six, ahead, eight, put, put_six
 from flexctrl.kernels.native import Reals, Wholes
 from flexctrl.model.flat.fronts import NODE, Fronts
 
@@ -37,31 +37,35 @@ def solve(f: Fronts, down: Reals, up: Reals, b: Reals, work: Reals) -> None:
     below = 0
     for s in range(f.count):
         pivots = f.pivots[s]
-        size = f.size[s]
         own = b[f.first[s] :]
-        others = f.others[f.rest[s] :]
-        if pivots == NODE and size == 2 * NODE:
-            fetch(pivots * size, down[below + _FORTH :])
-            node_forward(own, b, others, down[below:], work)
-        elif pivots == 2 * NODE and size == 3 * NODE:
-            pair_forward(own, b, others, down[below:], work)
-        else:
+        if f.onto[s] < 0:
+            size = f.size[s]
+            others = f.others[f.rest[s] :]
             forward(pivots, size, own, down[below:], work)
             copy_on(pivots, work, own)
             for i in range(pivots, size):
                 b[others[i - pivots]] += work[i]
-        below += pivots * size
+            below += pivots * size
+        elif pivots == NODE:
+            fetch(2 * NODE * NODE, down[below + _FORTH :])
+            node_forward(own, b[f.onto[s] :], down[below:], work)
+            below += 2 * NODE * NODE
+        else:
+            pair_forward(own, b[f.onto[s] :], down[below:], work)
+            below += 6 * NODE * NODE
     right = f.right
     for s in range(f.count - 1, -1, -1):
         pivots = f.pivots[s]
+        own = b[f.first[s] :]
+        if pivots == NODE and f.onto[s] >= 0:
+            right -= NODE * NODE
+            fetch(NODE * NODE, up[right - _BACK :])
+            node_backward(own, b[f.onto[s] :], up[right:], work)
+            continue
         rest = f.size[s] - pivots
         right -= pivots * rest
-        own = b[f.first[s] :]
         others = f.others[f.rest[s] :]
-        if pivots == NODE and rest == NODE:
-            fetch(pivots * rest, up[right - _BACK :])
-            node_backward(own, b, others, up[right:], work)
-        elif pivots >= 8 and pivots <= 16:
+        if pivots >= 8 and pivots <= 16:
             backward_in_place(pivots, rest, b, others, up[right:], own)
         else:
             copy_on(pivots, own, work)
@@ -75,7 +79,7 @@ def fetch(count: int, a: Reals) -> None:
         ahead(a[i:])
 
 
-def node_forward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) -> None:
+def node_forward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
     """Go forward from one node to the next, in twice two sums: its loops are of known length, and none is left."""
     one = own[0] * eight(a)
     two = own[0] * eight(a[8:])
@@ -89,13 +93,11 @@ def node_forward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) ->
         four = four + own[k + 1] * eight(column[2 * NODE + 8 :])
     put(work, one + three)
     put(work[8:], two + four)
-    for i in range(NODE):
-        own[i] = work[i]
-    for i in range(NODE):
-        b[others[i]] += work[NODE + i]
+    put_six(own, work)
+    add_six(onto, work[NODE:])
 
 
-def pair_forward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) -> None:
+def pair_forward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
     """Go forward from two nodes to the next, in twice three sums; of twelve unknowns eight are written at once."""
     one = own[0] * eight(a)
     two = own[0] * eight(a[8:])
@@ -116,20 +118,18 @@ def pair_forward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) ->
     put(work[8:], three + six)
     for i in range(4):
         own[8 + i] = work[i]
-    for i in range(NODE):
-        b[others[i]] += work[4 + i]
+    add_six(onto, work[4:])
 
 
-def node_backward(own: Reals, b: Reals, others: Wholes, a: Reals, work: Reals) -> None:
+def node_backward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
     """Come back to a node from the next."""
-    one = b[others[0]] * eight(a)
-    two = b[others[1]] * eight(a[NODE:])
+    one = -onto[0] * eight(a)
+    two = -onto[1] * eight(a[NODE:])
     for j in range(2, NODE, 2):
-        one = one + b[others[j]] * eight(a[NODE * j :])
-        two = two + b[others[j + 1]] * eight(a[NODE * j + NODE :])
+        one = one - onto[j] * eight(a[NODE * j :])
+        two = two - onto[j + 1] * eight(a[NODE * j + NODE :])
     put(work, one + two)
-    for i in range(NODE):
-        own[i] -= work[i]
+    add_six(own, work)
 
 
 def copy_on(n: int, x: Reals, y: Reals) -> None:
