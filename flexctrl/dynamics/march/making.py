@@ -115,6 +115,7 @@ def _motion(F: Flattened) -> dict[str, Any]:
     names = ["v", "left", "own", "rate", "algorithmic", "trend", "pulled", "fresh", "before", "asked", "reach", "first"]
     names += ["ahead", "swept", "bent", "path", "stray"]
     cones = F.plan.position[coning_of(F.model).triples]
+    cones = cones[np.argsort(cones.max(axis=1, initial=0))]
     vectors = dict(zip(names, np.zeros((len(names), F.flat.padded)), strict=True))
     return {**vectors, "cones": cones.ravel(), "coning": len(cones), "firmest": firmest(F.model), **_throwing(F)}
 

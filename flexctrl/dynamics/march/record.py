@@ -30,8 +30,9 @@ law does not say numbers; beyond a corner, anew, or where that is to be done."""
 FIXED, CONTROLLED, JUMP, SETTLE, REFACTOR, WEIGH, REMADE, WEIGHED, SAMPLED, START = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 """What to do."""
 
-FRESH, EVALUATE, CORRECT = 0, 1, 2
-"""Where in a step it is: before it, before an iteration, or with the forces of one known."""
+FRESH, EVALUATE, CORRECT, PRESSED = 0, 1, 2, 3
+"""Where in a step it is: before it, before an iteration, with the forces of one known, or with those of the first
+guess."""
 
 
 @dataclass
@@ -231,7 +232,8 @@ class March:
     weight, turns, dust : Reals
         One over the yardsticks; 1 for what turns; mass that is but rounding.
     coning, cones : int, Wholes
-        Rotations that turn all ways, and their degrees of freedom, three each; see `flexctrl.dynamics.alpha.coning`.
+        Rotations that turn all ways, and their degrees of freedom, three each, in order; see
+        `flexctrl.dynamics.alpha.coning`.
     fastest : float
         The largest rate of what turns at the start of the step.
     turned : float

@@ -16,11 +16,31 @@ from flexctrl.dynamics.march.corners import tell_sides
 from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.lagging import CHANGED, lag_share, lagged
 from flexctrl.dynamics.march.probing import probe
-from flexctrl.dynamics.march.record import CORRECT, DONE, EVALUATE, FAILED, FRESH, SINGULAR, WANTS_TANGENT, March
+from flexctrl.dynamics.march.record import (
+    CORRECT,
+    DONE,
+    EVALUATE,
+    FAILED,
+    FRESH,
+    PRESSED,
+    SINGULAR,
+    WANTS_TANGENT,
+    March,
+)
 from flexctrl.dynamics.swift.stiff_lines import SHORT, STIFF, SURE, TURNING
 from flexctrl.kernels.eights import Eight, eight, larger, largest, put, rounded, total
 from flexctrl.kernels.native import Reals, seldom
-from flexctrl.model.flat.flat import accelerate, drive, load, place, press_entire, press_tiles, push, tangent
+from flexctrl.model.flat.flat import (
+    accelerate,
+    drive,
+    load,
+    place,
+    press_beyond,
+    press_entire,
+    press_tile,
+    push,
+    tangent,
+)
 from flexctrl.model.flat.fronts import factor, whose
 
 __all__ = ["blended", "newton", "press_all", "refactored", "restore", "sloped", "step", "to_rate", "to_v"]
@@ -58,11 +78,44 @@ def step(m: March) -> int:
 def predict(m: March) -> None:
     """Guess the end of the step: accelerations change as in the last one, by the share that told that one best."""
     f = m.flat
-    h = m.h
     if m.lags.count > 0:
         hasten(m)
+    m.iteration = 0
+    m.last = math.inf
+    m.contraction = 0.0
+    m.strayed = 0.0
+    m.short = 0.0
     spun = 0.0 * eight(m.turns)
-    for i in range(0, f.padded, 8):
+    if tiled(m):
+        m.phase = PRESSED
+        coned = 0
+        for k in range(f.tiles.count):
+            last = f.tiles.freedoms[k + 1]
+            spun = larger(spun, guess(m, f.tiles.freedoms[k], last))
+            first = coned
+            while coned < m.coning and m.cones[3 * coned + 2] < last:
+                coned += 1
+            cone(m, f.v, -1.0, first, coned)
+            press_tile(f, k)
+        press_beyond(f)
+    else:
+        m.phase = EVALUATE
+        spun = guess(m, 0, f.padded)
+        cone(m, f.v, -1.0, 0, m.coning)
+    m.fastest = largest(spun)
+
+
+def tiled(m: March) -> bool:
+    """Tell whether forces are summed up tile by tile, and nothing acts on the guess before that."""
+    return m.flat.tiles.count > 0 and m.contacts.count == 0 and m.answering == 0 and m.swift != 1
+
+
+def guess(m: March, first: int, last: int) -> Eight:
+    """Guess the end of the step for some freedoms; return their rates at its start, if they turn something."""
+    f = m.flat
+    h = m.h
+    spun = 0.0 * eight(m.turns)
+    for i in range(first, last, 8):
         rate = eight(m.rate[i:]) + m.lean * eight(m.trend[i:])
         own = eight(m.algorithmic[i:])
         lead = blended(m, rate, eight(m.rate[i:]), own)
@@ -70,15 +123,7 @@ def predict(m: March) -> None:
         put(f.step[i:], h * eight(m.v[i:]) + h * h * ((0.5 - m.beta) * own + m.beta * lead))
         put(f.v[i:], eight(m.v[i:]) + h * ((1.0 - m.gamma) * own + m.gamma * lead))
         spun = larger(spun, abs(eight(m.v[i:])) * eight(m.turns[i:]))
-    if m.coning > 0:
-        m.fastest = largest(spun)
-        cone(m, f.v, -1.0)
-    m.phase = EVALUATE
-    m.iteration = 0
-    m.last = math.inf
-    m.contraction = 0.0
-    m.strayed = 0.0
-    m.short = 0.0
+    return spun
 
 
 @seldom
@@ -112,13 +157,13 @@ def restore(m: March) -> None:
     m.lagging = 0.0
 
 
-def cone(m: March, spins: Reals, share: float) -> None:
-    """Add to the step what it has beside the integral of the spins, for a share of others at its end; see `coning`."""
+def cone(m: March, spins: Reals, share: float, first: int, last: int) -> None:
+    """Add to some freedoms' step what it has beside the integral of spins, for a share of others at its end."""
     h = m.h
     cells = m.cones[0:]
     v = m.v[0:]
     step = m.flat.step[0:]
-    for k in range(m.coning):
+    for k in range(first, last):
         x = cells[3 * k]
         y = cells[3 * k + 1]
         z = cells[3 * k + 2]
@@ -147,8 +192,9 @@ def newton(m: March) -> int:
     while m.iteration < ITERATIONS:
         if m.swift == 1:
             lag(m)
-        elif m.phase == EVALUATE:
-            press_all(m)
+        elif m.phase != CORRECT:
+            if m.phase == EVALUATE:
+                press_all(m)
             m.phase = CORRECT
             if m.attempt == 1 or wary(m) or m.contraction > POOR or (m.iteration == 0 and stale(m)):
                 status = sloped_here(m)
@@ -182,7 +228,9 @@ def press_all(m: March) -> None:
         press_entire(f)
         return
     if f.tiles.count > 0 and m.contacts.count == 0:
-        press_tiles(f)
+        for k in range(f.tiles.count):
+            press_tile(f, k)
+        press_beyond(f)
         return
     place(f)
     drive(f)
@@ -353,5 +401,5 @@ def correct(m: March) -> float:
     turned = largest(turn)
     m.strayed += turned
     if _MOST * m.h * m.h * m.fastest * speed * turned > m.tolerance:
-        cone(m, f.force, (1.0 - m.short) * speed)
+        cone(m, f.force, (1.0 - m.short) * speed, 0, m.coning)
     return largest(most) if math.isfinite(total(sums)) else math.nan

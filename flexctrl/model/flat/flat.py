@@ -30,8 +30,9 @@ __all__ = [
     "keep_tiles",
     "load",
     "place",
+    "press_beyond",
     "press_entire",
-    "press_tiles",
+    "press_tile",
     "pull",
     "push",
     "stand",
@@ -193,20 +194,24 @@ def turn_tile(f: Flat, k: int) -> None:
     f.tiles.turn[2 * k + turned_far(f, first, f.tiles.freedoms[k + 1])](f.z, f.z)
 
 
-def press_tiles(f: Flat) -> None:
-    """Place the nodes and sum up all forces at the end of the step, tile by tile."""
+def press_tile(f: Flat, k: int) -> None:
+    """Place the nodes of a tile and sum up the forces of its pieces at the end of the step, the tiles before done."""
     tiles = f.tiles
-    move_parted(f)
-    rate_parted(f)
-    for k in range(tiles.count):
-        begin_tile(f, tiles.freedoms[k], tiles.freedoms[k + 1])
-        for i in range(tiles.nodes[k], tiles.nodes[k + 1]):
-            move(f, i)
-            rate(f, i)
-        turn_tile(f, k)
-        for i in range(k * tiles.families, (k + 1) * tiles.families):
-            tiles.forces[i](f.z, f.z)
-    for k in range(tiles.families, f.pieces):
+    if k + 1 == tiles.count:
+        move_parted(f)
+        rate_parted(f)
+    begin_tile(f, tiles.freedoms[k], tiles.freedoms[k + 1])
+    for i in range(tiles.nodes[k], tiles.nodes[k + 1]):
+        move(f, i)
+        rate(f, i)
+    turn_tile(f, k)
+    for i in range(k * tiles.families, (k + 1) * tiles.families):
+        tiles.forces[i](f.z, f.z)
+
+
+def press_beyond(f: Flat) -> None:
+    """Add the forces that are in no tile."""
+    for k in range(f.tiles.families, f.pieces):
         f.forces[k](f.z, f.z)
     press_following(f)
 
