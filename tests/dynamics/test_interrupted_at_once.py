@@ -94,3 +94,36 @@ def test_only_what_belongs_to_it_goes_on():
     checkpoint = fc.simulate(pushed(), Law(0.01), **HOW).checkpoint
     with pytest.raises(StructureError, match="checkpoint is of another method"):
         fc.simulate(pushed(), Law(0.01), start=checkpoint, method=fc.GeneralizedAlpha(1e-3), **HOW)
+
+
+class Servo:
+    """Holds the mass back, and says when it was asked; Ctrl-C is pressed while it is, once."""
+
+    inputs, outputs, sample_time = ("x",), ("push",), 0.01
+
+    def __init__(self, when):
+        self.when, self.asked = when, []
+
+    def initial(self):
+        return np.zeros(0)
+
+    def command(self, t, x, y):
+        self.asked.append(t)
+        if t > self.when - 1e-9:
+            self.when = np.inf
+            os.kill(os.getpid(), signal.SIGINT)
+        return -10.0 * y
+
+
+@pytest.mark.parametrize("method", [fc.AdaptiveAlpha(), fc.GeneralizedAlpha(1e-3), fc.ConservingMidpoint(1e-3)])
+def test_a_law_is_not_asked_again(method):
+    model, law = pushed(), Servo(1.0)
+    how = {"until": 5.0, "every": 0.01, "start": model.displace([0.1]), "method": fc.Unchecked(method)}
+    run = fc.simulate(model, law, **how)
+    assert run.status is fc.Status.INTERRUPTED
+    assert law.asked[-1] == pytest.approx(1.0)
+    assert 1.0 - 1e-9 <= run.t[-1] < 1.0 + 1.5e-3  # after the step under way
+    resumed = fc.simulate(model, law, **how | {"start": run.checkpoint})
+    once = fc.simulate(model, Servo(np.inf), **how)
+    assert np.array_equal(resumed.final.x, once.final.x)
+    assert np.array_equal(resumed.final.v, once.final.v)

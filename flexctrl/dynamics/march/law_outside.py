@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,7 +73,7 @@ def samples(ride: Ride, deadline: float) -> bool:
         if lookout is not None and lookout.leaps(marcher.rows[done - 1], u, False):
             ride.near = ride.leapt = True
             break
-        if time.perf_counter() >= deadline:
+        if ride.over(deadline):
             break
     h = held.samples[-1][1] if ride.near and held.samples else mark.size if ride.near else h
     mark.size, ride.supply = h, Supply(np.array(u), x, held.rate)

@@ -112,7 +112,7 @@ class Ride:
                 continue
             taken += sum(part.steps for part in self.legs.parts[parts:])
             parts = len(self.legs.parts)
-            if parts and (time.perf_counter() >= deadline or taken >= _STEPS):
+            if parts and (taken >= _STEPS or self.over(deadline)):
                 break
             if self.lookout is None and (self.wary or self.most):
                 well = stop - m.t > self.tick and self._leg(stop)
@@ -133,6 +133,10 @@ class Ride:
             self.journey.pause()  # where it stands now is what a run goes on from
             raise self.faults[0]
         return some
+
+    def over(self, deadline: float) -> bool:
+        """Tell whether it is time to end the ride, or Ctrl-C has been pressed."""
+        return self.journey.interruption.asked or time.perf_counter() >= deadline
 
     def _leg(self, stop: float) -> bool:
         """Go on towards a stop; tell whether all is well."""
