@@ -11,6 +11,7 @@ from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.answers import jumps
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
+from flexctrl.dynamics.notes.fading import radius
 from flexctrl.dynamics.notes.lengths import as_many, usual
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.peaks import peaked
@@ -31,6 +32,8 @@ _CHANCE = 2.0 / 3.0
 _ALIKE, _SAMPLED, _KNOTTED = 0.7, 0.5, 0.4
 """A coarser run with more of the steps, or so many between samples or between knots that are more than a coarser run
 would take steps by itself, is much the same, and makes the same errors."""
+_DAMPING = 0.5
+"""Spectral radius of steps below which what vibrates fast is gone from coarser runs as from the first."""
 _CUT = 0.8
 """A run nearby with more of the steps is much the same where stops cut them."""
 _OFF, _NEARLY = 0.01, 0.001
@@ -162,8 +165,12 @@ def _by_farther(
 def _rattled(
     run: Run, told: Run, others: tuple[Other, ...], journey: Journey, method: Checked, beginning: Beginning
 ) -> _Known:
-    """The run with what is known, and where corners come one after another with what a finer one tells."""
-    return _confirmed(run, told, others, journey, method, beginning) if rattles(journey) else (told, others)
+    """The run with what is known, and with what a finer one tells where coarser ones may be off alike.
+
+    So they are where corners come one after another, and of vibrations that steps damp away at once.
+    """
+    alike = rattles(journey) or radius(journey.plan.method) < _DAMPING
+    return _confirmed(run, told, others, journey, method, beginning) if alike else (told, others)
 
 
 def _confirmed(
