@@ -76,7 +76,7 @@ other work), a controller at 6.5 µs, a cold start at 1.1 s. On another (Intel, 
 chains came out at 0.18 to 0.32 within three hours, full swings at 0.11 to 0.16, growth at 1.03 to 1.05 (easy) and 1.09
 to 1.13 (full swing), the crane at 0.29 to 0.32, 0.13 to 0.15 and 0.09 to 0.10. Forces take an eighth less since, a step
 of 100 elements 8 % less, one of 1,000 4 %: ratios gained what they had missed, and growth lost as much. Tiles took 8 to
-9 % off a step of 10,000.
+9 % off a step of 10,000, reading less another 8.
 """
 _SWING = """\
 The full swing of {elements} elements over {steps} steps, through the lowest point and the whip of the
