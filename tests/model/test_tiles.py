@@ -10,7 +10,7 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.kernels.native import Packed, Reals
-from flexctrl.model.flat.flat import drive, load, place, press_beyond, press_tile, push, tangent
+from flexctrl.model.flat.flat import drive, load, place, press_tiles, push, tangent
 from flexctrl.model.flat.flattening import flatten
 from flexctrl.model.flat.tiles import NO_TILES
 from flexctrl.model.flat.workspace import Flat
@@ -27,9 +27,7 @@ class Once:
 
 def tiled(m: Once) -> int:
     load(m.flat)
-    for k in range(m.flat.tiles.count):
-        press_tile(m.flat, k)
-    press_beyond(m.flat)
+    press_tiles(m.flat)
     if m.flat.slopes > 0:
         tangent(m.flat, 1.0, 20.0, 400.0, m.entries)
     return 0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.closing import settled
+from flexctrl.dynamics.march.guessing import blended
 from flexctrl.dynamics.march.holding import begun
 from flexctrl.dynamics.march.judging import follow, lean, miss, tighten
 from flexctrl.dynamics.march.record import DONE, March
-from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import ALIKE, FAR, OFTEN, absurd, borne_out, looking, missed, unlooked
 from flexctrl.kernels.eights import eight, larger, largest, put, total
 from flexctrl.kernels.native import seldom

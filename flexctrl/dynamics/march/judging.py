@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.march.guessing import blended
 from flexctrl.dynamics.march.record import CONTROLLED, SAMPLED, March
-from flexctrl.dynamics.march.step import blended
 from flexctrl.dynamics.records.absurd import LOOKED_AT
 from flexctrl.kernels.eights import eight, larger, largest, put, rounded
 

@@ -10,6 +10,7 @@ from flexctrl.dynamics.march.books import accept, draw, drawn_now, reach, settle
 from flexctrl.dynamics.march.closing import in_doubt
 from flexctrl.dynamics.march.corners import passes
 from flexctrl.dynamics.march.gliding import back, glide, land, leap, level
+from flexctrl.dynamics.march.guessing import restore
 from flexctrl.dynamics.march.holding import lets_go
 from flexctrl.dynamics.march.joining import lengthen, started
 from flexctrl.dynamics.march.judging import compared, growth, judge
@@ -36,7 +37,7 @@ from flexctrl.dynamics.march.record import (
     March,
 )
 from flexctrl.dynamics.march.siding import decided
-from flexctrl.dynamics.march.step import refactored, restore, sloped, step, to_rate, to_v
+from flexctrl.dynamics.march.step import refactored, sloped, step, to_rate, to_v
 from flexctrl.dynamics.march.turning import start_anew, turn_corner
 from flexctrl.dynamics.swift.thrown import AT_HAND
 from flexctrl.kernels.native import seldom

@@ -33,6 +33,7 @@ __all__ = [
     "press_beyond",
     "press_entire",
     "press_tile",
+    "press_tiles",
     "pull",
     "push",
     "stand",
@@ -192,6 +193,13 @@ def turn_tile(f: Flat, k: int) -> None:
     if k + 1 == f.tiles.count and f.turning > 0:
         first = 0
     f.tiles.turn[2 * k + turned_far(f, first, f.tiles.freedoms[k + 1])](f.z, f.z)
+
+
+def press_tiles(f: Flat) -> None:
+    """Place the nodes and sum up all forces at the end of the step, tile by tile."""
+    for k in range(f.tiles.count):
+        press_tile(f, k)
+    press_beyond(f)
 
 
 def press_tile(f: Flat, k: int) -> None:

@@ -75,7 +75,7 @@ class Flat:
     answer : Reals *
         Accelerations; see `accelerate`.
     tiles : Tiles
-        What is placed, turned and pushed at once, of large models; see `press_tile`.
+        What is placed, turned and pushed at once, of large models; see `press_tiles`.
     entire : Runs
         Kernels of the whole machine, where it has few freedoms; see `flexctrl.model.flat.entire`.
     quick : int
