@@ -52,16 +52,14 @@ def trident() -> fc.Structure:
     """Three beams welded to a fourth, with a body, a spring between them, a slack line and two inputs."""
     stem = fc.Beam("stem", (0, 0, 0), (1, 0, 0), SECTION, elements=90)
     arms = [fc.Beam(f"arm{k}", (1, 0, 0), (2, k - 1.0, 0.3 * k), SECTION, elements=150) for k in range(3)]
-    parts = [
-        stem,
-        *arms,
-        fc.Spring("spring", arms[0].node(80), arms[2].node(40), stiffness=1e3),
-        fc.Rope("line", arms[1].end, (2, 0, 1), EA=1e4, unstretched=1.5),
-        fc.PointMass("load", arms[1].end, 2.0),
-    ]
-    joints = [fc.Support(stem.start), *(fc.Weld(stem.end, arm.start) for arm in arms), fc.Support(parts[5].end)]
+    spring = fc.Spring("spring", arms[0].node(80), arms[2].node(40), stiffness=1e3)
+    line = fc.Rope("line", arms[1].end, (2, 0, 1), EA=1e4, length=1.5)
+    load = fc.PointMass("load", arms[1].end, 2.0)
+    joints = [fc.Support(stem.start), *(fc.Weld(stem.end, arm.start) for arm in arms), fc.Support(line.end)]
+    joints += [fc.Pin(arms[0].node(80), spring.start), fc.Pin(arms[2].node(40), spring.end)]
+    joints += [fc.Pin(arms[1].end, line.start), fc.Pin(arms[1].end, load.node)]
     inputs = [fc.Force("push", arms[2].end, (0, 1, 0)), fc.FollowerForce("jet", arms[0].end, (1, 0, 0))]
-    return fc.Structure(parts, joints, [], inputs)
+    return fc.Structure([stem, *arms, spring, line, load], joints, [], inputs)
 
 
 def braced() -> fc.Structure:
@@ -109,7 +107,7 @@ def test_tiles_change_nothing(machine, compiled, far):
     f, rng = F.flat, np.random.default_rng(2)
     assert f.tiles.count >= 4
     step, v, rate = rng.normal(size=(3, model.n)) * [[1e-3], [1.0], [10.0]]
-    step[: model.n // 2] += far
+    step += np.linspace(0.0, far, model.n)
     found = []
     for plain, work in ((f, tiled), (replace(f, tiles=NO_TILES), untiled)):
         F.enter(model.rest)
@@ -121,7 +119,7 @@ def test_tiles_change_nothing(machine, compiled, far):
         found.append((f.z[: f.posed].copy(), f.force[: f.n].copy(), once.entries[:-1]))
         assert np.isfinite(found[-1][1]).all()
     (slots, *sums), (others, *other_sums) = found
-    np.testing.assert_array_equal(slots, others)
+    np.testing.assert_allclose(slots, others, rtol=0, atol=1e-14)  # either kernel may turn a tile
     for ours, theirs in zip(sums, other_sums, strict=True):
         if f.slopes or ours is sums[0]:
             np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-11 * abs(theirs).max())

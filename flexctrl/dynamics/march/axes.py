@@ -86,7 +86,7 @@ def turn_back(axes: Axes, turned: Reals, b: Reals) -> None:
     for k in range(axes.count):
         for i in range(2 * k, 2 * k + 2):
             if axes.triples[i] >= 0:
-                back(turned[9 * k :], b[axes.triples[i] :])
+                unturned(turned[9 * k :], b[axes.triples[i] :])
 
 
 def turn_on(axes: Axes, turned: Reals, b: Reals) -> None:
@@ -94,10 +94,10 @@ def turn_on(axes: Axes, turned: Reals, b: Reals) -> None:
     for k in range(axes.count):
         for i in range(2 * k, 2 * k + 2):
             if axes.triples[i] >= 0:
-                on(turned[9 * k :], b[axes.triples[i] :])
+                turned_by(turned[9 * k :], b[axes.triples[i] :])
 
 
-def back(R: Reals, x: Reals) -> None:
+def unturned(R: Reals, x: Reals) -> None:
     """Turn a vector back."""
     first = R[0] * x[0] + R[3] * x[1] + R[6] * x[2]
     second = R[1] * x[0] + R[4] * x[1] + R[7] * x[2]
@@ -106,7 +106,7 @@ def back(R: Reals, x: Reals) -> None:
     x[1] = second
 
 
-def on(R: Reals, x: Reals) -> None:
+def turned_by(R: Reals, x: Reals) -> None:
     """Turn a vector."""
     first = R[0] * x[0] + R[1] * x[1] + R[2] * x[2]
     second = R[3] * x[0] + R[4] * x[1] + R[5] * x[2]
