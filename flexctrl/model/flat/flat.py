@@ -182,9 +182,14 @@ def place_tiles(f: Flat) -> None:
     """Put the nodes where the step takes them, tile by tile."""
     move_parted(f)
     for k in range(f.tiles.count):
-        for i in range(f.tiles.nodes[k], f.tiles.nodes[k + 1]):
-            move(f, i)
-        turn_tile(f, k)
+        place_tile(f, k)
+
+
+def place_tile(f: Flat, k: int) -> None:
+    """Put the nodes of a tile where the step takes them."""
+    for i in range(f.tiles.nodes[k], f.tiles.nodes[k + 1]):
+        move(f, i)
+    turn_tile(f, k)
 
 
 def turn_tile(f: Flat, k: int) -> None:
@@ -357,9 +362,7 @@ def keep_tiles(f: Flat) -> None:
     """Put the nodes where the step takes them, and take that as the start of the next, tile by tile."""
     move_parted(f)
     for k in range(f.tiles.count):
-        for i in range(f.tiles.nodes[k], f.tiles.nodes[k + 1]):
-            move(f, i)
-        turn_tile(f, k)
+        place_tile(f, k)
         for i in range(f.tiles.nodes[k], f.tiles.nodes[k + 1]):
             retain(f, i)
         for i in range(f.tiles.freedoms[k], f.tiles.freedoms[k + 1], 8):
