@@ -1,6 +1,7 @@
 """One BLAS thread a worker: many small solves, several workers."""
 
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -202,6 +203,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that rewrites the pages of docs/validation; see tests/recorder.py."""
     parser.addoption("--validation-pages", action="store_true", help="rewrite docs/validation from the cases that run")
+
+
+@pytest.fixture(autouse=True)
+def _heard() -> Iterator[None]:
+    """Ctrl-C is heard as in a terminal, also where tests run in the background, where it is ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(autouse=True)

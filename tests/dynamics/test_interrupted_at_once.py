@@ -73,9 +73,7 @@ def test_the_run_stands_at_its_start_and_goes_on_from_there(tmp_path, sample_tim
 
 
 def test_a_signal_does_the_same():
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
     run = fc.simulate(pushed(), Law(0.01, signalled=True), **HOW)
-    signal.signal(signal.SIGINT, before)
     assert run.status is fc.Status.INTERRUPTED
     assert run.final.t == 0.0
 

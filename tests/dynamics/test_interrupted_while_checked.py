@@ -29,14 +29,6 @@ def beam() -> fc.Model:
 HOW = {"until": 1.0, "every": 0.05}
 
 
-@pytest.fixture(autouse=True)
-def _heard():
-    """Signals are ignored where tests run in the background."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 def pressed(times: int) -> None:
     for _ in range(times):
         os.kill(os.getpid(), signal.SIGINT)

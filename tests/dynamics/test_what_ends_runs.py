@@ -140,19 +140,15 @@ def test_a_run_that_an_event_ended_goes_on_past_it_to_the_next(method):
 
 def test_ctrl_c_is_kept_for_whoever_asks_and_a_second_one_is_not():
     """What is within knows what is kept around it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
-    try:
-        with Interruption() as kept:
-            with Interruption() as within:
-                os.kill(os.getpid(), signal.SIGINT)
-                assert kept.asked
-                with pytest.raises(KeyboardInterrupt):
-                    within.check()
+    with Interruption() as kept:
+        with Interruption() as within:
+            os.kill(os.getpid(), signal.SIGINT)
+            assert kept.asked
             with pytest.raises(KeyboardInterrupt):
-                os.kill(os.getpid(), signal.SIGINT)
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    finally:
-        signal.signal(signal.SIGINT, before)
+                within.check()
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def light(mass: float) -> fc.Model:
