@@ -46,7 +46,7 @@ def told(ride: Ride, deadline: float) -> bool:
         wanted = max(1, int(wanted * min(_MORE, _SECONDS / took)))
         done = m.done
         _enter_told(ride, law, sampling, pacing)
-        if mark.left or ride.lookout is not None or time.perf_counter() >= deadline:
+        if mark.left or ride.lookout is not None or ride.over(deadline):
             break
     ride.mute = status == SILENT
     if m.jumping:
