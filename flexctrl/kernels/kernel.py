@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FLOAT = np.dtype(np.float64)
 _INDEX_LIMIT = 2**31
 _LARGE = 6000
-_FEW = 64
+_FEW, _MANY = 64, 1000
 _OLDEST_LLVMLITE = (0, 45)
 
 
@@ -254,8 +254,8 @@ class Compiled:
     lanes : int
         Items computed at once: 1, 2, 4 or 8; 0 for what suits the processor and the number of items.
     optimize_up_to : int
-        Kernels of more instructions are compiled without optimisation: five times faster to compile,
-        up to 1.8 times slower to run.
+        Kernels of more instructions are compiled without optimisation for fewer than a thousand items: many times
+        faster to compile, up to 1.8 times slower to run.
 
     Raises
     ------
@@ -289,7 +289,8 @@ class Compiled:
         tables = Tables.of(kernel, gather, scatter)
         lanes = self.lanes or best_lanes(len(tables.gather))
         hurried = kernel.seldom and len(tables.gather) <= _FEW
-        level = 0 if hurried or kernel.instructions > self.optimize_up_to else 2
+        long = kernel.instructions > self.optimize_up_to and len(tables.gather) < _MANY
+        level = 0 if hurried or long else 2
         chunks = chunks_of(tables.gather, lanes), chunks_of(tables.scatter, lanes) if kernel.replaces else ()
         return CompiledRun.of(kernel, compile_kernel(kernel, lanes, level, *chunks), tables, params)
 
