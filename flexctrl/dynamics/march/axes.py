@@ -1,12 +1,13 @@
 """Factorised matrices seen from axes that turn with the nodes: compiled loops.
 
 A part that turns as a whole keeps its matrix in axes that turn with it. What makes a factorised matrix stale
-is that axes that meet in a piece have turned against each other.
+is that axes that meet in a piece have turned against each other; see also `swaying`.
 """
 
 from __future__ import annotations
 
 from flexctrl.dynamics.march.record import Factors
+from flexctrl.dynamics.march.swaying import bend, lead, sway_back, sway_on, unturned
 from flexctrl.kernels.eights import eight, larger, largest
 from flexctrl.kernels.native import Reals
 from flexctrl.model.flat.axes import Axes
@@ -25,6 +26,8 @@ def mark(axes: Axes, factors: Factors, f: Flat) -> None:
         for i in range(9):
             factors.made[9 * k + i] = R[i]
             factors.turned[9 * k + i] = 1.0 if i % 4 == 0 else 0.0
+    if factors.swaying > 0:
+        lead(axes, f, factors.bends)
     for k in range(axes.angle_count):
         factors.angles[k] = f.q[axes.angles[k]] + f.step[axes.angles[k]]
     copy_on(f.posed, f.z, factors.place)
@@ -38,6 +41,8 @@ def turned_too_far(axes: Axes, factors: Factors, f: Flat, most: float) -> bool:
             return True
     for k in range(axes.count):
         since(f.z[NODE_SLOT * axes.nodes[k] + 3 :], factors.made[9 * k :], factors.turned[9 * k :])
+    if factors.swaying > 0:
+        bend(axes, factors.turned, factors.bends)
     if axes.pair_count == 0:
         return False
     apart = 0.0 * eight(factors.made)
@@ -77,7 +82,11 @@ def tilt(a: Reals) -> float:
 def solved(axes: Axes, factors: Factors, fronts: Fronts, b: Reals) -> None:
     """Solve in place with the matrix as it would be now."""
     turn_back(axes, factors.turned, b)
+    if factors.swaying > 0:
+        sway_back(axes, factors.bends, b)
     solve_own(fronts, factors.down, factors.up, b, factors.work, factors.wide)
+    if factors.swaying > 0:
+        sway_on(axes, factors.bends, b)
     turn_on(axes, factors.turned, b)
 
 
@@ -95,15 +104,6 @@ def turn_on(axes: Axes, turned: Reals, b: Reals) -> None:
         for i in range(2 * k, 2 * k + 2):
             if axes.triples[i] >= 0:
                 turned_by(turned[9 * k :], b[axes.triples[i] :])
-
-
-def unturned(R: Reals, x: Reals) -> None:
-    """Turn a vector back."""
-    first = R[0] * x[0] + R[3] * x[1] + R[6] * x[2]
-    second = R[1] * x[0] + R[4] * x[1] + R[7] * x[2]
-    x[2] = R[2] * x[0] + R[5] * x[1] + R[8] * x[2]
-    x[0] = first
-    x[1] = second
 
 
 def turned_by(R: Reals, x: Reals) -> None:

@@ -95,8 +95,8 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
         leap=no_leap(),
         fronts=F.plan.fronts,
         axes=F.axes,
-        tangent=_factors(F),
-        mass=_factors(F),
+        tangent=_factors(F, F.axes.swaying),
+        mass=_factors(F, 0),
         probes=probes,
         lags=lags,
         entries=np.zeros(F.plan.length + 1),
@@ -162,7 +162,7 @@ def _newton(F: Flattened, method: Method, groups: int) -> dict[str, Any]:
     }
 
 
-def _factors(F: Flattened) -> Factors:
+def _factors(F: Flattened, swaying: int) -> Factors:
     axes, fronts = F.axes, F.plan.fronts
     return Factors(
         down=np.zeros(fronts.below + 8),
@@ -174,4 +174,6 @@ def _factors(F: Flattened) -> Factors:
         turned=np.zeros(9 * axes.count),
         angles=np.zeros(axes.angle_count),
         place=np.zeros(F.flat.posed),
+        swaying=swaying,
+        bends=np.zeros(6 * axes.count if swaying else 0),
     )

@@ -50,6 +50,10 @@ class Factors:
         Turning degrees of freedom without axes, when it was made.
     place : Reals
         The workspace when it was made.
+    swaying : int
+        Whether shear of fine beams is to be seen to; not in a matrix of masses.
+    bends : Reals
+        For each axis how fast turns change along such a beam, and which way it leads, seen from there as it was.
     """
 
     down: Reals
@@ -61,6 +65,8 @@ class Factors:
     turned: Reals
     angles: Reals
     place: Reals
+    swaying: int
+    bends: Reals
 
 
 @dataclass

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexctrl.kernels.native import Wholes
+from flexctrl.kernels.native import Reals, Wholes
+from flexctrl.mechanics.corotation import PARAMETERS
 from flexctrl.model.flat.fronts import Plan
 from flexctrl.model.model import Model
 
@@ -28,6 +29,12 @@ class Axes:
         Axes that meet in some piece; −1 for space.
     angles : Wholes
         Turning degrees of freedom without axes.
+    swaying : int
+        How many axes stand on beams so finely divided that their elements resist shear more than stretching.
+    beside : Wholes, (2 count,)
+        Of such axes the ones before and after along the beam, or themselves at its ends; elsewhere themselves.
+    share : Reals, (count,)
+        One over the length between these; 0 elsewhere.
     """
 
     count: int
@@ -37,6 +44,9 @@ class Axes:
     triples: Wholes
     pairs: Wholes
     angles: Wholes
+    swaying: int
+    beside: Wholes
+    share: Reals
 
 
 def axes_of(model: Model, plan: Plan, pattern: tuple[np.ndarray, np.ndarray]) -> Axes:
@@ -69,6 +79,7 @@ def axes_of(model: Model, plan: Plan, pattern: tuple[np.ndarray, np.ndarray]) ->
     alone = of < 0
     angles = position[np.flatnonzero(alone & _turning(model))]
     pairs = _pairs(model, pattern, of)
+    beside, share = _beside(model, of, len(nodes))
     return Axes(
         count=len(nodes),
         pair_count=len(pairs),
@@ -77,6 +88,9 @@ def axes_of(model: Model, plan: Plan, pattern: tuple[np.ndarray, np.ndarray]) ->
         triples=nodes[:, 1:].ravel(),
         pairs=pairs.ravel(),
         angles=angles,
+        swaying=int(np.count_nonzero(share)),
+        beside=beside.ravel(),
+        share=share,
     )
 
 
@@ -106,6 +120,36 @@ def _pairs(model: Model, pattern: tuple[np.ndarray, np.ndarray], of: np.ndarray)
     one, other = of[rows], of[columns]
     meet = ~scalar[rows] & ~scalar[columns] & (one > other)
     return np.unique(np.column_stack([one[meet], other[meet]]), axis=0)
+
+
+def _beside(model: Model, of: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the axes before and after each along a finely divided beam, and one over the length between them."""
+    own = np.arange(count)
+    beside, ways, length = np.column_stack([own, own]), np.zeros((count, 2), dtype=int), np.zeros(count)
+    for one, other, span in _fine(model, of):
+        for here, there, way in ((one, other, 1), (other, one, 0)):
+            beside[here, way] = there
+            ways[here, way] += 1
+            length[here] += span
+    forked = (ways > 1).any(axis=1) | (length == 0.0)
+    beside[forked] = own[forked, None]
+    return beside, np.where(forked, 0.0, 1.0 / np.where(forked, 1.0, length))
+
+
+def _fine(model: Model, of: np.ndarray) -> list[tuple[int, int, float]]:
+    """Return the axes at both ends of elements that resist shear more than stretching, and their lengths."""
+    place = model.motion.place
+    found: list[tuple[int, int, float]] = []
+    axes = np.append(of, -1)[np.minimum(place, len(of))]
+    seen = np.append(np.where((axes == axes[:, :1]).all(axis=1), axes[:, 0], -1), -1)
+    for family in model.forces.families:
+        if family.kernels.kind.slope is not None:
+            p = dict(zip(PARAMETERS, family.parameters.T, strict=False))
+            shear = 2.0 * np.maximum(p["a_y"] + p["b_y"], p["a_z"] + p["b_z"]) / p["L"]
+            ends = seen[family.nodes]
+            fine = (shear > p["EA"]) & (ends >= 0).all(axis=1) & (ends[:, 0] != ends[:, 1])
+            found += zip(*ends[fine].T.tolist(), p["L"][fine].tolist(), strict=True)
+    return found
 
 
 def _turning(model: Model) -> np.ndarray:

@@ -85,7 +85,7 @@ class SmallLayout(Layout):
     @cached_property
     def _axes(self) -> Axes:
         none = np.zeros(0, dtype=int)
-        return Axes(0, 0, 0, none, none, none, none)
+        return Axes(0, 0, 0, none, none, none, none, 0, none, np.zeros(0))
 
     @cached_property
     def own(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

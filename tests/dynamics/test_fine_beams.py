@@ -1,0 +1,62 @@
+"""Elements shorter than their section is thick: their tangents serve as long as those of longer ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+from flexctrl.model.flat import axes
+from flexctrl.model.flat.flattening import flatten
+
+pytest.importorskip("llvmlite")
+
+HOSE = fc.Section(EA=1e4, EI_y=2.0, EI_z=1.0, GJ=1.5, rhoA=1.0, rhoJ=1e-3)
+"""Radius of gyration 14 mm: elements below 49 mm resist shear more than stretching."""
+
+
+def chain(elements: int) -> fc.Structure:
+    """Let go from beside and pushed out of its plane."""
+    beam = fc.Beam("hose", (0, 0, 0), (2, 0, -1), HOSE, elements=elements)
+    outputs = [fc.Position(d, beam.end, d) for d in "xyz"]
+    return fc.Structure([beam], [fc.Support(beam.start, held="u v w")], [], [fc.Force("push", beam.end, "y")], outputs)
+
+
+def forked(elements: int) -> fc.Structure:
+    """Two beams head to head, and one across: welded nodes share their freedoms."""
+    one = fc.Beam("one", (0, 0, 0), (1, 0, 0), HOSE, elements=elements // 3)
+    two = fc.Beam("two", (2.2, 0, 0.5), one.end.position, HOSE, elements=elements // 3)
+    side = fc.Beam("side", one.node(elements // 6).position, (0.5, 1, 0), HOSE, elements=elements // 3)
+    joints = [fc.Support(one.start), fc.Weld(one.end, two.end), fc.Weld(one.node(elements // 6), side.start)]
+    outputs = [fc.Position(d, two.start, d) for d in "xyz"]
+    return fc.Structure([one, two, side], joints, [], [fc.Force("push", side.end, "y")], outputs)
+
+
+def run(structure: fc.Structure) -> fc.Run:
+    model = fc.assemble(structure, [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
+    method = fc.Unchecked(fc.GeneralizedAlpha(2e-3))
+    return fc.simulate(model, method=method, inputs={"push": 2.0}, until=0.8, every=0.02)
+
+
+def test_a_finely_divided_chain_needs_no_more_tangents_than_a_coarse_one():
+    coarse, fine = (run(chain(n)) for n in (40, 600))
+    assert fine.report.factorisations <= 2 * coarse.report.factorisations
+    assert np.ptp(fine["z"]) > 1.0
+    assert np.ptp(fine["y"]) > 0.1
+    np.testing.assert_allclose(fine.y, coarse.y, atol=0.02)
+
+
+@pytest.mark.parametrize(("machine", "elements"), [(chain, 600), (forked, 999)])
+def test_the_motion_is_that_of_tangents_made_more_often(monkeypatch, machine, elements):
+    with_sway = run(machine(elements))
+    monkeypatch.setattr(axes, "_fine", lambda model, of: [])
+    without = run(machine(elements))
+    assert with_sway.report.factorisations < 0.6 * without.report.factorisations
+    assert with_sway.report.newton_iterations <= 1.02 * without.report.newton_iterations
+    np.testing.assert_allclose(with_sway.y, without.y, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize(("machine", "count"), [(chain(40), 0), (chain(100), 100), (forked(300), 298)])
+def test_only_fine_beams_sway_but_where_they_fork(machine, count):
+    """Longer elements resist stretching more; a node that two elements end at, or three meet in, leads no one way."""
+    assert flatten(fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])).axes.swaying == count
