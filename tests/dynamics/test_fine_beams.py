@@ -60,3 +60,17 @@ def test_the_motion_is_that_of_tangents_made_more_often(monkeypatch, machine, el
 def test_only_fine_beams_sway_but_where_they_fork(machine, count):
     """Longer elements resist stretching more; a node that two elements end at, or three meet in, leads no one way."""
     assert flatten(fc.assemble(machine, [fc.Flexible(), fc.LargeRotation()])).axes.swaying == count
+
+
+@pytest.mark.parametrize("follows", [False, True])
+def test_a_run_goes_on_with_the_same_bits(follows):
+    """Under forces that turn with nodes a tangent is kept itself, and with it how it is seen."""
+    drawn = forked(300)
+    push = fc.FollowerForce("push", drawn.elements[2].end, "y") if follows else drawn.inputs[0]
+    structure = fc.Structure(drawn.elements, drawn.joints, [], [push])
+    model = fc.assemble(structure, [fc.Gravity(), fc.Flexible(), fc.LargeRotation()])
+    how = {"method": fc.Unchecked(fc.Richardson(fc.GeneralizedAlpha(4e-3))), "inputs": {"push": 2.0}}
+    whole = fc.simulate(model, until=0.2, **how)
+    rest = fc.simulate(model, until=0.2, start=fc.simulate(model, until=0.1, **how).checkpoint, **how)
+    assert np.array_equal(rest.final.x, whole.final.x)
+    assert np.array_equal(rest.final.v, whole.final.v)

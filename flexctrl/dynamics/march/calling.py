@@ -166,7 +166,7 @@ class Loops:
         """What is remembered of a matrix: where it was made, on which side of jumps, and itself where that is kept."""
         m = self.march
         f = m.mass if mass else m.tangent
-        whole = [f.down, f.up, f.diagonal, f.made] if self._whole else []
+        whole = [f.down, f.up, f.diagonal, f.made, f.bends] if self._whole else []
         return [f.place, f.angles, *([] if mass else [m.corners.made]), *whole]
 
     def _make(self, mass: bool) -> None:
