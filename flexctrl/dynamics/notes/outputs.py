@@ -32,7 +32,7 @@ __all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reac
 
 _TOLD, _SEEN, _BESIDE = 0.05, 1.0, 2.0
 _ROUND_OFF = 1e-12
-"""Of sizes and radians: less is the last digits of places."""
+"""Of what outputs are where nodes move by sizes and radians: less is the last digits of places."""
 _NAMED = 3
 _LEFT = 16.0 / 9.0
 """Two runs that lag by φ and φ/4 behind a vibration ±a are ¾ φ a apart; what is extrapolated is off by ½ φ² a."""
@@ -185,6 +185,8 @@ def _seen(journey: Journey, y: np.ndarray, sight: sp.csr_matrix) -> tuple[np.nda
     assert isinstance(model, Model)
     yards = yardsticks(model)
     least = _SEEN * max(tolerance.negligible, _ROUND_OFF) * (sight @ np.where(np.isfinite(yards), yards, 0.0))
+    # what no freedom moves has last digits all the same: freedoms turn the coupler of a parallelogram by nothing
+    least = np.maximum(least, _ROUND_OFF * output_yardsticks(model, journey.mark.size))
     way = ways(journey, y)
     return way, [i for i in placed(model) if way[i] > least[i]]
 
