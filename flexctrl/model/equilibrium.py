@@ -133,7 +133,8 @@ def equilibrium(
     the loads, brought on gradually, lead it to: if the machine gives way before, there is no equilibrium, and
     the error says at which part of the load. Elsewhere (a slack or straight chain, whose shape has no stiffness
     yet) the masses give the step its direction: pseudo-transient continuation (Kelley & Keyes 1998), and if
-    that fails, the loads come on in parts.
+    that fails, the loads come on in parts. `Rotation` outputs then show no whole turns from the way there, but where
+    drives, beams or what is held count them.
 
     Parameters
     ----------

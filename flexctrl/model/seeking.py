@@ -13,6 +13,7 @@ from flexctrl.errors import EquilibriumError
 from flexctrl.model.balance import Balance
 from flexctrl.model.eased import Eased, eased
 from flexctrl.model.overturned import overturned
+from flexctrl.model.recounted import recounted
 from flexctrl.model.search import SMALLEST_PART, Found, Newton, follow
 from flexctrl.model.softened import stiffest, stretching
 from flexctrl.model.state import State
@@ -67,9 +68,15 @@ def _behind(ease: Eased, start: State, tolerance: float) -> Found:
 
 
 def _searched(balance: Balance, start: State, tolerance: float) -> Found:
-    """The search: straight on from a shape that stands by itself, else by masses, at last by what stretches more."""
+    """The search: straight on from a shape that stands by itself, else as it is led."""
     if _stands(balance, start):
         return _loaded(balance, start, tolerance)
+    there = _led(balance, start, tolerance)
+    return replace(there, state=recounted(balance, start, there.state))
+
+
+def _led(balance: Balance, start: State, tolerance: float) -> Found:
+    """Where a shape that does not stand by itself is led by masses, at last by what stretches more."""
     try:
         return _hung(balance, start, tolerance)
     except EquilibriumError as failure:
