@@ -27,7 +27,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds
 
 __all__ = ["Autosave", "Checkpoint", "Origin", "check_same", "load_checkpoint", "machine_of"]
 
-_FORMAT = 16
+_FORMAT = 17
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 
@@ -52,6 +52,8 @@ class Checkpoint:
         Constant inputs under the controller's.
     law : str
         What its controller reads and commands, and when.
+    events : tuple of str
+        What is looked for, each in words.
     point : Point
         State of the machine, its accelerations, state of the controller.
     memory : object
@@ -92,6 +94,7 @@ class Checkpoint:
     tolerance: Tolerance
     base: np.ndarray
     law: str
+    events: tuple[str, ...]
     point: Point
     memory: Any
     passed: int
@@ -181,11 +184,15 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
                 raise ValueError("it is no archive of numpy's (.npz), or only part of one")
         with np.load(Path(path), allow_pickle=False) as file:
             content = json.loads(file["tree"].tobytes().decode())
-            if content["format"] != _FORMAT:
-                raise StructureError(f"{path} is a checkpoint of format {content['format']}; expected {_FORMAT}")
-            found = _unpacked(content["checkpoint"], file)
+            version = content["format"]
+            found = _unpacked(content["checkpoint"], file) if version == _FORMAT else None
     except _UNREADABLE as error:
         raise StructureError(f"{path} is no checkpoint: {error}; give a file that Checkpoint.save wrote") from error
+    if version != _FORMAT:
+        raise StructureError(
+            f"{path} is a checkpoint of another version of flexctrl (format {version}; expected {_FORMAT}); go on with "
+            "that version, or begin the run anew"
+        )
     if not isinstance(found, Checkpoint):
         raise StructureError(f"{path} holds a {type(found).__name__}; give a file that Checkpoint.save wrote")
     return found

@@ -356,6 +356,7 @@ class Journey:
             self.plan.tolerance,
             self.plan.feed.base,
             self.plan.feed.told_law,
+            self.watch.told,
             self.point,
             self._memory,
             self.stops.passed,

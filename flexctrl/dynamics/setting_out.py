@@ -154,7 +154,9 @@ def _check_going_on(plan: Plan, start: Checkpoint, watch: Watch, every: float | 
     check_same("model, by the digest of its names, effects and numbers", *digests)
     check_same("method", repr(plan.method), start.method)
     check_same("tolerance", plan.tolerance, start.tolerance)
-    check_same("number of events", watch.count if start.passed != UNASKED else 0, len(start.sides))
+    check_same("number of events", len(watch.events), len(start.events))
+    for now, before in zip(watch.told, start.events, strict=True):
+        check_same("event", now, before)
     check_same("spacing of rows (every)", every, start.every)
     check_same("controller", plan.feed.told_law, start.law)
 

@@ -77,8 +77,8 @@ def simulate(
         Where to begin; default: the shape as drawn, at rest. A `Rest` brings its constant inputs along. The clock of
         a run from these begins at 0, whatever the ``t`` of the state; only a `Checkpoint` brings its time along. From a
         `Checkpoint` the run goes on as if it had not been stopped, bit for bit; model, controller, method,
-        tolerance, events and ``every`` must be those of the run it was taken from. Beyond an event that ended that run
-        it goes on until one happens again.
+        tolerance, events and ``every`` must be those of the run it was taken from; an event may become ``terminal``, or
+        be so no more. Beyond an event that ended that run it goes on until one happens again.
     inputs : mapping of str to float, optional
         Constant inputs, applied as a step at the start; a controller's commands add to them. A `Checkpoint` brings its
         own along, and takes no others. Functions of time are a controller: ``OpenLoop({"push": lambda t: …})``.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +130,47 @@ def test_a_run_goes_on_as_it_was_asked_for_and_not_backwards(model):
     with pytest.raises(StructureError, match=r"another spacing of rows \(every\) \(None there, 0.05 here\)"):
         fc.simulate(model, until=0.2, start=stopped, every=0.05)
     assert fc.simulate(model, until=0.2, start=stopped).status is fc.Status.FINISHED
+
+
+EVENT = fc.Event("e", "swing", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("events", "message"),
+    [
+        ([], r"another number of events \(1 there, 0 here\)"),
+        ([fc.Event("other", "swing", 0.1)], r"another event \('e': swing through 0.1 there, 'other': swing .* here\)"),
+        ([fc.Event("e", "push", 0.1)], "another event .* 'e': push through 0.1 here"),
+        ([fc.Event("e", "swing", 0.3, terminal=True)], "another event .* 'e': swing through 0.3 here"),
+        ([fc.Event("e", "swing", 0.1, fc.Direction.FALLING)], "another event .* 'e': swing falling through 0.1 here"),
+        ([fc.Event("e", lambda y: y["swing"], 0.1)], "another event .* 'e': a function through 0.1 here"),
+    ],
+    ids=["none", "name", "signal", "value", "direction", "function"],
+)
+def test_a_run_goes_on_with_the_events_that_it_had(model, events, message):
+    """Which side of its value a signal is on was noted for these."""
+    stopped = fc.simulate(model, until=0.1, events=[EVENT]).checkpoint
+    with pytest.raises(StructureError, match=f"simulate: the checkpoint is of {message}.*give what the run had"):
+        fc.simulate(model, until=0.2, start=stopped, events=events)
+
+
+def test_whether_an_event_ends_a_run_may_change_where_it_goes_on(model, tmp_path: Path):
+    """It ends where a run ends that had it so all the time."""
+    start, path = model.rest.with_(v=np.array([1.0])), tmp_path / "run.checkpoint"
+    fc.simulate(model, until=0.05, start=start, events=[EVENT]).checkpoint.save(path)
+    starts, ending = (start, fc.load_checkpoint(path)), [replace(EVENT, terminal=True)]
+    once, ended = (fc.simulate(model, until=0.3, start=begun, events=ending) for begun in starts)
+    assert ended.status is once.status is fc.Status.STOPPED
+    assert np.array_equal(ended.final.q, once.final.q)
+    assert ended["swing"][-1] == pytest.approx(0.1, abs=1e-9)
+
+
+def test_a_checkpoint_of_another_version_is_told(model, tmp_path: Path, monkeypatch):
+    path = tmp_path / "run.checkpoint"
+    fc.simulate(model, until=0.01).checkpoint.save(path)
+    monkeypatch.setattr("flexctrl.dynamics.checkpoint._FORMAT", 0)
+    with pytest.raises(StructureError, match=r"^\S+ is a checkpoint of another version of flexctrl .*the run anew$"):
+        fc.load_checkpoint(path)
 
 
 def test_a_run_goes_on_under_the_law_and_the_inputs_that_it_had():

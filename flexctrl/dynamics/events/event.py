@@ -79,6 +79,13 @@ class Event:
             choices = ", ".join(f"Direction.{d.name}" for d in Direction)
             raise StructureError(f"{owner}: direction = {self.direction!r}; expected one of {choices}")
 
+    @property
+    def told(self) -> str:
+        """What is looked for, in words: of a function, that it is one; not whether the run ends there."""
+        of = self.of if isinstance(self.of, str) else "a function"
+        way = "" if self.direction is Direction.EITHER else f" {self.direction.name.lower()}"
+        return f"{self.name!r}: {of}{way} through {float(self.at)!r}"
+
     def value(self, signals: Mapping[str, float]) -> float:
         """Return how far it is from happening.
 

@@ -82,11 +82,6 @@ class Watch:
                 raise StructureError(f"event {event.name!r}: the model has no signal {event.of!r}{hint}")
 
     @property
-    def count(self) -> int:
-        """Number of gauges."""
-        return len(self.events) + len(self.names) + len(self.corner_names)
-
-    @property
     def idle(self) -> bool:
         """Whether there is nothing to look for."""
         return self.quiet and not self.corner_names
@@ -120,6 +115,11 @@ class Watch:
     def signals(self, state: State, u: np.ndarray) -> dict[str, float]:
         """Return all signals by name."""
         return self.named_signals(self.feed.model.measure(state), u)
+
+    @cached_property
+    def told(self) -> tuple[str, ...]:
+        """The events asked for, in words."""
+        return tuple(event.told for event in self.events)
 
     @cached_property
     def tensions(self) -> Tensions:
