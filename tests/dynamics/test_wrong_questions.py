@@ -46,6 +46,9 @@ def model() -> fc.Model:
         ({"progress": 1}, "progress = 1; expected a function"),
         ({"events": [fc.Event("top", lambda signals: np.nan)]}, "event 'top': its function gives nan"),
         ({"events": [fc.Event("top", lambda signals: signals["x"])]}, "event 'top': its function raised KeyError: 'x'"),
+        ({"events": [fc.Event("top", lambda y: y["swing"] > 0.5)]}, "event 'top': its function gives False; expected"),
+        ({"events": [fc.Event("top", lambda y: np.array(True))]}, "that goes through 0 where it happens: write lambda"),
+        ({"events": [fc.Event("top", lambda y: "1")]}, "event 'top': its function gives '1'; expected a number"),
     ],
     ids=lambda v: next(iter(v)) if isinstance(v, dict) else "",
 )
@@ -89,6 +92,8 @@ def test_what_is_no_model_is_refused():
         (lambda: fc.Autosave(None), "Autosave: path = None; expected the name of a file"),
         (lambda: fc.Event("top", 3), "event 'top': of = 3; expected the name of a signal or a function"),
         (lambda: fc.Event("top", "swing", direction="up"), "direction = 'up'; expected one of Direction.RISING"),
+        (lambda: fc.Event("top", lambda t, y: t), "event 'top': its function is called with one argument, a mapping"),
+        (lambda: fc.Event("top", lambda: 1.0), "is called with one argument"),
         (lambda: fc.Event(3, "swing"), "event 3: expected a name"),
         (lambda: fc.Event("", "swing"), "event '': expected a name"),
     ],
@@ -96,6 +101,11 @@ def test_what_is_no_model_is_refused():
 def test_values_that_cannot_be_are_refused_where_they_are_made(make, message):
     with pytest.raises(StructureError, match=re.escape(message)):
         make()
+
+
+@pytest.mark.parametrize("of", [max, np.sum, len, lambda *y: 1.0, lambda y, k=2: k, fc.Event("top", "swing").value])
+def test_any_function_of_one_argument_may_be_an_event(of):
+    assert fc.Event("top", of).of is of
 
 
 def test_an_event_that_is_no_number_later_ends_the_run(model):

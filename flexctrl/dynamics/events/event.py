@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from enum import Enum
+
+import numpy as np
 
 from flexctrl.errors import StructureError
 from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_finite
 
 __all__ = ["Direction", "Event", "EventError", "Occurrence"]
+
+
+_WRITTEN = 'lambda y: y["angle"] - 0.5'
 
 
 class EventError(StructureError):
@@ -46,7 +52,7 @@ class Event:
     Raises
     ------
     StructureError
-        For a value that is no finite number, and what is no direction, signal or function.
+        For a value that is no finite number, and what is no direction, signal or function of one argument.
 
     Notes
     -----
@@ -74,6 +80,10 @@ class Event:
             raise StructureError(f"{owner}: expected a name, a text that is not empty: what happens is told by it")
         if not isinstance(self.of, str) and not callable(self.of):
             raise StructureError(f"{owner}: of = {self.of!r}; expected the name of a signal or a function of signals")
+        if not isinstance(self.of, str) and not _takes_one(self.of):
+            raise StructureError(
+                f"{owner}: its function is called with one argument, a mapping of all signals by name; write {_WRITTEN}"
+            )
         check_finite(self.at, "at", owner)
         if not isinstance(self.direction, Direction):
             choices = ", ".join(f"Direction.{d.name}" for d in Direction)
@@ -101,14 +111,20 @@ class Event:
         Raises
         ------
         EventError
-            If its function raises, or gives no finite number.
+            If its function raises, or gives no finite number: none is a truth value, or a text.
         """
         if isinstance(self.of, str):
             return signals[self.of] - self.at
         try:
-            found = float(self.of(signals))
+            given = self.of(signals)
+            found = math.nan if _is_answer(given) else float(given)
         except Exception as error:
             raise EventError(f"event {self.name!r}: its function raised {type(error).__name__}: {error}") from error
+        if _is_answer(given):
+            raise EventError(
+                f"event {self.name!r}: its function gives {given!r}; expected a number that goes through {self.at:g} "
+                f"where it happens: write {_WRITTEN}"
+            )
         if not math.isfinite(found):
             raise EventError(f"event {self.name!r}: its function gives {found}; expected a finite number at all times")
         return found - self.at
@@ -134,3 +150,19 @@ class Occurrence:
     t: float
     rising: bool
     signals: Mapping[str, float]
+
+
+def _takes_one(function: Callable[..., object]) -> bool:
+    """Whether a function can be called with one argument, as far as Python tells."""
+    try:
+        inspect.signature(function).bind(None)
+    except TypeError:
+        return False
+    except ValueError:  # it has no signature: what was compiled need not have one
+        return True
+    return True
+
+
+def _is_answer(given: object) -> bool:
+    """Whether something is a truth value or a text, which Python would take for a number."""
+    return np.asarray(given).dtype.kind in "bSU"
