@@ -9,6 +9,7 @@ import math
 import os
 import zlib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from flexctrl.errors import StructureError
 from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import check_path, check_seconds
+from flexctrl.structure.freedoms import check_path, check_seconds, written
 
 __all__ = ["Autosave", "Checkpoint", "Origin", "check_same", "load_checkpoint", "machine_of"]
 
@@ -127,14 +128,28 @@ class Checkpoint:
         ----------
         path : str or Path
             Name of the file; no ending is added.
+
+        Raises
+        ------
+        StructureError
+            If ``path`` names no file, its folder is not there, or it cannot be written.
         """
+        with written(path, "Checkpoint.save"):
+            self.put(path)
+
+    def put(self, path: str | Path) -> None:
+        """Write to a file as `save` does, with the system's own word where that cannot be."""
         arrays: dict[str, np.ndarray] = {}
         tree = _packed(self, arrays)
         text = json.dumps({"format": _FORMAT, "checkpoint": tree})
         beside = Path(f"{path}.part")
-        with beside.open("wb") as file:
-            np.savez(file, allow_pickle=False, tree=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
-        os.replace(beside, path)
+        try:
+            with beside.open("wb") as file:
+                np.savez(file, allow_pickle=False, tree=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
+            os.replace(beside, path)
+        finally:
+            with suppress(OSError):
+                beside.unlink(missing_ok=True)
 
 
 @frozen(eq=False)
@@ -175,7 +190,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     Raises
     ------
     StructureError
-        If the file is no checkpoint of this version.
+        If the file is not there, or no checkpoint of this version.
     """
     check_path(path, "load_checkpoint")
     try:
@@ -186,6 +201,8 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
             content = json.loads(file["tree"].tobytes().decode())
             version = content["format"]
             found = _unpacked(content["checkpoint"], file) if version == _FORMAT else None
+    except OSError as error:
+        raise StructureError(f"load_checkpoint: {path} cannot be read: {error.strerror or error}") from error
     except _UNREADABLE as error:
         raise StructureError(f"{path} is no checkpoint: {error}; give a file that Checkpoint.save wrote") from error
     if version != _FORMAT:

@@ -345,7 +345,7 @@ class Journey:
         """Write a checkpoint of where the run stands, and all rows until there."""
         self.rows.recorder.flush()
         with writing(path):
-            (self.saved or self.snapshot()).save(path)
+            (self.saved or self.snapshot()).put(path)
 
     def snapshot(self) -> Checkpoint:
         """Return where the run stands."""

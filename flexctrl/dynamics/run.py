@@ -13,7 +13,7 @@ import numpy as np
 from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.frozen import frozen
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import check_finite, check_number
+from flexctrl.structure.freedoms import check_finite, check_number, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -353,9 +353,15 @@ class Run:
         Parameters
         ----------
         path : str or Path
+
+        Raises
+        ------
+        StructureError
+            If ``path`` names no file, its folder is not there, or it cannot be written.
         """
         header = ",".join(["t", *self.outputs, *self.inputs])
-        np.savetxt(path, np.column_stack([self.t, self.y, self.u]), delimiter=",", header=header, comments="")
+        with written(path, "run.save_csv"):
+            np.savetxt(path, np.column_stack([self.t, self.y, self.u]), delimiter=",", header=header, comments="")
 
 
 __all__ = ["EnergyBalance", "Moment", "Report", "Run", "Status", "Tolerance", "worst_output"]

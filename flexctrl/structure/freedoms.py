@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from numbers import Integral, Real
 from typing import TypeAlias
 
@@ -150,6 +150,18 @@ def check_path(path: str | os.PathLike[str], owner: str) -> None:
     folder = os.path.dirname(os.fspath(path)) or "."
     if not os.path.isdir(folder):
         raise StructureError(f"{owner}: path = {str(path)!r}: there is no folder {folder!r}; make it first")
+    if os.path.isdir(path):
+        raise StructureError(f"{owner}: path = {str(path)!r} is a folder; expected the name of a file")
+
+
+@contextmanager
+def written(path: str | os.PathLike[str], owner: str) -> Iterator[None]:
+    """Tell what cannot be written where ``path`` says, and why, before and while it is."""
+    check_path(path, owner)
+    try:
+        yield
+    except OSError as error:
+        raise StructureError(f"{owner}: {path} cannot be written: {error.strerror or error}") from error
 
 
 def check_whole(value: int, what: str, owner: str, *, least: int, most: int = 2**31) -> int:

@@ -19,7 +19,7 @@ from flexctrl.model.assemble import rigid
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
-from flexctrl.structure.freedoms import check_seconds
+from flexctrl.structure.freedoms import check_seconds, written
 from flexctrl.study.rounding import beyond, of_signal
 
 if TYPE_CHECKING:
@@ -226,12 +226,18 @@ class Comparison:
         Parameters
         ----------
         path : str or Path
+
+        Raises
+        ------
+        StructureError
+            If ``path`` names no file, its folder is not there, or it cannot be written.
         """
         names = [s.name for s in self.signals]
         t, columns = self.flexible.t, [self.flexible[name] for name in names]
         columns += [np.interp(t, self.rigid.t, self.rigid[name]) for name in names]
         header = ",".join(["t", *names, *(f"{name}_rigid" for name in names)])
-        np.savetxt(path, np.column_stack([t, *columns]), delimiter=",", header=header, comments="")
+        with written(path, "comparison.save_csv"):
+            np.savetxt(path, np.column_stack([t, *columns]), delimiter=",", header=header, comments="")
 
     def save_json(self, path: str | Path) -> None:
         """Write the numbers.
@@ -239,8 +245,14 @@ class Comparison:
         Parameters
         ----------
         path : str or Path
+
+        Raises
+        ------
+        StructureError
+            As `save_csv` does.
         """
-        Path(path).write_text(json.dumps([asdict(s) for s in self.signals], indent=1), encoding="utf-8")
+        with written(path, "comparison.save_json"):
+            Path(path).write_text(json.dumps([asdict(s) for s in self.signals], indent=1), encoding="utf-8")
 
     def __str__(self) -> str:
         heads = ("final", "rigid", "largest", "rigid", "rms diff", *(["known to"] if self.known else []), "Hz")

@@ -219,8 +219,8 @@ def test_the_clock_on_the_wall_has_no_say(name, tmp_path, monkeypatch):
 
 def _saving(name: str, until: float, folder: Path, seconds: float, monkeypatch) -> list[fc.Checkpoint]:
     """What a case saves on its way."""
-    found, save = [], fc.Checkpoint.save
-    monkeypatch.setattr(fc.Checkpoint, "save", lambda self, path: found.append(self) or save(self, path))
+    found, put = [], fc.Checkpoint.put
+    monkeypatch.setattr(fc.Checkpoint, "put", lambda self, path: found.append(self) or put(self, path))
     model, controller, method, inputs = CASES[name]
     how = {"until": until, "method": method, "inputs": inputs, "autosave": fc.Autosave(folder / "autosave", seconds)}
     fc.simulate(model(), controller() if controller else None, **how)
