@@ -9,6 +9,7 @@ import pytest
 
 import flexctrl as fc
 from flexctrl.design import pd as law_of
+from flexctrl.errors import StructureError
 
 
 class Counting:
@@ -31,6 +32,30 @@ def cart() -> fc.Model:
     )
     structure = fc.Structure([mass], [fc.Support(mass.node, "v w")], inputs=inputs, outputs=outputs)
     return fc.assemble(structure, [fc.LargeRotation()])
+
+
+def test_a_file_that_is_gone_or_another_one_is_refused_and_not_touched(tmp_path: Path):
+    """What followed alone was written, without a word."""
+    path, how = tmp_path / "rows.csv", {"method": fc.GeneralizedAlpha(0.01), "every": 0.1}
+    half = fc.simulate(cart(), Counting(), until=0.5, record=fc.CsvStream(path), **how)
+    path.unlink()
+    with pytest.raises(StructureError, match=r"rows.csv is not there, .*behind the \d rows .*; give the file that has"):
+        fc.simulate(cart(), Counting(), until=1.0, start=half.checkpoint, record=fc.CsvStream(path), **how)
+    assert not path.exists()
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(StructureError, match=r"not what the checkpoint goes on from: .*; give the file that has them"):
+        fc.simulate(cart(), Counting(), until=1.0, start=half.checkpoint, record=fc.CsvStream(path), **how)
+    assert path.read_text() == "a,b\n1,2\n"
+
+
+def test_a_run_in_memory_goes_on_in_a_file(tmp_path: Path):
+    joined, whole = tmp_path / "joined.csv", tmp_path / "whole.csv"
+    how = {"method": fc.GeneralizedAlpha(0.01), "every": 0.1}
+    half = fc.simulate(cart(), Counting(), until=0.55, **how)
+    half.save_csv(joined)
+    fc.simulate(cart(), Counting(), until=1.0, start=half.checkpoint, record=fc.CsvStream(joined), **how)
+    fc.simulate(cart(), Counting(), until=1.0, record=fc.CsvStream(whole), **how)
+    assert np.array_equal(*(np.loadtxt(path, delimiter=",", skiprows=1) for path in (joined, whole)))
 
 
 def pd() -> fc.Sampled:

@@ -16,6 +16,8 @@ from flexctrl.structure.freedoms import check_number, check_path, check_seconds
 
 __all__ = ["CsvStream", "InMemory", "Record", "Recorder", "Table", "Unwritten", "writing"]
 
+_BEFORE = "give the file that has them (run.save_csv makes it of rows in memory), or InMemory() for the others"
+
 
 class Unwritten(Exception):
     """What a run records cannot be written, or not be told while it goes on; caused by the error of who was to."""
@@ -99,9 +101,9 @@ class CsvStream:
 
     What is told of errors is told by all rows up to 8 MB of them, and beyond by every second, fourth, … one.
 
-    A file that exists is replaced, unless the run goes on from a checkpoint: then lines follow those that were
-    written until there, and what was written since is dropped. Lines are on the disk when the run ends, however it
-    ends, and whenever it is saved by `Autosave`.
+    A file that exists is replaced, unless the run goes on from a checkpoint: then it has to be there, lines follow
+    those that were written until there, and what was written since is dropped. Lines are on the disk when the run
+    ends, however it ends, and whenever it is saved by `Autosave`.
 
     Parameters
     ----------
@@ -115,7 +117,7 @@ class CsvStream:
     ------
     StructureError
         If ``path`` names no file, its folder is not there, or ``every`` is not positive; by `simulate`, if it cannot
-        be opened. A run that cannot go on writing ends as failed.
+        be opened, or is not what the run goes on from. A run that cannot go on writing ends as failed.
     """
 
     path: str | Path
@@ -129,8 +131,12 @@ class CsvStream:
             check_seconds(self.every, "every", "CsvStream", endless=True)
 
     def start(self, signals: Sequence[str], after: int = 0) -> _Stream:
-        path, header = Path(self.path), ",".join(["t", *signals]) + "\n"
-        going_on = bool(after) and path.exists()
+        path, header, going_on = Path(self.path), ",".join(["t", *signals]) + "\n", bool(after)
+        if going_on and not path.exists():
+            raise StructureError(
+                f"CsvStream: {path} is not there, and the run goes on behind the {after} rows that it has written; "
+                f"{_BEFORE}"
+            )
         try:
             file = path.open("r+" if going_on else "w", encoding="utf-8")
         except OSError as error:
@@ -146,7 +152,7 @@ class CsvStream:
             file.close()
             raise StructureError(
                 f"CsvStream: {path} is not what the checkpoint goes on from: expected {after} rows of "
-                f"{header.strip()}; give that file, or the name of a new one"
+                f"{header.strip()}; {_BEFORE}"
             )
         file.seek(file.tell())
         file.truncate()
