@@ -13,6 +13,9 @@ from flexctrl.kernels.kernel import FLOAT
 
 __all__ = ["CommandError", "blamed", "reals", "state_of"]
 
+_TEXTS = "SU"
+"""Kinds of numpy's types that it would read numbers out of."""
+
 
 class CommandError(ControllerError):
     """A controller says what is no finite number, or raises an exception: that is its cause."""
@@ -55,9 +58,11 @@ def reals(values: Any, what: str) -> np.ndarray:
     Raises
     ------
     CommandError
-        For complex ones.
+        For complex ones, and for a text.
     """
     found = np.asarray(values)
+    if found.dtype.kind in _TEXTS:
+        raise CommandError(f"the controller's {what} is {shortened(values)}, a text; give real numbers")
     if found.dtype.kind == "c":
         raise CommandError(f"the controller's {what} is complex: {shortened(values)}; give real numbers, by numpy.real")
     return np.asarray(found, dtype=float)
@@ -92,6 +97,8 @@ def state_of(controller: Controller, values: Any, what: str, count: int | None =
     if given is None:
         raise _unlike(controller, what, "None", count, " (a missing return?)")
     try:
+        if np.asarray(values).dtype.kind in _TEXTS:
+            raise TypeError("a text")
         found = reals(values, what).ravel()
     except (TypeError, ValueError) as error:
         if isinstance(error, CommandError):

@@ -165,7 +165,8 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     """A run that goes on."""
     if start.passed == UNASKED:
         return _begun(plan, stepper, start.point.state, watch, rows, track)
-    check_same("controller", len(plan.feed.first(start.point.state).x), len(start.point.supply.x))
+    states = len(plan.feed.first(start.point.state).x)
+    check_same("controller, by how many states it has", states, len(start.point.supply.x))
     stepper.recall(start.memory)
     stepper.counts.take(start.counts)
     watch.sides, watch.sizes, watch.span = start.sides.copy(), start.sizes.copy(), start.span

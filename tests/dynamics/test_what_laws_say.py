@@ -21,6 +21,7 @@ ODD = [
     (np.zeros(3), "3 values"),
     (np.zeros(1), "1 values"),
     ("abc", "'abc'"),
+    (["1", "2"], "\\['1', '2'\\]"),
     (np.array([1j, 0.0]), "complex"),
     ([[0.0], [np.inf]], "inf"),
 ]
@@ -90,6 +91,21 @@ def test_linear_models_look_too():
 def test_so_does_a_state_at_the_start(first, said, sample_time):
     with pytest.raises(ControllerError, match=f"controller Forgetful: its initial state is .*{said}"):
         fc.simulate(swing(), Forgetful(sample_time, np.zeros(2), 0.0, first), until=1.0)
+
+
+@pytest.mark.parametrize("sample_time", [0.0, 0.1])
+@pytest.mark.parametrize("said", ["1", b"1", ["1"], np.array("1")], ids=repr)
+def test_a_text_is_no_command_though_a_number_can_be_read_out_of_it(said, sample_time):
+    law = Forgetful(sample_time, np.zeros(2))
+    law.command = lambda t, x, y: said
+    with pytest.raises(ControllerError, match=r"the controller's command is .*1.*, a text; give real numbers"):
+        fc.simulate(swing(), law, until=1.0)
+
+
+def test_a_checkpoint_of_a_law_with_another_number_of_states_tells_that_these_are_meant():
+    half = fc.simulate(swing(), Forgetful(0.1, np.zeros(2)), until=0.5).checkpoint
+    with pytest.raises(StructureError, match=r"another controller, by how many states it has \(2 there, 1 here\)"):
+        fc.simulate(swing(), Forgetful(0.1, np.zeros(1), first=[0.0]), until=1.0, start=half)
 
 
 @pytest.mark.parametrize("shape", [(2,), (2, 1), (1, 2)])
