@@ -9,14 +9,14 @@ from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 
-from flexctrl.errors import ControllerError, did_you_mean
+from flexctrl.errors import ControllerError, did_you_mean, shortened
 from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import listed
 
 __all__ = ["Controller", "IOSystemController", "LinearController", "as_controller"]
 
 
-_PARTS = ("inputs", "outputs", "sample_time", "initial", "command", "rate", "update")
+_VALUES, _METHODS = ("inputs", "outputs", "sample_time"), ("initial", "command", "rate", "update")
 
 
 @runtime_checkable
@@ -347,14 +347,30 @@ def _check_sample_time(candidate: Any) -> None:
         )
 
 
+def _check_names(candidate: Any) -> None:
+    for what in ("inputs", "outputs"):
+        given = getattr(candidate, what, ())
+        if isinstance(given, str) or not isinstance(given, Collection):
+            raise ControllerError(
+                f"controller {type(candidate).__name__}: {what} = {shortened(given)}; expected a tuple of names, as "
+                f"({given if isinstance(given, str) else 'angle'!r},)"
+            )
+
+
+def _callable(candidate: Any, name: str) -> bool:
+    return callable(getattr(candidate, name, None))
+
+
 def _from_object(candidate: Any) -> Controller:
     if isinstance(candidate, type):
         name = candidate.__name__
         raise ControllerError(f"{name} is a class, no controller; make one, as {name}(…), and give that")
     _check_sample_time(candidate)
-    if all(hasattr(candidate, name) for name in _PARTS):  # what isinstance asks, ten times quicker
+    _check_names(candidate)
+    told = [*(n for n in _VALUES if hasattr(candidate, n)), *(n for n in _METHODS if _callable(candidate, n))]
+    if len(told) == len(_VALUES) + len(_METHODS):  # what isinstance asks, ten times quicker
         return cast(Controller, candidate)
-    missing = [m for m in ("inputs", "outputs", "initial", "command") if not hasattr(candidate, m)]
+    missing = [name for name in ("inputs", "outputs", "initial", "command") if name not in told]
     if missing and hasattr(candidate, "build"):
         raise ControllerError(f"a {type(candidate).__name__} is no controller yet; give the scene's law, scene.law")
     if missing:
@@ -364,7 +380,7 @@ def _from_object(candidate: Any) -> Controller:
         )
     sample_time = float(getattr(candidate, "sample_time", 0.0))
     needed = "update" if sample_time else "rate"
-    if not hasattr(candidate, needed) and np.size(candidate.initial()):
+    if needed not in told and np.size(candidate.initial()):
         kind = f"sampled ({sample_time} s)" if sample_time else "continuous (no sample_time)"
         raise ControllerError(
             f"controller {type(candidate).__name__} is {kind} and has states: it needs {needed}(t, x, y)"

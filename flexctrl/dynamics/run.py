@@ -331,12 +331,12 @@ class Run:
         state = replace(state, freedoms=self.final.freedoms)
         return Moment(state.t, state, dict(zip((*self.outputs, *self.inputs), values, strict=True)))
 
-    def plot(self, signals: tuple[str, ...] | None = None) -> Figure:
+    def plot(self, signals: str | tuple[str, ...] | None = None) -> Figure:
         """Draw curves over time, one axes a signal.
 
         Parameters
         ----------
-        signals : tuple of str, optional
+        signals : str or tuple of str, optional
             Default: all outputs.
 
         Returns

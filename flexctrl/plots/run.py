@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from flexctrl.dynamics.run import Run
 from flexctrl.linear.matfile import SI, Units
 from flexctrl.plots.style import FLEXIBLE, INK, RIGID, new_figure, tidy
+from flexctrl.structure.freedoms import listed
 from flexctrl.structure.inputs import FollowerForce, FollowerTorque, Force, Input, MotorTorque, Torque, WindSpeed
 from flexctrl.structure.outputs import (
     AngularVelocity,
@@ -67,31 +68,31 @@ def _unit(signal: Input | Output) -> str:
     return next(unit for kind, unit in _UNITS.items() if isinstance(signal, kind))
 
 
-def run_figure(run: Run, signals: Sequence[str] | None = None) -> Figure:
+def run_figure(run: Run, signals: str | Sequence[str] | None = None) -> Figure:
     """Draw a run in a new figure, one axes a signal.
 
     Parameters
     ----------
     run : Run
-    signals : sequence of str, optional
+    signals : str or sequence of str, optional
         Default: all outputs.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    figure, names = new_figure(8.0, 4.0), tuple(signals or run.outputs)
+    figure, names = new_figure(8.0, 4.0), _asked(signals, run.outputs)
     run_curves(panels(figure, len(names)), run, names)
     return figure
 
 
-def comparison_figure(comparison: Comparison, signals: Sequence[str] | None = None) -> Figure:
+def comparison_figure(comparison: Comparison, signals: str | Sequence[str] | None = None) -> Figure:
     """Draw a comparison in a new figure.
 
     Parameters
     ----------
     comparison : Comparison
-    signals : sequence of str, optional
+    signals : str or sequence of str, optional
         Default: all outputs.
 
     Returns
@@ -99,9 +100,15 @@ def comparison_figure(comparison: Comparison, signals: Sequence[str] | None = No
     matplotlib.figure.Figure
     """
     figure = new_figure(8.0, 4.0)
-    names = tuple(signals or comparison.flexible.outputs)
+    names = _asked(signals, comparison.flexible.outputs)
     comparison_curves(panels(figure, len(names)), comparison, names)
     return figure
+
+
+def _asked(signals: str | Sequence[str] | None, outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """The signals to be drawn, one of them by its name alone; all outputs where none is asked for."""
+    asked = [signals] if isinstance(signals, str) else listed(() if signals is None else signals, "plot: signals")
+    return tuple(asked) or outputs
 
 
 def panels(figure: Figure, count: int) -> np.ndarray:

@@ -204,12 +204,12 @@ class Comparison:
         """Whether both runs went to their end."""
         return self.flexible.status is Status.FINISHED and self.rigid.status is Status.FINISHED
 
-    def plot(self, signals: tuple[str, ...] | None = None) -> Figure:
+    def plot(self, signals: str | tuple[str, ...] | None = None) -> Figure:
         """Draw both runs over time: flexible as lines, rigid dashed.
 
         Parameters
         ----------
-        signals : tuple of str, optional
+        signals : str or tuple of str, optional
             Default: all outputs.
 
         Returns

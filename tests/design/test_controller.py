@@ -98,6 +98,23 @@ def test_a_class_is_told_to_be_made_first():
         as_controller(Integrating)
 
 
+@pytest.mark.parametrize("what", ["inputs", "outputs"])
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("torque", r"'torque'; expected a tuple of names, as \('torque',\)"),
+        (3, r"3; expected a tuple of names, as \('angle',\)"),
+        (None, "None; expected a tuple"),
+    ],
+)
+def test_a_name_alone_is_no_tuple_of_names(what, given, message):
+    """Its letters were looked for."""
+    law = Integrating()
+    setattr(law, what, given)
+    with pytest.raises(ControllerError, match=f"controller Integrating: {what} = {message}"):
+        as_controller(law, ["torque"], ["angle"])
+
+
 def test_unknown_names_are_answered_with_the_nearest():
     with pytest.raises(ControllerError, match=r"reads 'angle'.*did you mean 'angles'.*Commanded"):
         as_controller(system(), ["torque"], ["angles", "rate"])
@@ -140,6 +157,19 @@ def test_own_controller_lacking_the_method_its_time_base_needs():
 
     with pytest.raises(ControllerError, match=r"sampled \(0.1 s\) and has states: it needs update"):
         as_controller(Clocked())
+
+    class Unset(Clocked):
+        update = None
+
+    with pytest.raises(ControllerError, match=r"controller Unset is sampled .* it needs update"):
+        as_controller(Unset())
+
+
+def test_a_method_that_is_not_needed_may_be_none():
+    class Unset(Integrating):
+        sample_time, update = 0.0, None
+
+    assert as_controller(Unset()).rate(0.0, np.zeros(1), np.ones(1)) == 1.0
 
 
 @pytest.mark.parametrize("h", [1e-3, 0.1, 2.0])

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 import flexctrl as fc
 from flexctrl.cranes import bridge_crane, ceiling_crane, flexible_arm
+from flexctrl.errors import StructureError
 from flexctrl.plots.machine import add_machine_axes, best_plane, draw_deformed, draw_machine
 from flexctrl.plots.modes import mode_label, mode_pose, modes_figure
 from flexctrl.plots.pose import pose_of
@@ -209,6 +210,16 @@ def test_a_run_draws_itself(runs):
     run_curves(axes[:1], runs[0], ("load_z",))
     figure = Comparison.between(*runs).plot(("load_z",))
     assert len(figure.axes) == 1
+
+
+def test_one_signal_is_drawn_by_its_name_alone(runs):
+    """Its letters were looked for."""
+    assert len(Comparison.between(*runs).plot("load_z").axes) == 1
+    assert len(runs[0].plot("load_z").axes) == len(runs[0].plot(("load_z",)).axes) == 1
+    with pytest.raises(StructureError, match="no signal 'load_y'; did you mean 'load_z'"):
+        runs[0].plot("load_y")
+    with pytest.raises(StructureError, match="plot: signals = 3; expected a list"):
+        runs[0].plot(3)
 
 
 def test_how_far_a_trolley_has_travelled_is_drawn_nowhere():
