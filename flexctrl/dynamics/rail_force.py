@@ -13,6 +13,8 @@ from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.model.consistent import admitted
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
+from flexctrl.structure.elements import Part
+from flexctrl.structure.references import name_of
 from flexctrl.structure.trolleys import Trolley
 
 __all__ = ["rail_force"]
@@ -50,9 +52,12 @@ def rail_force(
         motion.
     """
     trolleys = {p.name: p for p in model.structure.elements if isinstance(p, Trolley)}
-    name = trolley.name if isinstance(trolley, Trolley) else trolley
+    if isinstance(trolley, Part) and not isinstance(trolley, Trolley):
+        raise StructureError(f"rail_force: {trolley.name!r} is a {type(trolley).__name__}; expected a Trolley")
+    name = name_of(trolley, (Trolley,), "rail_force: trolley")
     if name not in trolleys:
-        raise StructureError(f"rail_force: there is no trolley {name!r}{did_you_mean(str(name), trolleys)}")
+        hint = did_you_mean(name, trolleys) or ": the structure has none"
+        raise StructureError(f"rail_force: there is no trolley {name!r}{hint}")
     if not model.large:
         raise StructureError("rail_force: the model is one of small motion; give it LargeRotation()")
     state = admitted(model, state, "rail_force: state")

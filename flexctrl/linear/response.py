@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import control
     from matplotlib.figure import Figure
 
-__all__ = ["FrequencyResponse", "frequency_response", "response_span"]
+__all__ = ["FrequencyResponse", "frequencies_of", "frequency_response", "response_span"]
 
 MOST_POINTS = 20_000
 MOST_SOLVES = 3_000
@@ -126,10 +126,10 @@ def frequency_response(
     LinearizationError
         If a frequency hits an undamped pole (an integrator at 0): the response is infinite there.
     StructureError
-        For frequencies that are negative or not finite, or a span that is empty or starts at 0.
+        For frequencies that are negative or not finite, none at all, or a span that is empty or starts at 0.
     """
     if omega is not None:
-        points = _checked(np.atleast_1d(np.asarray(omega)))
+        points = frequencies_of(omega)
         top = float(points.max(initial=0.0)) or 1.0
         values = transfer(linear, top)(1j * points)
     else:
@@ -177,12 +177,29 @@ def _is_complete(linear: LinearModel) -> bool:
     return len(linear.coordinates) <= COMPLETE
 
 
-def _checked(omega: np.ndarray) -> np.ndarray:
-    real = omega.dtype.kind in "iuf" or not omega.size
-    if not real or omega.ndim != 1 or not np.isfinite(omega).all() or (omega < 0).any():
+def frequencies_of(given: np.ndarray | Sequence[float]) -> np.ndarray:
+    """Return the frequencies that a response is asked for at, in ascending order.
+
+    Parameters
+    ----------
+    given : array_like
+        rad/s.
+
+    Returns
+    -------
+    numpy.ndarray, shape (N,)
+
+    Raises
+    ------
+    StructureError
+        For frequencies that are negative or not finite, or none at all.
+    """
+    omega = np.atleast_1d(np.asarray(given))
+    several = omega.ndim == 1 and omega.size and omega.dtype.kind in "iuf"
+    if not several or not np.isfinite(omega).all() or (omega < 0).any():
         raise StructureError(
             f"frequency_response: omega = {np.array2string(omega, threshold=8)}; expected a list of finite real "
-            "angular frequencies in rad/s, none negative (the response is at s = iω)"
+            "angular frequencies in rad/s, one at least and none negative (the response is at s = iω)"
         )
     return np.sort(omega.astype(float))
 

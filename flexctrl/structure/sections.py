@@ -38,8 +38,9 @@ class Material:
     def __post_init__(self) -> None:
         object.__setattr__(self, "E", check_finite(self.E, "E", "Material", above=0.0))
         object.__setattr__(self, "rho", check_finite(self.rho, "rho", "Material", least=0.0))
-        object.__setattr__(self, "nu", check_finite(self.nu, "nu", "Material", above=-1.0))
-        check_finite(0.5 - self.nu, "0.5 - nu", "Material", least=0.0)
+        if not -1.0 < check_finite(self.nu, "nu", "Material") <= 0.5:
+            raise StructureError(f"Material: nu = {self.nu!r}; expected -1 < nu ≤ 0.5")
+        object.__setattr__(self, "nu", float(self.nu))
 
     @property
     def G(self) -> float:

@@ -97,14 +97,15 @@ def _signal_nodes(signal: Input | Output) -> tuple[Node | None, ...]:
 
 def _check_part(s: Structure, signal: Input | Output, who: str) -> None:
     if isinstance(signal, MotorTorque | DriveAngle | DriveSpeed):
-        known, wanted = tuple(d.name for d in s.drives), signal.drive
+        known, wanted, kinds = tuple(d.name for d in s.drives), signal.drive, "drive"
     elif isinstance(signal, Tension):
         lines = (p for p in (*s.elements, *s.drives) if isinstance(p, Rope | Spring | Winch))
-        known, wanted = tuple(p.name for p in lines), signal.line
+        known, wanted, kinds = tuple(p.name for p in lines), signal.line, "rope, spring or winch"
     else:
         return
     if wanted not in known:
-        raise StructureError(f"{who}: there is no {wanted!r}{did_you_mean(wanted, known)}")
+        hint = did_you_mean(wanted, known) or f": the structure has no {kinds}"
+        raise StructureError(f"{who}: there is no {kinds} {wanted!r}{hint}")
 
 
 def _check_table(s: Structure) -> None:

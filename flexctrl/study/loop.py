@@ -227,9 +227,10 @@ def open_loop(
     StructureError
         For a signal that does not exist or is not given, or a controller more improper than a derivative.
     """
-    side = _Path.of_controller(controller)
     if isinstance(plant, ReducedModel):
         plant = plant.linear
+    _check_names(plant, input, output)
+    side = _Path.of_controller(controller)
     dt = side.dt
     if isinstance(plant, LinearModel) and not dt:
         chosen = plant.select([_only(input, plant.inputs, "input")], [_only(output, plant.outputs, "output")])
@@ -284,7 +285,11 @@ class _Path:
             return cls.of_states(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), gain, 0.0)
         _refuse_unspecified(controller, "controller")
         if controller.ninputs != 1 or controller.noutputs != 1:
-            raise StructureError("a loop is closed with one signal: give a controller with one input and one output")
+            raise StructureError(
+                f"open_loop: the controller has inputs {', '.join(controller.input_labels) or 'none'} and outputs "
+                f"{', '.join(controller.output_labels) or 'none'}; a loop is closed with one signal: give a controller "
+                "with one input and one output"
+            )
         if isinstance(controller, control.TransferFunction):
             return cls._of_polynomials(controller)
         return cls.of_lti(control.ss(controller), "", "")
@@ -373,6 +378,16 @@ def _as_lti(plant: Any, dt: float) -> Any:
     if dt and not system.dt:
         system = control.sample_system(system, dt)
     return system
+
+
+def _check_names(plant: Any, input: str, output: str) -> None:
+    """Whether the signals that are given are there, before anything is looked at that hangs on more."""
+    if isinstance(plant, ReducedStates):
+        plant = plant.full
+    for kind, name in (("input", input), ("output", output)):
+        known = getattr(plant, f"{kind}s" if isinstance(plant, LinearModel) else f"{kind}_labels", ())
+        if name and known:
+            _only(name, tuple(known), kind)
 
 
 def _only(name: str, known: tuple[str, ...], kind: str) -> str:

@@ -237,6 +237,11 @@ def test_wheels_share_what_a_body_weighs_and_its_moment():
     assert loads["front"][0] + loads["back"][0] == pytest.approx(-12.0)
     with pytest.raises(fc.errors.StructureError, match=r"no trolley 'fornt'.*front"):
         fc.rail_force(model, model.rest, "fornt")
+    beam = next(p for p in model.structure.elements if isinstance(p, fc.Beam))
+    with pytest.raises(fc.errors.StructureError, match=rf"^rail_force: '{beam.name}' is a Beam; expected a Trolley$"):
+        fc.rail_force(model, model.rest, beam)
+    with pytest.raises(fc.errors.StructureError, match=r"rail_force: trolley = 3; expected a Trolley"):
+        fc.rail_force(model, model.rest, 3)
 
 
 def test_wheel_load_of_a_swinging_load():

@@ -186,6 +186,12 @@ def test_an_error_can_be_asked_for_and_a_smaller_model_misses_it(held):
     assert corrected.order <= reduced.order
 
 
+def test_an_order_above_the_models_own_is_the_model():
+    """A search by error doubles the order past the number of freedoms."""
+    full = s.cantilever(6, beta=1e-3)
+    assert full.reduce(ModalTruncation(999)).order == len(full.coordinates) == 12
+
+
 def test_an_error_that_cannot_be_met_is_refused():
     with pytest.raises(ReductionError, match="no order up to"):
         s.cantilever(3, beta=1e-4).reduce(RelativeError(1e-3, up_to_hz=1e3), using=lambda k: ModalTruncation(min(k, 1)))

@@ -14,6 +14,7 @@ from fixtures.random_models import dense_response
 
 from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.linear.condense import scaled
+from flexctrl.linear.reduction import BalancedTruncation, ModalTruncation
 from flexctrl.linear.reduction.states import states_transfer
 from flexctrl.linear.transfer import direct_transfer, transfer
 
@@ -231,6 +232,9 @@ def test_bad_requests_are_refused():
     linear = s.six_mass_chain()
     with pytest.raises(StructureError, match="rad/s"):
         linear.frequency_response([-1.0])
+    for model in (linear, linear.reduce(BalancedTruncation(4)), linear.reduce(ModalTruncation(2))):
+        with pytest.raises(StructureError, match=r"omega = \[\]; expected .*, one at least"):
+            model.frequency_response([])
     with pytest.raises(StructureError, match="span"):
         linear.frequency_response(span=(0.0, 1.0))
     with pytest.raises(StructureError, match="did you mean 'force1'"):

@@ -42,7 +42,7 @@ BAD = [
     ('direction = "x"\nradius', 'direction = "up"\nradius', "no direction 'up'"),
     ('kind = "linear"', 'kind = "line"', "[drives.travel_drive] kind: there is no 'line'; did you mean 'linear'?"),
     ("torque = { kind", "tor-que = { kind", "[inputs] tor-que: MotorTorque: name = 'tor-que'; expected ASCII letters"),
-    ('drive = "travel_drive" }\nspeed', 'drive = "drive" }\nspeed', "DriveAngle 'angle': there is no 'drive'"),
+    ('drive = "travel_drive" }\nspeed', 'drive = "drive" }\nspeed', "DriveAngle 'angle': there is no drive 'drive'"),
     ('top = "trolley", ', "", "[outputs] sway: the key 'top' is missing"),
     ("gravity = true", "gravty = true", "there is no effect 'gravty'; did you mean 'gravity'?"),
     ("gravity = true", "gravity = 9.81", "[effects] gravity = 9.81; expected true, false or a table"),

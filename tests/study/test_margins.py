@@ -196,8 +196,19 @@ def test_what_cannot_be_a_loop_is_refused():
         open_loop(linear, 1.0, output="x9")
     with pytest.raises(StructureError, match="2 degrees above"):
         open_loop(linear, ct.tf([1, 0, 0], [1]), output="x1")
-    with pytest.raises(StructureError, match="one input and one output"):
-        open_loop(linear, ct.ss([], [], [], np.eye(2)), output="x1")
+    two = ct.ss([], [], [], [[1.0, 1.0]], inputs=["x", "v"], outputs=["f"])
+    with pytest.raises(StructureError, match=r"has inputs x, v and outputs f; .* one input and one output"):
+        open_loop(linear, two, output="x1")
+
+
+@pytest.mark.parametrize("of", [lambda m: m, lambda m: m.reduce(BalancedTruncation(6)), lambda m: m.to_ss()])
+def test_a_name_that_is_none_is_told_before_what_is_wrong_with_the_controller(of):
+    wide = ct.ss([], [], [], [[1.0, 1.0]])
+    model = of(chain(3))
+    with pytest.raises(StructureError, match="'x9' is not a signal of the plant"):
+        open_loop(model, wide, output="x9")
+    with pytest.raises(StructureError, match="input 'force9' is not a signal of the plant"):
+        open_loop(model, wide, "force9", "x1")
 
 
 def test_a_loop_through_which_nothing_comes_back_has_no_crossing():

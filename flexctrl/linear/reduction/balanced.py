@@ -44,7 +44,7 @@ class BalancedTruncation:
     Parameters
     ----------
     order : int
-        Number of states, the exactly kept ones included.
+        Number of states, the exactly kept ones included; more than there are to keep are not taken.
     match_dc : bool
         Let the states left out follow statically instead of dropping them (singular perturbation
         approximation): the DC gain of the stable part is exact and the bound stays the same.

@@ -37,8 +37,8 @@ class ModalTruncation:
     Parameters
     ----------
     keep : int or Selection
-        Number of modes, rigid-body modes included, lowest first; or ``Lowest``, ``BelowFrequency``,
-        ``Participation``, ``DCGain``.
+        Number of modes, rigid-body modes included, lowest first; more than the model has are not taken. Or ``Lowest``,
+        ``BelowFrequency``, ``Participation``, ``DCGain``.
     static_correction : bool
         Add the static response of the modes left out.
     """

@@ -11,7 +11,7 @@ from scipy.linalg import eigvals, schur, solve_triangular
 from flexctrl.frozen import frozen
 from flexctrl.linear.grid import peak_grid, refined
 from flexctrl.linear.reduction.result import Reduced
-from flexctrl.linear.response import MOST_POINTS, FrequencyResponse, response_span
+from flexctrl.linear.response import MOST_POINTS, FrequencyResponse, frequencies_of, response_span
 from flexctrl.linear.transfer import Transfer
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class ReducedStates(Reduced):
         if omega is None:
             points, values = refined(evaluate, peak_grid(poles, span or response_span(poles)), MOST_POINTS)
         else:
-            points = np.asarray(omega, float)
+            points = frequencies_of(omega)
             values = evaluate(1j * points)
         return FrequencyResponse(points, values, self.full.inputs, self.full.outputs, self.full.name)
 
