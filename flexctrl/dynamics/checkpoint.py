@@ -138,7 +138,12 @@ class Checkpoint:
             self.put(path)
 
     def put(self, path: str | Path) -> None:
-        """Write to a file as `save` does, with the system's own word where that cannot be."""
+        """Write to a file as `save` does, with the system's own word where that cannot be.
+
+        Parameters
+        ----------
+        path : str or Path
+        """
         arrays: dict[str, np.ndarray] = {}
         tree = _packed(self, arrays)
         text = json.dumps({"format": _FORMAT, "checkpoint": tree})
