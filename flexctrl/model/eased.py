@@ -171,10 +171,16 @@ def _borne(balance: Balance, state: State, motors: np.ndarray) -> np.ndarray:
     K = balance.slope(state)
     own = K.diagonal()
     stiff = np.where(own[motors] > 0.0, own[motors], np.inf)
-    borne = K[motors].toarray() ** 2 / stiff[:, None]
+    borne = _beyond_dust(K[motors].toarray() ** 2 / stiff[:, None], balance.unit)
     drowned = own - borne.sum(axis=0) < _DROWNED * own
     drowned[motors] = False
     return np.asarray(np.where(drowned, borne, 0.0)[:, balance.free])
+
+
+def _beyond_dust(borne: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """The same without what shafts add by levers of last digits: what a leg spins by about itself, none turns."""
+    felt = borne * unit**2
+    return np.where(felt > _DUST * felt.max(axis=1, keepdims=True), borne, 0.0)
 
 
 def _own(bare: Balance, state: State, borne: np.ndarray) -> np.ndarray:
