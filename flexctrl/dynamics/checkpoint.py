@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
-import math
 import os
 import zlib
 from collections.abc import Mapping
@@ -17,16 +16,16 @@ from zipfile import BadZipFile, is_zipfile
 
 import numpy as np
 
+from flexctrl.dynamics.origin import Origin
 from flexctrl.dynamics.records.books import Sums
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Mark, Pace, Point
 from flexctrl.errors import StructureError
 from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
-from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_path, check_seconds, written
 
-__all__ = ["Autosave", "Checkpoint", "Origin", "check_same", "load_checkpoint", "machine_of"]
+__all__ = ["Autosave", "Checkpoint", "check_same", "load_checkpoint", "machine_of"]
 
 _FORMAT = 17
 _HOUSE = "flexctrl."
@@ -155,30 +154,6 @@ class Checkpoint:
         finally:
             with suppress(OSError):
                 beside.unlink(missing_ok=True)
-
-
-@frozen(eq=False)
-class Origin:
-    """Where a run began, and where those stand that were laid beside it: what these tell goes on with it.
-
-    Attributes
-    ----------
-    state : State
-    u : numpy.ndarray, shape (inputs,)
-        Inputs as they were told first; empty if nobody was asked.
-    others : tuple of Checkpoint
-        Of each run beside, where it stood last.
-    error : float
-        How far the run has been off by these, as `Report` has it; 0 if there are none.
-    right : float
-        Until when it has been right by these [s].
-    """
-
-    state: State
-    u: np.ndarray
-    others: tuple[Checkpoint, ...] = ()
-    error: float = 0.0
-    right: float = math.inf
 
 
 def load_checkpoint(path: str | Path) -> Checkpoint:

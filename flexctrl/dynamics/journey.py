@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, Origin, machine_of
+from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.events.event import EventError, Occurrence
 from flexctrl.dynamics.events.switching import beyond
 from flexctrl.dynamics.events.watch import Crossing, Watch
@@ -26,6 +26,7 @@ from flexctrl.dynamics.march.stepper import plain_of
 from flexctrl.dynamics.notes.adding import Drift
 from flexctrl.dynamics.notes.growing import growth
 from flexctrl.dynamics.notes.outputs import OutputErrors
+from flexctrl.dynamics.origin import Origin
 from flexctrl.dynamics.pacing import controlled, fixed
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track
@@ -111,6 +112,8 @@ class Journey:
         Where the whole run began.
     bent : str
         What is to be said of elements that are bent far at either end.
+    begin : float
+        When this part of the run began [s].
     told : float
         Events up to this time have been told by the run that this one goes on from [s].
     balked : bool
@@ -145,6 +148,7 @@ class Journey:
     drift: Drift = _NONE
     outputs: OutputErrors = _NOTHING
     bent: str = ""
+    begin: float = 0.0
     told: float = -math.inf
     balked: bool = False
     crumbled: int = 0

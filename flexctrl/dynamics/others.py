@@ -15,14 +15,14 @@ from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.gap import Gap, between
 from flexctrl.dynamics.records.digest import Digest
-from flexctrl.dynamics.run import Run, Tolerance
+from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.setting_out import travelled
 from flexctrl.errors import FlexctrlError
 from flexctrl.frozen import frozen
 from flexctrl.model.equilibrium import Rest
 from flexctrl.model.state import State
 
-__all__ = ["UNCHECKED", "Beginning", "Other", "made", "noted", "standing"]
+__all__ = ["UNCHECKED", "Beginning", "Other", "made", "noted", "seen_until", "standing"]
 
 _LONGER, _SECONDS, _ALIKE = 2.0, 2.0, 0.01
 UNCHECKED = "how far small differences have grown is not told by another run"
@@ -173,7 +173,8 @@ def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tu
         return noted(run, f"{UNCHECKED}, which ends where it begins ({fault or 'interrupted'})"), None
     if not _begins_alike(run, other, journey):
         return noted(run, f"{UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
-    told = standing(run, other.checkpoint)
+    reached = end if other.status is Status.STOPPED else min(other.final.t, end)
+    told = seen_until(standing(run, other.checkpoint), reached)
     if other.final.t <= beginning.t:
         return told, Other(other, Gap.unseen(run), beside)
     try:
@@ -211,16 +212,32 @@ def standing(run: Run, other: Checkpoint) -> Run:
     return replace(run, checkpoint=replace(run.checkpoint, origin=replace(origin, others=others)))
 
 
-def noted(run: Run, note: str) -> Run:
-    """Return a run with one more note.
+def seen_until(run: Run, t: float) -> Run:
+    """Return a run with until when others have been laid beside it for what goes on from there.
 
     Parameters
     ----------
     run : Run
-    note : str
+    t : float
+        [s]
 
     Returns
     -------
     Run
     """
-    return replace(run, report=replace(run.report, notes=(*run.report.notes, note)))
+    return replace(run, checkpoint=replace(run.checkpoint, origin=run.checkpoint.origin.seen_until(t)))
+
+
+def noted(run: Run, *notes: str) -> Run:
+    """Return a run with more notes.
+
+    Parameters
+    ----------
+    run : Run
+    *notes : str
+
+    Returns
+    -------
+    Run
+    """
+    return replace(run, report=replace(run.report, notes=(*run.report.notes, *notes)))

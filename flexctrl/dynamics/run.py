@@ -146,7 +146,8 @@ class Report:
     error : float
         By how much places and angles of the run are off, over the largest motion, growth of small differences
         included: by another run laid beside it (`Checked`), which sees what errors of steps add up to, so that it may
-        be less than ``drift``; ``drift`` where there is none.
+        be less than ``drift``; ``drift`` where there is none. Of a run that goes on from a part that was cut off: of
+        what came after.
     output_errors : mapping of str to float
         By how much outputs may be off at an instant, each over the range of its own values (1: all of it): a
         deflection of millimetres beside a travel of metres. Forces and rates by other runs laid beside, by how they

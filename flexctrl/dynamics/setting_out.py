@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from flexctrl.dynamics.alpha.first_step import first_step
-from flexctrl.dynamics.checkpoint import Checkpoint, Origin, check_same, machine_of
+from flexctrl.dynamics.checkpoint import Checkpoint, check_same, machine_of
 from flexctrl.dynamics.events.event import Event
 from flexctrl.dynamics.events.nearing import SMALLEST
 from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.interrupt import heed
 from flexctrl.dynamics.journey import Journey, Plan
+from flexctrl.dynamics.origin import Origin
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track, curves_of
 from flexctrl.dynamics.records.digest import watched
@@ -174,7 +175,8 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
     books.sums, books.first = replace(start.sums), start.first
     rows.count = start.rows
     stops, mark = _stops(plan, start), replace(start.mark)
-    journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, mark, start.origin)
+    origin = start.origin.gone_on(start.t)
+    journey = Journey(plan, stepper, start.point, stops, books, watch, rows, track, mark, origin, begin=start.t)
     journey.told, journey.balked = start.told, start.balked
     journey.read = start.point, start.read
     return journey

@@ -23,13 +23,14 @@ from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.misreading import misread
 from flexctrl.dynamics.notes.answers import Manner, answers
-from flexctrl.dynamics.notes.beside import can_be_told, may_grow, shorter
+from flexctrl.dynamics.notes.beside import can_be_told, is_cut, may_grow, shorter
 from flexctrl.dynamics.notes.heeded import heeded
 from flexctrl.dynamics.notes.leaving import leaves
 from flexctrl.dynamics.notes.rates import are_asked, said_of_rates
+from flexctrl.dynamics.notes.right import unseen
 from flexctrl.dynamics.notes.ringing import ringing
 from flexctrl.dynamics.notes.turned_over import turned_over
-from flexctrl.dynamics.others import Beginning
+from flexctrl.dynamics.others import UNCHECKED, Beginning, noted, seen_until
 from flexctrl.dynamics.records.digest import Watched
 from flexctrl.dynamics.records.record import InMemory, Record, Recorder
 from flexctrl.dynamics.run import Run, Status, Tolerance
@@ -199,7 +200,11 @@ def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning |
         if asked or leaves(run, journey, beginning.again):
             told = laid_beside(run, journey, check, beginning, shorter(run, journey, law))
             told = loosened(misread(told, run, journey, beginning, law), run, journey, beginning)
-            run = bounced(told, run, journey, beginning)
+            run = noted(bounced(told, run, journey, beginning), *unseen(journey))
+        else:
+            run = seen_until(run, run.final.t)
+    elif beginning and is_cut(journey):
+        run = noted(run, f"{UNCHECKED} (interrupted)")
     told = turned_over(said_of_rates(ringing(run, journey), journey), journey)
     return heeded(told, journey, beginning.again) if beginning else told
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from flexctrl.dynamics.checkpoint import Checkpoint, Origin
+from flexctrl.dynamics.checkpoint import Checkpoint
 from flexctrl.dynamics.events.watch import Watch
 from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.journey import Journey, Plan
+from flexctrl.dynamics.origin import Origin
 from flexctrl.dynamics.records.books import Books
 from flexctrl.dynamics.records.dense import Track
 from flexctrl.dynamics.records.rows import Rows

@@ -15,6 +15,7 @@ from flexctrl.dynamics.notes.lengths import as_many, usual
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.notes.peaks import unresolved
 from flexctrl.dynamics.notes.percent import percent
+from flexctrl.dynamics.notes.right import right_until, said_until
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.scales import turning, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
@@ -30,6 +31,7 @@ __all__ = [
     "agreeing",
     "can_be_told",
     "elsewhere",
+    "is_cut",
     "kept_short",
     "may_grow",
     "rattles",
@@ -76,8 +78,25 @@ def can_be_told(journey: Journey) -> bool:
     bool
         False for linear models, what is integrated exactly, and where the run ended early.
     """
-    model, ended = journey.plan.model, journey.status in (Status.FINISHED, Status.STOPPED)
-    return ended and isinstance(model, Model) and journey.judging is not None and journey.mark.steps > 0
+    return journey.status in (Status.FINISHED, Status.STOPPED) and _has_steps_to_judge(journey)
+
+
+def is_cut(journey: Journey) -> bool:
+    """Tell whether a coarser run would say something of one that is interrupted.
+
+    Parameters
+    ----------
+    journey : Journey
+
+    Returns
+    -------
+    bool
+    """
+    return journey.status is Status.INTERRUPTED and _has_steps_to_judge(journey)
+
+
+def _has_steps_to_judge(journey: Journey) -> bool:
+    return isinstance(journey.plan.model, Model) and journey.judging is not None and journey.mark.steps > 0
 
 
 def kept_short(journey: Journey) -> bool:
@@ -242,7 +261,7 @@ def told_beside(
         notes = tuple(note for note in report.notes if note not in journey.outputs.notes) + outputs.notes + ended
         return replace(run, report=replace(report, output_errors=outputs.shares, notes=notes))
     outputs = by_rows(journey, run.y, gap.outputs / left, error, kind)
-    right = min(origin.right, _right(run, gap, left))
+    right = right_until(run, coarse, journey, gap, TOLD * left)
     said = (journey.drift.note, journey.bent, *journey.outputs.notes)
     notes = tuple(note for note in report.notes if note not in said)
     notes += tuple({gap.bent or journey.bent} - {""})
@@ -296,13 +315,6 @@ def agreeing(journey: Journey) -> str:
     return f"a step of {0.25 * usual(journey):.1g} s"
 
 
-def _right(run: Run, gap: Gap, left: float) -> float:
-    """Until when two runs have told that all is well; infinity if they do at the end."""
-    wrong = gap.size > TOLD * left
-    begin = run.track.starts[:1] or run.t[:1].tolist() or [0.0]
-    return float([*begin, *gap.t.tolist()][int(np.argmax(wrong))]) if wrong.any() else math.inf
-
-
 def _note(journey: Journey, gap: Gap, error: float, right: float, kind: str) -> str:
     """What is to be said: how far off, until when all is well, and what would leave little."""
     plan, pace = journey.plan, journey.plan.method.pace
@@ -316,4 +328,4 @@ def _note(journey: Journey, gap: Gap, error: float, right: float, kind: str) -> 
         remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
         remedy = f"take steps of {finer * usual(journey):.1g} s"
-    return f"{said}; places are right to {TOLD:.0%} until t = {right:.3g} s: {remedy}"
+    return f"{said}; {said_until(journey.origin, right, f'{TOLD:.0%}')}: {remedy}"

@@ -17,7 +17,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Gap", "between", "interpolated"]
+__all__ = ["Gap", "between", "gap_at", "interpolated"]
 
 _POINTS, _FEW = 4, 1500
 _INSTANTS, _FEWER, _GOLDEN = 16, 8, 0.5 * (5.0**0.5 - 1.0)
@@ -80,6 +80,28 @@ def between(run: Run, other: Run, journey: Journey, taken: int) -> Gap:
     if kept and instants and not journey.plan.feed.sample_time:
         return _of_tracks(run, other, journey, instants)
     return _of_rows(run, other, journey)
+
+
+def gap_at(run: Run, other: Run, journey: Journey, t: float) -> float:
+    """Return how far places and turns of nodes and angles of motors are apart at an instant, over the largest motion.
+
+    Parameters
+    ----------
+    run, other : Run
+        With their steps, as far as that instant.
+    journey : Journey
+        How the first went.
+    t : float
+        [s]
+
+    Returns
+    -------
+    float
+    """
+    model = journey.plan.model
+    assert isinstance(model, Model)
+    apart = _apart(model, run.track.state(t)[0], other.track.state(t)[0])
+    return float(apart.max(initial=0.0)) / _most(journey)
 
 
 def _of_tracks(run: Run, other: Run, journey: Journey, instants: int) -> Gap:

@@ -1,0 +1,130 @@
+"""Of parts that were interrupted, nobody has been laid beside: what goes on from there says so."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flexctrl as fc
+
+FAST = {"until": 30.0, "every": 0.05}
+RIGHT = re.compile(r"places are right to 3% until t = ([\d.]+) s")
+
+
+def pendulum() -> fc.Model:
+    """A double pendulum, which chaos leads astray within seconds."""
+    upper = fc.RigidBody("upper", (0, 0, -0.5), 1.0, (0.05,) * 3, {"top": (0, 0, 0), "end": (0, 0, -1)})
+    lower = fc.RigidBody("lower", (0, 0, -1.5), 1.0, (0.05,) * 3, {"top": (0, 0, -1), "end": (0, 0, -2)})
+    joints = [
+        fc.Support(upper.point("top"), "u v w rx rz"),
+        fc.Hinge(upper.point("end"), lower.point("top"), axis="y"),
+    ]
+    places = [fc.Position(a, lower.point("end"), a) for a in "xz"]
+    plan = fc.Structure([upper, lower], joints, outputs=places)
+    return fc.assemble(plan, [fc.Gravity(), fc.LargeRotation()])
+
+
+def thrown(model: fc.Model, speed: float = 8.0) -> fc.State:
+    return model.rest.with_(v=np.array([speed, 0.0]))
+
+
+@pytest.fixture
+def cut(monkeypatch):
+    """A run in which Ctrl-C is pressed as soon as so much of it is done."""
+
+    def run(*model_and_law, share: float, **how) -> fc.Run:
+        left = [1]
+
+        def pressing(done: float) -> None:
+            if done > share and left:
+                os.kill(os.getpid(), signal.SIGINT)
+                left.clear()
+
+        with monkeypatch.context() as often:
+            often.setattr("flexctrl.dynamics.journey._SECONDS", 0.0)
+            found = fc.simulate(*model_and_law, progress=pressing, **how)
+        assert found.status is fc.Status.INTERRUPTED
+        assert share < found.checkpoint.t / how["until"] < 0.98
+        return found
+
+    return run
+
+
+def test_since_when_a_part_that_was_cut_was_wrong_is_not_told(cut, tmp_path):
+    """It was called right until it was cut, where it had been wrong for long."""
+    model = pendulum()
+    first = cut(model, start=thrown(model), share=0.3, **FAST)
+    assert any("not told by another run (interrupted)" in note for note in first.report.notes)
+    first.checkpoint.save(tmp_path / "first")
+    on = fc.simulate(model, start=fc.load_checkpoint(tmp_path / "first"), **FAST)
+    later = fc.simulate(model, start=on.checkpoint, **{**FAST, "until": 35.0})
+    at = f"t = {first.checkpoint.t:.3g} s"
+    for run in (on, later):
+        said = "; ".join(run.report.notes)
+        assert run.report.error > 0.2
+        assert f"places were off by more than 3% as it went on at {at}, and nothing tells since when" in said
+        assert f"what was run before {at}, cut off or unchecked, has not been laid beside another run" in said
+        assert not RIGHT.search(said)
+
+
+def test_since_when_a_part_that_finished_was_wrong_is_known():
+    model = pendulum()
+    first = fc.simulate(model, start=thrown(model), **{**FAST, "until": 20.0})
+    on = fc.simulate(model, start=first.checkpoint, **FAST)
+    told = [RIGHT.search("; ".join(run.report.notes)).group(1) for run in (first, on)]
+    assert told[0] == told[1]
+    assert not any("has not been laid" in note for note in on.report.notes)
+
+
+def test_what_was_right_as_it_went_on_is_so_from_there_on(cut):
+    """Cut before it went astray: right from there until it did."""
+    model = pendulum()
+    how = {"until": 12.0, "every": 0.05, "method": fc.ExplicitRungeKutta()}
+    once = fc.simulate(model, start=thrown(model), **how)
+    first = cut(model, start=thrown(model), share=0.1, **how)
+    assert first.checkpoint.t < 2.0
+    said = "; ".join(fc.simulate(model, start=first.checkpoint, **how).report.notes)
+    found = re.search(r"right to 3% from t = ([\d.]+) s until t = ([\d.]+) s", said)
+    right = float(RIGHT.search("; ".join(once.report.notes)).group(1))
+    assert float(found.group(1)) == pytest.approx(first.checkpoint.t, rel=5e-3)
+    assert float(found.group(2)) == pytest.approx(right, abs=0.3)
+
+
+def test_a_part_that_needed_none_beside_it_is_no_part_that_was_cut():
+    model = pendulum()
+    first = fc.simulate(model, start=thrown(model, 0.02), until=2.0, every=0.05)
+    on = fc.simulate(model, start=first.checkpoint, until=4.0, every=0.05, method=fc.Checked(fc.AdaptiveAlpha()))
+    assert not any("has not been laid" in note for note in on.report.notes)
+    unchecked = fc.simulate(
+        model, start=thrown(model, 0.02), until=2.0, every=0.05, method=fc.Unchecked(fc.AdaptiveAlpha())
+    )
+    on = fc.simulate(model, start=unchecked.checkpoint, until=4.0, every=0.05, method=fc.Checked(fc.AdaptiveAlpha()))
+    assert any("cut off or unchecked, has not been laid" in note for note in on.report.notes)
+
+
+def test_until_when_a_long_run_is_right_is_looked_for():
+    """Wrong at the first of sixteen instants, it was called right until t = 0 s."""
+    model = pendulum()
+    how = {"start": thrown(model), "every": 0.05, "until": 25.0}
+    true = fc.simulate(
+        model, method=fc.Unchecked(fc.ExplicitRungeKutta()), tolerance=fc.Tolerance(0.0, 1e-12), **{**how, "until": 4.0}
+    )
+    run = fc.simulate(model, method=fc.GeneralizedAlpha(2e-2), **how)
+    off = np.abs(run.y[: len(true.y)] - true.y).max(axis=1) / 2.0
+    told = float(RIGHT.search("; ".join(run.report.notes)).group(1))
+    assert 0.2 < told < true.t[np.argmax(off > 0.03)]
+
+
+def test_a_checkpoint_knows_what_nobody_has_seen(cut):
+    model = pendulum()
+    first = cut(model, start=thrown(model), share=0.3, **FAST).checkpoint
+    assert first.origin.seen == 0.0
+    seen = replace(first.origin, seen=first.t)
+    assert seen.gone_on(first.t).unseen == (0.0, 0.0)
+    assert seen.gone_on(20.0).unseen == (first.t, 20.0)
+    assert seen.gone_on(20.0).seen_until(25.0).gone_on(28.0).unseen == (first.t, 28.0)
