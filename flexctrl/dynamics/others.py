@@ -24,7 +24,7 @@ from flexctrl.model.state import State
 
 __all__ = ["UNCHECKED", "Beginning", "Other", "made", "noted", "seen_until", "standing"]
 
-_LONGER, _SECONDS, _ALIKE = 2.0, 2.0, 0.01
+_LONGER, _SECONDS, _ALIKE, _NEAR = 2.0, 2.0, 0.01, 1e-9
 UNCHECKED = "how far small differences have grown is not told by another run"
 
 
@@ -174,13 +174,20 @@ def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tu
     if not _begins_alike(run, other, journey):
         return noted(run, f"{UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
     reached = end if other.status is Status.STOPPED else min(other.final.t, end)
-    told = seen_until(standing(run, other.checkpoint), reached)
+    told, other = seen_until(standing(run, other.checkpoint), reached), _since(beginning.t, other)
     if other.final.t <= beginning.t:
         return told, Other(other, Gap.unseen(run), beside)
     try:
         return told, Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside)
     except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
         return noted(told, f"{UNCHECKED}, whose numbers fail ({fault})"), None
+
+
+def _since(begin: float, other: Run) -> Run:
+    """Another run from where one goes on: what came before, peaks and events, is not in that one."""
+    rows = other.t >= begin * (1.0 - _NEAR)
+    events = tuple(event for event in other.events if not begin or event.t > begin)
+    return replace(other, t=other.t[rows], y=other.y[rows], u=other.u[rows], events=events)
 
 
 def _begins_alike(run: Run, other: Run, journey: Journey) -> bool:
