@@ -235,6 +235,7 @@ def growth(quick: bool) -> dict[str, object]:
         found[name] = {
             "exponent": exponent,
             "elements": list(times),
+            "steps": WINDOW,
             "times": list(times.values()),
             "newton": list(newton.values()),
             "bytes": bytes_an_element(LARGEST),
