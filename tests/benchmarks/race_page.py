@@ -78,8 +78,8 @@ chains came out at 0.18 to 0.32 within three hours, full swings at 0.11 to 0.16,
 to 1.13 (full swing), the crane at 0.29 to 0.32, 0.13 to 0.15 and 0.09 to 0.10. Forces take an eighth less since, a step
 of 100 elements 8 % less, one of 1,000 4 %: ratios gained what they had missed, and growth lost as much. Tiles took 8 to
 9 % off a step of 10,000, reading less another 8, and tangents that fine beams keep longer 20 % through the whip. All
-these exponents were of steps 100 to 400 of 10,000 elements beside steps 500 to 2,500 of fewer: 1.07 in the full swing was
-1.14 over one motion.
+these exponents were of steps 100 to 400 of 10,000 elements beside steps 500 to 2,500 of fewer: 1.07 in the full
+swing was 1.14 over one motion.
 """
 _SWING = """\
 The full swing of {elements} elements over {steps} steps, through the lowest point and the whip of the
