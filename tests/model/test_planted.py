@@ -36,7 +36,7 @@ def series(rng: np.random.Generator, sound: bool) -> tuple[fc.Structure, Said]:
     parts = [*beams, first, second]
     joints += [fc.Pin(a, first.start), fc.Pin(first.end, second.start), fc.Pin(second.end, b)]
     if sound:
-        mass = fc.PointMass("mass", between, 1e-3)
+        mass = fc.PointMass("mass", between, 1.0)
         parts, joints = [*parts, mass], [*joints, fc.Pin(first.end, mass.node)]
     return fc.Structure(parts, joints), ("one 1: translation along", None)
 
