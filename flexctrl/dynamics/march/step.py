@@ -44,6 +44,8 @@ __all__ = ["newton", "press_all", "refactored", "sloped", "step", "to_rate", "to
 
 _TURNED = 0.1
 _TRUSTED = 8
+_SECOND = 1.0
+"""Of the first correction: tension answers what bends, and the third is small all the same."""
 _FINEST = 1e-12
 """Increments of probes in a step that has failed, at the least."""
 _PATIENCE = 500
@@ -81,7 +83,7 @@ def newton(m: March) -> int:
             if m.phase == EVALUATE:
                 press_all(m)
             m.phase = CORRECT
-            if m.attempt == 1 or wary(m) or m.contraction > POOR or (m.iteration == 0 and stale(m)):
+            if m.attempt == 1 or wary(m) or poor(m) or (m.iteration == 0 and stale(m)):
                 status = sloped_here(m)
                 if status != DONE:
                     return status
@@ -104,6 +106,11 @@ def newton(m: March) -> int:
             return DONE
         m.iteration += 1
     return FAILED
+
+
+def poor(m: March) -> bool:
+    """Tell whether corrections shrink too slowly; the second may be what the first has called forth elsewhere."""
+    return m.contraction > (POOR if m.iteration > 2 else _SECOND)
 
 
 def press_all(m: March) -> None:
@@ -201,7 +208,7 @@ def reckon(m: March) -> None:
     """Enter the iterations of a step in the account of the tangent."""
     m.served += 1
     m.spent += m.iteration + 1.0
-    m.lately = m.iteration + 1.0
+    m.lately += 0.5 * (m.iteration + 1.0 - m.lately)
 
 
 def stale(m: March) -> bool:
