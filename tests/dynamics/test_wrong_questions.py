@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -103,7 +104,18 @@ def test_values_that_cannot_be_are_refused_where_they_are_made(make, message):
         make()
 
 
-@pytest.mark.parametrize("of", [max, np.sum, len, lambda *y: 1.0, lambda y, k=2: k, fc.Event("top", "swing").value])
+def beyond(least, signals):
+    return signals["swing"] - least
+
+
+@functools.wraps(beyond)
+def decorated(signals):
+    return beyond(0.1, signals)
+
+
+@pytest.mark.parametrize(
+    "of", [max, np.sum, len, lambda *y: 1.0, lambda y, k=2: k, decorated, fc.Event("top", "swing").value]
+)
 def test_any_function_of_one_argument_may_be_an_event(of):
     assert fc.Event("top", of).of is of
 

@@ -155,7 +155,7 @@ class Occurrence:
 def _takes_one(function: Callable[..., object]) -> bool:
     """Whether a function can be called with one argument, as far as Python tells."""
     try:
-        inspect.signature(function).bind(None)
+        inspect.signature(function, follow_wrapped=False).bind(None)
     except TypeError:
         return False
     except ValueError:  # it has no signature: what was compiled need not have one

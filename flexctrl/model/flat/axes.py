@@ -30,9 +30,9 @@ class Axes:
     angles : Wholes
         Turning degrees of freedom without axes.
     swaying : int
-        How many axes stand on beams so finely divided that their elements resist shear more than stretching.
+        How many axes stand within beams so finely divided that their elements resist shear more than stretching.
     beside : Wholes, (2 count,)
-        Of such axes the ones before and after along the beam, or themselves at its ends; elsewhere themselves.
+        Of such axes the ones before and after along the beam.
     share : Reals, (count,)
         One over the length between these; 0 elsewhere.
     """
@@ -123,17 +123,19 @@ def _pairs(model: Model, pattern: tuple[np.ndarray, np.ndarray], of: np.ndarray)
 
 
 def _beside(model: Model, of: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the axes before and after each along a finely divided beam, and one over the length between them."""
-    own = np.arange(count)
-    beside, ways, length = np.column_stack([own, own]), np.zeros((count, 2), dtype=int), np.zeros(count)
+    """Return the axes before and after each within a finely divided beam, and one over the length between them.
+
+    Where a beam ends, what it is joined to would be strained by what undoes its shear.
+    """
+    beside = np.repeat(np.arange(count)[:, None], 2, axis=1)
+    ways, length = np.zeros((count, 2), dtype=int), np.zeros(count)
     for one, other, span in _fine(model, of):
         for here, there, way in ((one, other, 1), (other, one, 0)):
             beside[here, way] = there
             ways[here, way] += 1
             length[here] += span
-    forked = (ways > 1).any(axis=1) | (length == 0.0)
-    beside[forked] = own[forked, None]
-    return beside, np.where(forked, 0.0, 1.0 / np.where(forked, 1.0, length))
+    within = (ways == 1).all(axis=1)
+    return beside, np.divide(1.0, length, out=np.zeros(count), where=within)
 
 
 def _fine(model: Model, of: np.ndarray) -> list[tuple[int, int, float]]:
