@@ -45,7 +45,7 @@ __all__ = ["newton", "press_all", "refactored", "sloped", "step", "to_rate", "to
 _TURNED = 0.1
 _TRUSTED = 8
 _SECOND = 0.5
-"""Of the first correction: tension answers what bends, and the third is small all the same. Round-off does not shrink."""
+"""Of the first correction: tension answers what bends, and the third is small all the same. Round-off never shrinks."""
 _FINEST = 1e-12
 """Increments of probes in a step that has failed, at the least."""
 _PATIENCE = 500
