@@ -200,8 +200,8 @@ class March:
     habit, trusted : float, int
         How much smaller each correction has been than the one before, and in how many steps that was only believed.
     price, spent, lately, served : float, int
-        What a tangent costs, in iterations; what was spent on it and on iterations since, how many the last steps
-        took, each counting half as much as the one after it, and how many steps there were.
+        What a tangent costs, in iterations; what was spent on it and on iterations since, how many the last step
+        took, and how many steps there were.
     lean : float
         What share of their last change accelerations are expected to change by; see `AlphaPoint`.
     came, lagging : float

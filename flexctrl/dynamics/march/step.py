@@ -208,7 +208,7 @@ def reckon(m: March) -> None:
     """Enter the iterations of a step in the account of the tangent."""
     m.served += 1
     m.spent += m.iteration + 1.0
-    m.lately += 0.5 * (m.iteration + 1.0 - m.lately)
+    m.lately = m.iteration + 1.0
 
 
 def stale(m: March) -> bool:
