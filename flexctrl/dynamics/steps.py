@@ -277,8 +277,8 @@ class Judging(Stepper[P], Protocol[P]):
     def missed(self, before: P, after: P) -> np.ndarray:
         """Return by how much a step is beyond where it should be, shape (n,)."""
 
-    def remains(self, share: float) -> float:
-        """Return what a run is off by whose local errors add up to a share of the motion."""
+    def remains(self, share: np.ndarray) -> np.ndarray:
+        """Return what a run is off by whose local errors add up to such shares of the motion."""
 
 
 @runtime_checkable

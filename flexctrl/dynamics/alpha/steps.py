@@ -308,7 +308,7 @@ class Stepper:
         h = after.state.t - before.state.t
         return (self.coefficients.beta - 1.0 / 6.0) * h * h * (after.algorithmic - before.algorithmic)
 
-    def remains(self, share: float) -> float:
+    def remains(self, share: np.ndarray) -> np.ndarray:
         """Return what a run is off by: as much as its errors add up to."""
         return share
 

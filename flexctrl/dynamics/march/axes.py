@@ -81,29 +81,29 @@ def tilt(a: Reals) -> float:
 
 def solved(axes: Axes, factors: Factors, fronts: Fronts, b: Reals) -> None:
     """Solve in place with the matrix as it would be now."""
-    turn_back(axes, factors.turned, b)
-    if factors.swaying > 0:
-        sway_back(axes, factors.bends, b)
+    turn_back(axes, factors, b)
     solve_own(fronts, factors.down, factors.up, b, factors.work, factors.wide)
-    if factors.swaying > 0:
-        sway_on(axes, factors.bends, b)
-    turn_on(axes, factors.turned, b)
+    turn_on(axes, factors, b)
 
 
-def turn_back(axes: Axes, turned: Reals, b: Reals) -> None:
+def turn_back(axes: Axes, factors: Factors, b: Reals) -> None:
     """See forces from the axes as they were."""
     for k in range(axes.count):
         for i in range(2 * k, 2 * k + 2):
             if axes.triples[i] >= 0:
-                unturned(turned[9 * k :], b[axes.triples[i] :])
+                unturned(factors.turned[9 * k :], b[axes.triples[i] :])
+        if factors.swaying > 0 and axes.share[k] > 0.0:
+            sway_back(factors.bends[6 * k :], b[axes.triples[2 * k + 1] :], b[axes.triples[2 * k] :])
 
 
-def turn_on(axes: Axes, turned: Reals, b: Reals) -> None:
+def turn_on(axes: Axes, factors: Factors, b: Reals) -> None:
     """See motions in the axes as they were from space."""
     for k in range(axes.count):
+        if factors.swaying > 0 and axes.share[k] > 0.0:
+            sway_on(factors.bends[6 * k :], b[axes.triples[2 * k + 1] :], b[axes.triples[2 * k] :])
         for i in range(2 * k, 2 * k + 2):
             if axes.triples[i] >= 0:
-                turned_by(turned[9 * k :], b[axes.triples[i] :])
+                turned_by(factors.turned[9 * k :], b[axes.triples[i] :])
 
 
 def turned_by(R: Reals, x: Reals) -> None:

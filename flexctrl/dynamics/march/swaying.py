@@ -47,32 +47,22 @@ def bend(axes: Axes, turned: Reals, bends: Reals) -> None:
             unturned(turned[9 * k :], bent)
 
 
-def sway_back(axes: Axes, bends: Reals, b: Reals) -> None:
-    """Add to forces what moments do, on turns that follow displacements."""
-    for k in range(axes.count):
-        if axes.share[k] > 0.0:
-            bent = bends[6 * k :]
-            way = bends[6 * k + 3 :]
-            moment = b[axes.triples[2 * k] :]
-            force = b[axes.triples[2 * k + 1] :]
-            curved = dotted(bent, moment)
-            twisted = dotted(bent, way)
-            for i in range(3):
-                force[i] += way[i] * curved - moment[i] * twisted
+def sway_back(bent: Reals, force: Reals, moment: Reals) -> None:
+    """Add to a force what the moment does, on turns that follow displacements."""
+    way = bent[3:]
+    curved = dotted(bent, moment)
+    twisted = dotted(bent, way)
+    for i in range(3):
+        force[i] += way[i] * curved - moment[i] * twisted
 
 
-def sway_on(axes: Axes, bends: Reals, b: Reals) -> None:
-    """Add to turns what displacements lack in shear."""
-    for k in range(axes.count):
-        if axes.share[k] > 0.0:
-            bent = bends[6 * k :]
-            way = bends[6 * k + 3 :]
-            turn = b[axes.triples[2 * k] :]
-            x = b[axes.triples[2 * k + 1] :]
-            moved = dotted(way, x)
-            twisted = dotted(bent, way)
-            for i in range(3):
-                turn[i] += bent[i] * moved - x[i] * twisted
+def sway_on(bent: Reals, x: Reals, turn: Reals) -> None:
+    """Add to a turn what the displacement lacks in shear."""
+    way = bent[3:]
+    moved = dotted(way, x)
+    twisted = dotted(bent, way)
+    for i in range(3):
+        turn[i] += bent[i] * moved - x[i] * twisted
 
 
 def unturned(R: Reals, x: Reals) -> None:

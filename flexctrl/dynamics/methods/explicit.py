@@ -225,7 +225,7 @@ class _Stepper:
         high, _, share = self._compared(after.slopes, h, self.weight)
         return h * share * high
 
-    def remains(self, share: float) -> float:
+    def remains(self, share: np.ndarray) -> np.ndarray:
         """Return what a run is off by: as much as its errors add up to."""
         return share
 

@@ -230,9 +230,9 @@ class _Stepper:
         self.parted = np.maximum(self.parted, np.abs(self.between(after.coarse.state, after.fine.state)))
         return cast("Judging[Any]", plain_of(self.coarse)).missed(before.coarse, after.coarse)
 
-    def remains(self, share: float) -> float:
+    def remains(self, share: np.ndarray) -> np.ndarray:
         """Return what a run is off by: of second order in the lag of the coarser one."""
-        return 0.5 * share * share
+        return np.asarray(0.5 * share * share)
 
 
 def _joined(stepper: Stepper[Any], run: Any, supply: Supply, step: float) -> Any:

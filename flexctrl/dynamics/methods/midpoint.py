@@ -308,7 +308,7 @@ class _Stepper:
         h = after.state.t - before.state.t
         return h * h / 12.0 * (after.rate - before.rate)
 
-    def remains(self, share: float) -> float:
+    def remains(self, share: np.ndarray) -> np.ndarray:
         """Return what a run is off by: as much as its errors add up to."""
         return share
 

@@ -79,7 +79,7 @@ def drifted(journey: Journey) -> Drift:
     off[went] = np.minimum(late, sums.moved[went])
     width[went] = _width(sums.swept[went], sums.bent[went], sums.path[went])
     most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.negligible) * yardsticks(model)
-    lags = np.minimum([stepper.remains(lag) for lag in (off / most).tolist()], width / most)
+    lags = np.minimum(stepper.remains(off / most), width / most)
     ran = _run_off(journey) / most
     shares = np.maximum(lags, ran)
     worst = int(np.argmax(shares))
@@ -140,7 +140,7 @@ def remedy(journey: Journey, share: float) -> str:
     """
     plan, mark, stepper = journey.plan, journey.mark, journey.judging
     assert stepper is not None
-    pace, power = plan.method.pace, math.log2(stepper.remains(2.0) / stepper.remains(1.0))
+    pace, power = plan.method.pace, float(np.diff(np.log2(stepper.remains(np.array([1.0, 2.0]))))[0])
     if isinstance(pace, Controlled):
         less, asked = (_AIM / share) ** (1.0 / (power * (1.0 - 1.0 / pace.steepness))), plan.tolerance
         less *= min(1.0, journey.point.state.t / (mark.steps * mark.size)) ** pace.steepness  # samples keep them short
