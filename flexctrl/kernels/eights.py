@@ -14,8 +14,8 @@ Eight: TypeAlias = np.ndarray
 
 
 def eight(x: np.ndarray) -> Eight:
-    """Return the first eight entries of a vector."""
-    return np.array(x[:8])
+    """Return the first eight entries of a vector, of single precision or not."""
+    return x[:8].astype(float) if x.dtype == np.float32 else np.array(x[:8])
 
 
 def put(x: np.ndarray, value: Eight | float) -> None:

@@ -1,6 +1,6 @@
 """Loops as machine code: functions in a small part of Python, compiled once and called on a record.
 
-A record is a dataclass of numbers, vectors (float64 or int64 arrays) and compiled runs. `compiled` turns a
+A record is a dataclass of numbers, vectors (float64, float32 or int64 arrays) and compiled runs. `compiled` turns a
 function of one record into machine code; a `Packed` record is what that code reads and writes. The same
 function runs on the plain record without being compiled: slower, for tests. What may be written is told in
 `native_ir`.
@@ -18,12 +18,14 @@ import numpy as np
 from flexctrl.errors import KernelError
 from flexctrl.kernels.kernel import FLOAT, Run
 from flexctrl.kernels.native_ir import Translation
-from flexctrl.kernels.native_types import DECLARATIONS, RUNS, SCALARS, Absent, record_fields
+from flexctrl.kernels.native_types import DECLARATIONS, RUNS, SCALARS, Absent, Callee, record_fields
 
-__all__ = ["Packed", "Reals", "Runs", "Wholes", "assembly", "compiled", "lasting_zeros", "seldom"]
+__all__ = ["Packed", "Reals", "Runs", "Singles", "Wholes", "assembly", "compiled", "lasting_zeros", "seldom"]
 
 Reals: TypeAlias = np.ndarray
 """A vector of floats."""
+Singles: TypeAlias = np.ndarray
+"""A vector of floats of single precision, read and written eight at a time."""
 Wholes: TypeAlias = np.ndarray
 """A vector of ints."""
 Runs: TypeAlias = Sequence[Run]
@@ -31,6 +33,7 @@ Runs: TypeAlias = Sequence[Run]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _WHOLE = np.dtype(np.int64)
+_ENTRIES = {"Reals": FLOAT, "Singles": np.dtype(np.float32)}
 _libraries: list[object] = []  # owners of the memory of what `compiled` returns, which keeps it for good
 _ENTRY = """\
 define i64 @entry(ptr %record) {{
@@ -88,7 +91,7 @@ class Packed:
             return _start(inner._words)
         if kind == RUNS:
             value = np.array([word for run in value for word in (run.address, run.arguments)], dtype=_WHOLE)
-        wanted = FLOAT if kind == "Reals" else _WHOLE
+        wanted = _ENTRIES.get(kind, _WHOLE)
         if not (isinstance(value, np.ndarray) and value.dtype == wanted and value.flags.c_contiguous):
             raise KernelError(f"record field {name!r} is no contiguous vector of {wanted}")
         self._kept.append(value)
@@ -181,13 +184,15 @@ def assembly(function: Callable[..., int], absent: Absent = frozenset()) -> str:
         If a function uses what cannot be compiled, says what and where; if two of them have one name.
     """
     known, parts, libraries = {function.__name__: function}, [], set()
-    waiting = [function]
+    waiting: list[Callee] = [(function, frozenset())]
+    found = set(waiting)
     while waiting:
         translation = Translation(waiting.pop(), absent)
         parts.append(translation.assembly())
         libraries |= translation.libraries
-        waiting += [f for f in translation.callees if f.__name__ not in known]
-        for callee in translation.callees:
+        waiting += [callee for callee in translation.callees if callee not in found]
+        found |= set(translation.callees)
+        for callee, _ in translation.callees:
             _check_name(known.setdefault(callee.__name__, callee), callee)
     return "\n".join([*parts, *DECLARATIONS, *sorted(libraries), _ENTRY.format(name=function.__name__)])
 

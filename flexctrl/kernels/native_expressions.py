@@ -18,12 +18,15 @@ from flexctrl.kernels.native_types import (
     LIBRARY,
     RUNS,
     SCALARS,
+    SHORT,
     VECTORS,
     Absent,
+    Callee,
     Value,
     llvm_type,
     record_fields,
     signature,
+    symbol,
 )
 
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
@@ -37,8 +40,8 @@ class Expressions:
 
     Attributes
     ----------
-    callees : list of callable
-        The functions it needs, each once.
+    callees : list of (callable, frozenset of str)
+        The functions it needs, each once for every choice of parameters that are `Singles`.
     libraries : set of str
         Declarations of functions of the C library it needs.
     """
@@ -46,7 +49,7 @@ class Expressions:
     def __init__(self, function: Callable[..., Any], absent: Absent = frozenset()) -> None:
         self.function, self.absent = function, absent
         self.names = function.__globals__
-        self.callees: list[Callable[..., Any]] = []
+        self.callees: list[Callee] = []
         self.libraries: set[str] = set()
         self.lines: list[str] = []
         self.slots: dict[str, Value] = {}
@@ -272,6 +275,8 @@ class Expressions:
 
     def _eights(self, name: str, arguments: list[Value]) -> Value:
         a = arguments[0].text
+        if arguments[0].type == "Singles" and name in ("eight", "put"):
+            return self._singles(a, arguments[1:])
         if name == "eight":
             return self._value("Eight", f"load {EIGHT}, ptr {a}, align 8")
         if name == "ahead":
@@ -297,6 +302,15 @@ class Expressions:
             return self._value("float", f"call double @llvm.vector.reduce.fmax.v8f64({EIGHT} {a})")
         return self._value("float", f"call reassoc double @llvm.vector.reduce.fadd.v8f64(double 0.0, {EIGHT} {a})")
 
+    def _singles(self, place: str, written: list[Value]) -> Value:
+        """Read eight floats of single precision, or write these."""
+        if not written:
+            short = self._value("single", f"load {SHORT}, ptr {place}, align 4").text
+            return self._value("Eight", f"fpext {SHORT} {short} to {EIGHT}")
+        short = self._value("single", f"fptrunc {EIGHT} {self._cast(written[0], 'Eight').text} to {SHORT}").text
+        self._put(f"store {SHORT} {short}, ptr {place}, align 4")
+        return Value(None, "")
+
     def _six(self, goal: str, source: str, added: bool) -> None:
         """Read all of it before any is written, which LLVM may not do by itself: goal and source might overlap."""
         ends = [self._value("ptr", f"getelementptr double, ptr {at}, i64 4").text for at in (goal, source)]
@@ -315,11 +329,13 @@ class Expressions:
         parameters, result = signature(callee)
         if len(parameters) != len(arguments):
             raise self._fail(f"{callee.__name__} takes {len(parameters)} arguments")
-        given = [self._cast(a, kind) for a, (_, kind) in zip(arguments, parameters, strict=True)]
+        pairs = list(zip(arguments, parameters, strict=True))
+        singles = frozenset(name for a, (name, kind) in pairs if (a.type, kind) == ("Singles", "Reals"))
+        given = [a if name in singles else self._cast(a, kind) for a, (name, kind) in pairs]
         text = ", ".join(f"{llvm_type(a.type)} {a.text}" for a in given)
-        if callee not in self.callees:
-            self.callees.append(callee)
-        call = f"call {llvm_type(result)} @{callee.__name__}({text})"
+        if (callee, singles) not in self.callees:
+            self.callees.append((callee, singles))
+        call = f"call {llvm_type(result)} @{symbol((callee, singles))}({text})"
         if result is not None:
             return self._value(result, call)
         self._put(call)

@@ -1,23 +1,22 @@
 """From a function in a small part of Python to LLVM assembly.
 
 The part: ``int`` (64 bits), ``float`` and ``bool`` values; vectors (`Reals`, `Wholes`) read and written by one
-index, and their tails ``a[k:]``; records, which are dataclasses of such; lists of compiled runs (`Runs`);
-``if``, ``while``, ``for … in range``, ``return``; arithmetic, comparisons, ``and``/``or``/``not``, ``x if c else y``;
-``min``, ``max``, ``abs``, ``int``, ``float``, functions of `math`, eight floats at once (`eights`), and other
-functions of the same part. Every variable keeps the type of its first value, ``//`` and ``%`` are for numbers
-≥ 0, and vectors that one function is given must not overlap. What is outside is refused with its line.
+index, and their tails ``a[k:]``; `Singles`, eight at a time, also where a function says `Reals`; records, which are
+dataclasses of such; lists of compiled runs (`Runs`); ``if``, ``while``, ``for … in range``, ``return``; arithmetic,
+comparisons, ``and``/``or``/``not``, ``x if c else y``; ``min``, ``max``, ``abs``, ``int``, ``float``, functions of
+`math`, eight floats at once (`eights`), and other functions of the same part. Every variable keeps the type of its
+first value, ``//`` and ``%`` are for numbers ≥ 0, and vectors that one function is given must not overlap. What is
+outside is refused with its line.
 """
 
 from __future__ import annotations
 
 import ast
 import linecache
-from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 from flexctrl.kernels.native_expressions import Expressions
-from flexctrl.kernels.native_types import VECTORS, ZERO, Absent, Value, llvm_type, signature
+from flexctrl.kernels.native_types import VECTORS, ZERO, Absent, Callee, Value, llvm_type, signature, symbol
 
 _SHORT = 150
 """Lines of assembly without branches that are put where they are called."""
@@ -26,10 +25,12 @@ _SHORT = 150
 class Translation(Expressions):
     """A function and its statements."""
 
-    def __init__(self, function: Callable[..., Any], absent: Absent = frozenset()) -> None:
-        super().__init__(function, absent)
+    def __init__(self, callee: Callee, absent: Absent = frozenset()) -> None:
+        super().__init__(callee[0], absent)
+        self.name, singles = symbol(callee), callee[1]
         self.loops: list[tuple[str, str]] = []
-        self.parameters, self.result = signature(function)
+        parameters, self.result = signature(self.function)
+        self.parameters = [(name, "Singles" if name in singles else kind) for name, kind in parameters]
 
     def assembly(self) -> str:
         """Return the definition in LLVM assembly."""
@@ -42,7 +43,7 @@ class Translation(Expressions):
         self._body(tree.body)
         self._put(f"ret {llvm_type(self.result)} {ZERO[llvm_type(self.result)]}")
         slots = [f"  {slot.text} = alloca {llvm_type(slot.type)}" for slot in self.slots.values()]
-        top = f"define internal {llvm_type(self.result)} @{self.function.__name__}({', '.join(heads)}){self._hurry} {{"
+        top = f"define internal {llvm_type(self.result)} @{self.name}({', '.join(heads)}){self._hurry} {{"
         return "\n".join([top, *slots, *self.lines, "}"])
 
     @property

@@ -12,16 +12,18 @@ from typing import Any, NamedTuple, TypeAlias
 from flexctrl.errors import KernelError
 
 SCALARS = {"int": "i64", "float": "double", "bool": "i1"}
-EIGHT = "<8 x double>"
-VECTORS = {"Reals": "float", "Wholes": "int"}
+EIGHT, SHORT = "<8 x double>", "<8 x float>"
+VECTORS = {"Reals": "float", "Singles": "single", "Wholes": "int"}
 RUNS = "Runs"
-_TYPES: dict[Any, str] = {**SCALARS, "Eight": EIGHT, None: "void"}
+_TYPES: dict[Any, str] = {**SCALARS, "single": "float", "Eight": EIGHT, None: "void"}
 INTRINSICS = ("sqrt", "fabs", "floor", "ceil", "copysign")
 LIBRARY = ("sin", "cos", "tan", "atan", "atan2", "exp", "log", "pow", "asin", "acos", "hypot")
 
 
 Absent: TypeAlias = frozenset[tuple[type, str]]
 """Fields of records, ints, that are 0 for good: no code is made for what they count."""
+Callee: TypeAlias = tuple[Callable[..., Any], frozenset[str]]
+"""A function, and which of its parameters are `Singles` where it says `Reals`: it is compiled for these as well."""
 
 
 class Value(NamedTuple):
@@ -45,6 +47,12 @@ def signature(function: Callable[..., Any]) -> tuple[list[tuple[str, Any]], str 
     types = {name: _resolved(note, names) for name, note in notes.items()}
     result = types.pop("return", None)
     return list(types.items()), result
+
+
+def symbol(callee: Callee) -> str:
+    """Return the name of a function in machine code."""
+    function, singles = callee
+    return ".".join([function.__name__, *sorted(singles)])
 
 
 def _resolved(note: Any, names: dict[str, Any]) -> Any:

@@ -14,7 +14,7 @@ import pytest
 from flexctrl.errors import KernelError
 from flexctrl.kernels.eights import Eight, add_six, ahead, eight, larger, largest, lost, put, put_six, rounded, total
 from flexctrl.kernels.kernel import CasadiVM, Compiled, Kernel
-from flexctrl.kernels.native import Packed, Reals, Runs, Wholes, assembly, lasting_zeros
+from flexctrl.kernels.native import Packed, Reals, Runs, Singles, Wholes, assembly, lasting_zeros
 from flexctrl.model.flat.flat import clear as cleared
 
 pytest.importorskip("llvmlite")
@@ -241,6 +241,39 @@ def test_compiled_functions_run_compiled_kernels():
     plain, packed = record(CasadiVM()), Packed(record(Compiled()))
     assert packed.bound(kernels)() == kernels(plain)
     assert np.allclose(packed.y, plain.y, rtol=1e-14)
+
+
+@dataclass
+class Mixed:
+    x: Reals
+    y: Reals
+    brief: Singles
+
+
+def doubled_on(a: Reals, b: Reals) -> None:
+    put(b, 2.0 * eight(a[3:]))
+
+
+def both_precisions(m: Mixed) -> int:
+    put(m.brief[1:], eight(m.x))
+    doubled_on(m.brief, m.y)
+    doubled_on(m.x, m.y[8:])
+    doubled_on(m.y, m.brief[8:])
+    return 0
+
+
+def test_vectors_of_single_precision_stand_where_functions_say_reals():
+    plain, packed = (Mixed(np.arange(16) / 3.0, np.zeros(16), np.zeros(16, np.float32)) for _ in range(2))
+    assert Packed(packed).bound(both_precisions)() == both_precisions(plain) == 0
+    assert np.array_equal(packed.brief, plain.brief)
+    assert np.array_equal(packed.y, plain.y)
+    assert packed.y[0] == 2.0 * np.float32(packed.x[2]) != 2.0 * packed.x[2]
+    assert packed.y[8] == 2.0 * packed.x[3]
+
+
+def test_entries_of_single_precision_are_refused_where_others_are_expected():
+    with pytest.raises(KernelError, match="'brief' is no contiguous vector of float32"):
+        Packed(Mixed(np.zeros(8), np.zeros(8), np.zeros(8)))
 
 
 def test_numbers_of_a_packed_record_are_read_and_written_as_attributes():

@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from flexctrl.kernels.native import Packed, Reals
+from flexctrl.kernels.native import Packed, Reals, Singles
 from flexctrl.model.flat import fronts
 from flexctrl.model.flat.fronts import Fronts, Plan, factor, plan_of
 from flexctrl.model.flat.solving import solve
@@ -33,6 +33,20 @@ def solved(m: Problem) -> int:
     if where < 0:
         solve(m.fronts, m.down, m.up, m.b, m.work)
     return where
+
+
+@dataclass
+class Brief:
+    fronts: Fronts
+    down: Singles
+    up: Singles
+    b: Reals
+    work: Reals
+
+
+def solved_briefly(m: Brief) -> int:
+    solve(m.fronts, m.down, m.up, m.b, m.work)
+    return 0
 
 
 def chain(links: int, freedoms: int, rng: np.random.Generator) -> sp.csr_matrix:
@@ -88,13 +102,30 @@ def test_solutions_do_not_hang_on_how_many_nodes_are_eliminated_together(name, c
     """Where factors fit no near cache nodes are eliminated one by one: 2/3 of the numbers, for the same answer."""
     b = np.random.default_rng(2).normal(size=MATRICES[name].shape[0])
     together, _ = problem(MATRICES[name], b)
-    monkeypatch.setattr(fronts, "_LARGE", 0)
+    monkeypatch.setattr(fronts, "LARGE", 0)
     plan, m = problem(MATRICES[name], b)
     assert plan.fronts.below <= together.fronts.below
     assert (Packed(m).bound(solved)() if compiled else solved(m)) == -1
     x = np.empty_like(b)
     x[plan.order] = m.b
     assert np.allclose(x, spsolve(MATRICES[name].tocsc(), b), rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("nodes", [1, 2])
+@pytest.mark.parametrize("name", MATRICES)
+def test_factors_in_single_precision_keep_six_digits(name, nodes, compiled, monkeypatch):
+    A = MATRICES[name].tocsc()
+    b = np.random.default_rng(3).normal(size=A.shape[0])
+    monkeypatch.setattr(fronts, "LARGE", 0 if nodes == 1 else fronts.LARGE)
+    _, m = problem(A, b)
+    right = m.b.copy()
+    assert solved(m) == -1
+    brief = Brief(m.fronts, m.down.astype(np.float32), m.up.astype(np.float32), right, m.work.copy())
+    assert (Packed(brief).bound(solved_briefly)() if compiled else solved_briefly(brief)) == 0
+    apart = np.abs(brief.b - m.b).max() / np.abs(m.b).max()
+    assert apart < 1e-6
+    assert apart > 0.0 or np.array_equal(brief.down, m.down)
 
 
 @pytest.mark.parametrize("compiled", [False, True])

@@ -16,7 +16,7 @@ from flexctrl.model.flat.solving import copy_on, solve_own
 from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.kinds import NODE_SLOT
 
-__all__ = ["mark", "solved", "turned_too_far"]
+__all__ = ["mark", "solved", "solved_with", "turned_too_far"]
 
 
 def mark(axes: Axes, factors: Factors, f: Flat) -> None:
@@ -81,8 +81,13 @@ def tilt(a: Reals) -> float:
 
 def solved(axes: Axes, factors: Factors, fronts: Fronts, b: Reals) -> None:
     """Solve in place with the matrix as it would be now."""
+    solved_with(axes, factors, fronts, factors.down, factors.up, b)
+
+
+def solved_with(axes: Axes, factors: Factors, fronts: Fronts, down: Reals, up: Reals, b: Reals) -> None:
+    """Do so with its numbers as they are kept somewhere."""
     turn_back(axes, factors, b)
-    solve_own(fronts, factors.down, factors.up, b, factors.work, factors.wide)
+    solve_own(fronts, down, up, b, factors.work, factors.wide)
     turn_on(axes, factors, b)
 
 

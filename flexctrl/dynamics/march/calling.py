@@ -33,7 +33,7 @@ from flexctrl.model.model import Model
 
 __all__ = ["Loops", "Remembered"]
 
-_HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed", "swift")
+_HABITS = ("habit", "trusted", "tolerance", "served", "spent", "lately", "missed", "believed", "swift", "halved")
 _PACED = (CONTROLLED, SAMPLED)
 _NOTHING: tuple[tuple[int, int], np.ndarray, np.ndarray] = ((-1, -1), np.zeros(0), np.zeros(0))
 

@@ -29,6 +29,7 @@ from flexctrl.dynamics.swift.thrown import holding_inputs, may_throw
 from flexctrl.frozen import frozen
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import Flattened
+from flexctrl.model.flat.fronts import LARGE
 
 __all__ = ["CAPACITY", "Method", "march_of"]
 
@@ -83,6 +84,7 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
     closing: Any = Packed(closing_of(F))
     probes = probes_of(F, method.weight)
     lags: Any = Packed(lags_of(F.model, F.plan.position, F.flat.padded))
+    brief = _brief(F, probes.groups)
     return March(
         flat=F.flat,
         gauges=F.gauges,
@@ -95,13 +97,14 @@ def march_of(F: Flattened, contacts: Any, method: Method, leaping: int, answerin
         leap=no_leap(),
         fronts=F.plan.fronts,
         axes=F.axes,
-        tangent=_factors(F, F.axes.swaying),
-        mass=_factors(F, 0),
+        tangent=_factors(F, F.axes.swaying, brief),
+        mass=_factors(F, 0, False),
         probes=probes,
         lags=lags,
         entries=np.zeros(F.plan.length + 1),
         leaping=leaping,
         answering=answering,
+        brief=int(brief),
         **_motion(F),
         **_yardsticks(F, method),
         **_room(F),
@@ -162,7 +165,13 @@ def _newton(F: Flattened, method: Method, groups: int) -> dict[str, Any]:
     }
 
 
-def _factors(F: Flattened, swaying: int) -> Factors:
+def _brief(F: Flattened, groups: int) -> bool:
+    """Tell whether tangents may be solved with in single precision: of what is large and has no line that is stiff."""
+    fronts = F.plan.fronts
+    return fronts.n > LARGE and fronts.beyond == 0 and bool(F.flat.tangents) and groups == 0 and firmest(F.model) == 0.0
+
+
+def _factors(F: Flattened, swaying: int, brief: bool) -> Factors:
     axes, fronts = F.axes, F.plan.fronts
     return Factors(
         down=np.zeros(fronts.below + 8),
@@ -174,6 +183,8 @@ def _factors(F: Flattened, swaying: int) -> Factors:
         turned=np.zeros(9 * axes.count),
         angles=np.zeros(axes.angle_count),
         place=np.zeros(F.flat.posed),
+        brief_down=np.zeros(fronts.below + 8 if brief else 0, dtype=np.float32),
+        brief_up=np.zeros(fronts.right + 8 if brief else 0, dtype=np.float32),
         swaying=swaying,
         bends=np.zeros(6 * axes.count if swaying else 0),
     )

@@ -15,7 +15,7 @@ from flexctrl.dynamics.march.flowing import Flows
 from flexctrl.dynamics.march.lagging import Lags
 from flexctrl.dynamics.march.law import Law
 from flexctrl.dynamics.march.probing import Probes
-from flexctrl.kernels.native import Reals, Wholes
+from flexctrl.kernels.native import Reals, Singles, Wholes
 from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.fronts import Fronts
 from flexctrl.model.flat.workspace import Flat
@@ -50,6 +50,8 @@ class Factors:
         Turning degrees of freedom without axes, when it was made.
     place : Reals
         The workspace when it was made.
+    brief_down, brief_up : Singles
+        What solving reads in single precision, where that may do; empty elsewhere.
     swaying : int
         Whether shear of fine beams is to be seen to; not in a matrix of masses.
     bends : Reals
@@ -65,6 +67,8 @@ class Factors:
     turned: Reals
     angles: Reals
     place: Reals
+    brief_down: Singles
+    brief_up: Singles
     swaying: int
     bends: Reals
 
@@ -206,6 +210,8 @@ class March:
         What share of their last change accelerations are expected to change by; see `AlphaPoint`.
     came, lagging : float
         Length of the last step; that of the one for which the start has other rates than the last one left, 0: of none.
+    brief, halved : int
+        Whether the tangent may be solved with in single precision; whether it is (−1: to be looked at); see `halving`.
     made_for, mass_for : float
         Step for which the tangent was made; 1 once the mass has been.
     missed, believed : float, int
@@ -256,7 +262,7 @@ class March:
         Poses, degrees of freedom, rates, driven coordinates, angles of outputs, and the time.
     """
 
-    LASTING = ("answering", "leaping", "swift", "whole")
+    LASTING = ("answering", "leaping", "swift", "whole", "brief")
 
     flat: Flat
     gauges: Gauges
@@ -359,6 +365,8 @@ class March:
     lean: float = 1.0
     came: float = 0.0
     lagging: float = 0.0
+    brief: int = 0
+    halved: int = 0
     made_for: float = -1.0
     mass_for: float = 0.0
     missed: float = -1.0

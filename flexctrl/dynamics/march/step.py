@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 
 from flexctrl.dynamics.alpha.newton import ASTRAY, ITERATIONS, POOR, small_enough, wanted
-from flexctrl.dynamics.march.axes import mark, solved, turned_too_far
+from flexctrl.dynamics.march.axes import mark, turned_too_far
 from flexctrl.dynamics.march.contacts import feel, firmness
 from flexctrl.dynamics.march.corners import tell_sides
 from flexctrl.dynamics.march.guessing import cone, predict
+from flexctrl.dynamics.march.halving import find_correction, halve
 from flexctrl.dynamics.march.holding import held
 from flexctrl.dynamics.march.probing import probe
 from flexctrl.dynamics.march.record import (
@@ -236,6 +237,8 @@ def refactored(m: March) -> int:
     m.served = 0
     m.spent = m.price
     m.lately = 0.0
+    if m.brief > 0:
+        halve(m)
     mark(m.axes, m.tangent, m.flat)
     tell_sides(m.corners, m.flat)
     return DONE
@@ -266,7 +269,7 @@ def correct(m: March) -> float:
     f = m.flat
     if m.swift != 1:
         f.force[f.n] = 0.0
-        solved(m.axes, m.tangent, m.fronts, f.force)
+        find_correction(m)
         if (
             m.contacts.count > 0
             and m.contacts.stuck > 0

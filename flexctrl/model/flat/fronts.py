@@ -22,13 +22,13 @@ from flexctrl.frozen import frozen
 from flexctrl.kernels.eights import eight, put
 from flexctrl.kernels.native import Reals, Wholes, seldom
 
-__all__ = ["NODE", "Fronts", "Plan", "factor", "plan_of", "seat", "whose"]
+__all__ = ["LARGE", "NODE", "Fronts", "Plan", "factor", "plan_of", "seat", "whose"]
 
 _VANISHING = 1e-13
 NODE = 6
 _MERGED = 2 * NODE
 """Unknowns of a front that small ones are joined to. Two nodes at once are quicker; one at a time takes less room."""
-_LARGE = 3_000
+LARGE = 3_000
 """Unknowns from which on room counts: factors of half a megabyte share a near cache with all else that a step reads.
 Those of what levers say are of other sizes, of which no loop is written out."""
 
@@ -167,7 +167,7 @@ def plan_of(
     order = sp.csr_matrix((np.ones(len(after[0])), after), shape=(n, n))
     members, touching, group = _grouped(pattern, order)
     before = [set(found) - {i} for i, found in enumerate(_gathered(order, members, group))]
-    fronts = _merged(*_eliminated(members, touching, before), NODE if own is None and n > _LARGE else _MERGED)
+    fronts = _merged(*_eliminated(members, touching, before), NODE if own is None and n > LARGE else _MERGED)
     return _laid_out(n, n if own is None else own, fronts)
 
 
