@@ -1,7 +1,7 @@
 """Shear of finely divided beams, seen from axes that have turned by different amounts: compiled loops.
 
 Seen from nodes' axes whose turns change by κ along a beam, a displacement x of it as a whole strains it by −κ × x.
-Elements shorter than about three radii of gyration resist shear, by 12 EI/L², more than they resist stretching: their
+Elements shorter than 2.4 radii of gyration resist shear, by 12 EI/L², twice as much as stretching, or more: their
 factorised matrix would soon be worth nothing, though no element has changed its shape. A node that turns by
 κ (t·x) − x (t·κ) more, t the direction of the beam, undoes the shear. Forces follow, by the transposed.
 """

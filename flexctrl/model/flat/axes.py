@@ -30,7 +30,7 @@ class Axes:
     angles : Wholes
         Turning degrees of freedom without axes.
     swaying : int
-        How many axes stand within beams so finely divided that their elements resist shear more than stretching.
+        How many axes stand within beams so finely divided that their elements resist shear twice as much as stretching.
     beside : Wholes, (2 count,)
         Of such axes the ones before and after along the beam.
     share : Reals, (count,)
@@ -139,7 +139,7 @@ def _beside(model: Model, of: np.ndarray, count: int) -> tuple[np.ndarray, np.nd
 
 
 def _fine(model: Model, of: np.ndarray) -> list[tuple[int, int, float]]:
-    """Return the axes at both ends of elements that resist shear more than stretching, and their lengths."""
+    """Return the axes at both ends of elements that resist shear twice as much as stretching, and their lengths."""
     place = model.motion.place
     found: list[tuple[int, int, float]] = []
     axes = np.append(of, -1)[np.minimum(place, len(of))]
@@ -149,7 +149,7 @@ def _fine(model: Model, of: np.ndarray) -> list[tuple[int, int, float]]:
             p = dict(zip(PARAMETERS, family.parameters.T, strict=False))
             shear = 2.0 * np.maximum(p["a_y"] + p["b_y"], p["a_z"] + p["b_z"]) / p["L"]
             ends = seen[family.nodes]
-            fine = (shear > p["EA"]) & (ends >= 0).all(axis=1) & (ends[:, 0] != ends[:, 1])
+            fine = (shear > 2.0 * p["EA"]) & (ends >= 0).all(axis=1) & (ends[:, 0] != ends[:, 1])
             found += zip(*ends[fine].T.tolist(), p["L"][fine].tolist(), strict=True)
     return found
 
