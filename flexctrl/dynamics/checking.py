@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from flexctrl.dynamics.agreed import agreed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.answers import jumps
@@ -193,7 +194,7 @@ def _confirmed(
         return told, others
     again, plan = replace(run, checkpoint=told.checkpoint), journey.plan
     length = usual(journey) if isinstance(method.pace, Fixed) else 0.0  # no step of one length goes beyond it
-    finer, finest = _told(again, journey, method.finer(plan.tolerance, length, shorter), beginning)
+    finer, finest = _told(again, journey, method.finer(plan.tolerance, length, shorter), beginning, others)
     if finer.report.error > told.report.error:
         return _as_much(finer, told), (*others, *finest)
     notes = (*told.report.notes, *(note for note in finer.report.notes if note not in run.report.notes))
@@ -208,7 +209,7 @@ def _halved(run: Run, told: Run, other: Other, journey: Journey, method: Checked
     if isinstance(method.pace, Controlled) and not journey.plan.feed.sample_time:
         length = min(length, 2.0 ** round(math.log2(mean)))  # the same when the run goes on
     beside = method.finer(journey.plan.tolerance, length, 0.5)
-    halved, finer = _told(replace(run, checkpoint=told.checkpoint), journey, beside, beginning)
+    halved, finer = _told(replace(run, checkpoint=told.checkpoint), journey, beside, beginning, (other,))
     return (halved, (other, *finer)) if finer else (told, (other,))
 
 
@@ -266,7 +267,7 @@ def _nearer(run: Run, told: Run, other: Other, journey: Journey, nearby: Beside,
     order, parted = run.report.order, told.report.error > PARTED
     feared = told.report.error / (other.beside.longer**order - 1.0) if parted else 0.0
     seen = order if parted else _order(second, other, order)
-    nearer = _said(kept, second, journey, beginning, seen, feared)
+    nearer = _said(kept, second, journey, beginning, seen, feared, (other,))
     alike = nearer.report.error == told.report.error == run.report.drift
     return _as_much(nearer, told) if alike else nearer, (second,)
 
@@ -283,17 +284,26 @@ def _reached(other: Run) -> float:
     return math.inf if other.status is Status.STOPPED else other.final.t
 
 
-def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> _Known:
-    """The run with what one other tells, if there is one."""
+def _told(run: Run, journey: Journey, beside: Beside, beginning: Beginning, known: tuple[Other, ...] = ()) -> _Known:
+    """The run with what one other tells, if there is one, beside others that are known."""
     kept, other = made(run, journey, beside, beginning)
     if other is None:
         return kept, ()
-    return _said(kept, other, journey, beginning, run.report.order), (other,)
+    return _said(kept, other, journey, beginning, run.report.order, known=known), (other,)
 
 
-def _said(run: Run, other: Other, journey: Journey, beginning: Beginning, order: float, feared: float = 0.0) -> Run:
-    """The run with what one other tells, if errors are of an order."""
+def _said(
+    run: Run,
+    other: Other,
+    journey: Journey,
+    beginning: Beginning,
+    order: float,
+    feared: float = 0.0,
+    known: tuple[Other, ...] = (),
+) -> Run:
+    """The run with what one other tells, if errors are of an order; until when it is right others known have a say."""
     if other.run.final.t <= beginning.t:
         return noted(run, f"{UNCHECKED}, which ended at t = {other.run.final.t:.3g} s")
-    told = told_beside(run, other.run, other.gap, journey, other.beside.longer, order, feared)
+    until = agreed(other, known, journey, run.report.order)
+    told = told_beside(run, other.run, other.gap, journey, other.beside.longer, order, feared, until)
     return peaked(told, other.run, journey, other.beside.longer) if other.beside.longer < 1.0 else told

@@ -120,11 +120,14 @@ class Other:
         How far it is from the first: nothing where it has ended at once.
     beside : Beside
         How it was made.
+    whole : Run
+        It from where it began, which may be before the first goes on.
     """
 
     run: Run
     gap: Gap
     beside: Beside
+    whole: Run
 
 
 def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tuple[Run, Other | None]:
@@ -174,11 +177,12 @@ def made(run: Run, journey: Journey, beside: Beside, beginning: Beginning) -> tu
     if not _begins_alike(run, other, journey):
         return noted(run, f"{UNCHECKED}: the controller, asked anew, does not begin alike (keep memory in x)"), None
     reached = end if other.status is Status.STOPPED else min(other.final.t, end)
-    told, other = seen_until(standing(run, other.checkpoint), reached), _since(beginning.t, other)
+    told, whole = seen_until(standing(run, other.checkpoint), reached), other
+    other = _since(beginning.t, whole)
     if other.final.t <= beginning.t:
-        return told, Other(other, Gap.unseen(run), beside)
+        return told, Other(other, Gap.unseen(run), beside, whole)
     try:
-        return told, Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside)
+        return told, Other(other, between(run, other, journey, run.report.steps - beginning.steps), beside, whole)
     except (ArithmeticError, ValueError) as fault:  # numbers of a run that has failed need be none in between
         return noted(told, f"{UNCHECKED}, whose numbers fail ({fault})"), None
 

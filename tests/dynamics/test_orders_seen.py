@@ -59,5 +59,6 @@ def test_the_order_is_that_of_the_gaps(order):
     for longer in (3.0**0.5, 3.0):
         beside = Beside(fc.AdaptiveAlpha(), fc.Tolerance(), longer, "")
         gap = Gap(np.zeros(1), np.array([1e-3 * (longer**order - 1.0)]), "", np.zeros(0))
-        others.append(Other(_finished(), gap, beside))
+        run = _finished()
+        others.append(Other(run, gap, beside, run))
     assert _order(*others, 2.0) == pytest.approx(min(order, 2.0))

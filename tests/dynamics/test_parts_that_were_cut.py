@@ -55,9 +55,11 @@ def cut(monkeypatch):
     return run
 
 
-def test_since_when_a_part_that_was_cut_was_wrong_is_not_told(cut, tmp_path):
-    """It was called right until it was cut, where it had been wrong for long."""
+def test_since_when_a_part_that_was_cut_was_wrong_is_told_by_others(cut, tmp_path):
+    """It was called right until it was cut, where it had been wrong for long; runs beside part before."""
     model = pendulum()
+    once = fc.simulate(model, start=thrown(model), **FAST)
+    right = float(RIGHT.search("; ".join(once.report.notes)).group(1))
     first = cut(model, start=thrown(model), share=0.3, **FAST)
     assert any("not told by another run (interrupted)" in note for note in first.report.notes)
     first.checkpoint.save(tmp_path / "first")
@@ -67,7 +69,8 @@ def test_since_when_a_part_that_was_cut_was_wrong_is_not_told(cut, tmp_path):
     for run in (on, later):
         said = "; ".join(run.report.notes)
         assert run.report.error > 0.2
-        assert f"places were off by more than 3% as it went on at {at}, and nothing tells since when" in said
+        late = f"off by more than 3% as it went on at {at}, as runs beside it are apart by so much since t = "
+        assert 0.3 * right < float(said.partition(late)[2].partition(" s")[0]) < 1.2 * right
         assert f"what was run before {at}, cut off or unchecked, has not been laid beside another run" in said
         assert not RIGHT.search(said)
 
@@ -92,7 +95,23 @@ def test_what_was_right_as_it_went_on_is_so_from_there_on(cut):
     found = re.search(r"right to 3% from t = ([\d.]+) s until t = ([\d.]+) s", said)
     right = float(RIGHT.search("; ".join(once.report.notes)).group(1))
     assert float(found.group(1)) == pytest.approx(first.checkpoint.t, rel=5e-3)
-    assert float(found.group(2)) == pytest.approx(right, abs=0.3)
+    assert 0.8 * right < float(found.group(2)) < right + 0.3
+
+
+@pytest.mark.parametrize("cut_at", [1.25, 2.5, 2.75])
+def test_what_is_near_a_run_beside_by_chance_is_not_right(cut_at):
+    """Of a part that nobody had checked: 14 % off as it went on, it was called right to 3 % from there until 3.04 s."""
+    model, method = pendulum(), fc.ConservingMidpoint(1e-2)
+    how = {"start": thrown(model, 6.5), "every": 0.05}
+    exact = {"method": fc.Unchecked(fc.ExplicitRungeKutta()), "tolerance": fc.Tolerance(0.0, 1e-12)}
+    true = fc.simulate(model, until=3.1, **how, **exact)
+    off = np.abs(fc.simulate(model, until=3.1, method=fc.Unchecked(method), **how).y - true.y).max(axis=1) / 2.0
+    part = fc.simulate(model, until=cut_at, method=fc.Unchecked(method), **how)
+    on = fc.simulate(model, start=part.checkpoint, until=12.0, every=0.05, method=fc.Checked(method))
+    said = "; ".join(on.report.notes)
+    late = r"as it went on at t = [\d.]+ s, as runs beside it are apart by so much since"
+    found = re.search(rf"(right to 3% from t = [\d.]+ s until|{late}) t = ([\d.]+) s", said)
+    assert 1.0 < float(found.group(2)) < true.t[np.argmax(off > 0.03)]
 
 
 def test_a_part_that_needed_none_beside_it_is_no_part_that_was_cut():

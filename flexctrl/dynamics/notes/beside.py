@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -208,7 +209,14 @@ def may_grow(journey: Journey, law: Manner) -> bool:
 
 
 def told_beside(
-    run: Run, coarse: Run, gap: Gap, journey: Journey, longer: float, order: float, feared: float = 0.0
+    run: Run,
+    coarse: Run,
+    gap: Gap,
+    journey: Journey,
+    longer: float,
+    order: float,
+    feared: float = 0.0,
+    agreed: Callable[[float], float] = float,
 ) -> Run:
     """Return a run with what a coarser one tells of its error.
 
@@ -233,6 +241,8 @@ def told_beside(
         p: that of the method, or less, as two runs beside have shown it.
     feared : float
         What one that has parted would leave if errors grew as powers of steps do; 0 if none has.
+    agreed : callable, optional
+        Until when this one and those before it agree with each other: no later than a time [s].
 
     Returns
     -------
@@ -261,7 +271,7 @@ def told_beside(
         notes = tuple(note for note in report.notes if note not in journey.outputs.notes) + outputs.notes + ended
         return replace(run, report=replace(report, output_errors=outputs.shares, notes=notes))
     outputs = by_rows(journey, run.y, gap.outputs / left, error, kind)
-    right = right_until(run, coarse, journey, gap, TOLD * left)
+    right = right_until(run, coarse, journey, gap, TOLD * left, agreed)
     said = (journey.drift.note, journey.bent, *journey.outputs.notes)
     notes = tuple(note for note in report.notes if note not in said)
     notes += tuple({gap.bent or journey.bent} - {""})

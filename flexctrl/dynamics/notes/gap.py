@@ -17,7 +17,7 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["Gap", "between", "gap_at", "interpolated"]
+__all__ = ["Gap", "between", "gap_at", "interpolated", "is_short"]
 
 _POINTS, _FEW = 4, 1500
 _INSTANTS, _FEWER, _GOLDEN = 16, 8, 0.5 * (5.0**0.5 - 1.0)
@@ -74,12 +74,33 @@ def between(run: Run, other: Run, journey: Journey, taken: int) -> Gap:
     -------
     Gap
     """
-    model, kept = journey.plan.model, run.track.stretches and other.track.stretches
+    model = journey.plan.model
     assert isinstance(model, Model)
     instants = _INSTANTS if taken <= _FEW else 0 if placed(model) else _FEWER  # rows of rates tell nothing of places
-    if kept and instants and not journey.plan.feed.sample_time:
+    if instants and _kept(run, other, journey):
         return _of_tracks(run, other, journey, instants)
     return _of_rows(run, other, journey)
+
+
+def _kept(run: Run, other: Run, journey: Journey) -> bool:
+    """Tell whether steps of both are kept, not from sample to sample as what they set out from."""
+    return bool(run.track.stretches and other.track.stretches) and not journey.plan.feed.sample_time
+
+
+def is_short(run: Run, other: Run, journey: Journey) -> bool:
+    """Tell whether two runs can be looked at anywhere: their steps are kept, and few.
+
+    Parameters
+    ----------
+    run, other : Run
+    journey : Journey
+        How the run went that they are beside.
+
+    Returns
+    -------
+    bool
+    """
+    return _kept(run, other, journey) and max(run.report.steps, other.report.steps) <= _FEW
 
 
 def gap_at(run: Run, other: Run, journey: Journey, t: float) -> float:
@@ -110,7 +131,7 @@ def _of_tracks(run: Run, other: Run, journey: Journey, instants: int) -> Gap:
     end = min(run.final.t, other.final.t)
     assert isinstance(model, Model)
     k = np.arange(1, instants)
-    t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / instants, end)
+    t = np.append(begin + (end - begin) * (k + (_GOLDEN * k) % 1.0) / instants, [begin, end] if begin else end)
     t = np.unique(np.append(t, _farthest(run, other, model, (begin, end))))
     pairs = [(run.track.state(s)[0], other.track.state(s)[0]) for s in t]
     apart = np.array([_apart(model, one, other) for one, other in pairs])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
     from flexctrl.dynamics.origin import Origin
 
-__all__ = ["right_until", "said_until", "unseen"]
+__all__ = ["is_after_a_cut", "right_until", "said_until", "unseen"]
 
 _ROUNDS, _PARTS, _LONG = 3, 4, 0.01
 """How often the time between two instants is parted, into how many parts, while it is more than that of the way."""
@@ -23,7 +24,9 @@ _UNSEEN = (
 )
 
 
-def right_until(run: Run, other: Run, journey: Journey, gap: Gap, least: float) -> float:
+def right_until(
+    run: Run, other: Run, journey: Journey, gap: Gap, least: float, agreed: Callable[[float], float] = float
+) -> float:
     """Return until when two runs are apart by no more than so much, and were in the parts before.
 
     Parameters
@@ -35,12 +38,14 @@ def right_until(run: Run, other: Run, journey: Journey, gap: Gap, least: float) 
         How far they are apart.
     least : float
         Of the motion.
+    agreed : callable, optional
+        Until when runs beside agree, of which this one is one: no later than a time.
 
     Returns
     -------
     float
-        Infinity if they are at the end. Where they were farther apart as the run went on already, until when it was
-        seen that they were not [s].
+        Infinity if they are at the end. Where they were farther apart as the run went on already, until when runs
+        beside agreed before; if that tells nothing, until when it was seen that they were not [s].
     """
     wrong, origin = gap.size > least, journey.origin
     if not wrong.any():
@@ -48,9 +53,24 @@ def right_until(run: Run, other: Run, journey: Journey, gap: Gap, least: float) 
     first = int(np.argmax(wrong))
     low, high = ([journey.begin, *gap.t.tolist()][k] for k in (first, first + 1))
     right = _narrowed(run, other, journey, (low, high), least)
-    if right <= journey.begin == origin.unseen[1] > 0.0:
-        right = origin.unseen[0]
-    return min(origin.right, right)
+    sooner = agreed(right)
+    if sooner == right <= journey.begin and is_after_a_cut(journey):
+        sooner = origin.unseen[0]
+    return min(origin.right, sooner)
+
+
+def is_after_a_cut(journey: Journey) -> bool:
+    """Tell whether a run goes on from a part that others have not been laid beside.
+
+    Parameters
+    ----------
+    journey : Journey
+
+    Returns
+    -------
+    bool
+    """
+    return journey.begin == journey.origin.unseen[1] > 0.0
 
 
 def _narrowed(run: Run, other: Run, journey: Journey, within: tuple[float, float], least: float) -> float:
@@ -93,7 +113,10 @@ def said_until(origin: Origin, right: float, share: str) -> str:
         return f"places are right to {share} {since}until t = {right:.3g} s"
     if right < begin:
         return f"places are right to {share} until t = {right:.3g} s"
-    return f"places were off by more than {share} as it went on at t = {end:.3g} s, and nothing tells since when"
+    went_on = f"places may have been off by more than {share} as it went on at t = {end:.3g} s"
+    if right == begin:
+        return f"{went_on}, and nothing tells since when"
+    return f"{went_on}, as runs beside it are apart by so much since t = {right:.3g} s"
 
 
 def unseen(journey: Journey) -> tuple[str, ...]:
