@@ -65,3 +65,29 @@ def test_fixed_steps_do_as_well(inertia, method):
     (light, exact), (heavy, _) = (hoisted(0.05, 5.0, inertia=j, method=method) for j in (1e4, inertia))
     assert heavy.status is fc.Status.FINISHED
     assert abs(heavy["sway"][-1] - exact) <= abs(light["sway"][-1] - exact) + 1e-4
+
+
+def beside_a_crane(way):
+    """A mass on a spring of 20 rad/s that swings by ±way, a kilometre from a boom of that length that hangs."""
+    mass, spring = fc.PointMass("mass", (1, 0, 0), 1.0), fc.Spring("spring", (0, 0, 0), (1, 0, 0), stiffness=400.0)
+    ends = {"top": (1e3, 0, 0), "end": (1e3, 0, -1e3)}
+    boom = fc.RigidBody("boom", (1e3, 0, -500), 1e3, (1e8,) * 3, ends)
+    joints = [fc.Support(boom.point("top"), "u v w rx rz"), fc.Support(spring.start), fc.Pin(spring.end, mass.node)]
+    outputs = [fc.Position("x", mass.node, "x"), fc.Position("far", boom.point("end"), "x")]
+    plan = fc.Structure([mass, spring, boom], [*joints, fc.Support(mass.node, "v w")], outputs=outputs)
+    model = fc.assemble(plan, [fc.LargeRotation(), fc.Gravity()])
+    speed = [20.0 * way if name.startswith("mass") else 0.05 for name in model.coordinates]
+    return model, model.rest.with_(v=np.array(speed))
+
+
+@pytest.mark.parametrize("way", [1e-4, 1e-5, 1e-7])
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(0.02), fc.ConservingMidpoint(0.02)])
+def test_what_moves_by_little_beside_what_is_large_is_told_of(way, method):
+    """It moved by less than a ten-millionth of the machine, which is one of a kilometre: it was left out."""
+    model, start = beside_a_crane(way)
+    run = fc.simulate(model, until=2.0, every=0.01, start=start, method=method)
+    off = np.abs(run["x"] - 1.0 - way * np.sin(20.0 * run.t)).max() / np.ptp(run["x"])
+    assert off > 0.2
+    assert run.report.output_errors["x"] > 0.1
+    assert any(note.startswith("x has moved by") for note in run.report.notes)
+    assert run.report.output_errors["far"] < 1e-3

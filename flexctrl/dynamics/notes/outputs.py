@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reach", "seen", "told_from", "ways"]
 
-_TOLD, _SEEN, _BESIDE = 0.05, 1.0, 2.0
+_TOLD, _BESIDE = 0.05, 2.0
 _ROUND_OFF = 1e-12
 """Of what outputs are where nodes move by sizes and radians: less is the last digits of places."""
 _NAMED = 3
@@ -176,15 +176,15 @@ def reach(journey: Journey) -> sp.csr_matrix:
 
 
 def seen(journey: Journey, y: np.ndarray) -> tuple[np.ndarray, list[int]]:
-    """Return how far outputs go, and which are places or angles that go farther than absolute tolerances."""
+    """Return how far outputs go, and which are places or angles that go farther than their last digits."""
     return _seen(journey, y, reach(journey))
 
 
 def _seen(journey: Journey, y: np.ndarray, sight: sp.csr_matrix) -> tuple[np.ndarray, list[int]]:
-    model, tolerance = journey.plan.model, journey.plan.tolerance
+    model = journey.plan.model
     assert isinstance(model, Model)
     yards = yardsticks(model)
-    least = _SEEN * max(tolerance.negligible, _ROUND_OFF) * (sight @ np.where(np.isfinite(yards), yards, 0.0))
+    least = _ROUND_OFF * (sight @ np.where(np.isfinite(yards), yards, 0.0))
     # what no freedom moves has last digits all the same: freedoms turn the coupler of a parallelogram by nothing
     least = np.maximum(least, _ROUND_OFF * output_yardsticks(model, journey.mark.size))
     way = ways(journey, y)
