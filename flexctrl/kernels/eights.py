@@ -42,8 +42,8 @@ def ahead(x: np.ndarray) -> None:
 
 
 def larger(a: Eight, b: Eight) -> Eight:
-    """Return the larger of two, entry by entry; NaN counts as less, and symbols as beyond all."""
-    return np.fmax(a, b) if a.dtype != object else np.full(a.shape, np.inf, dtype=object)
+    """Return the larger of two, entry by entry; NaN in the second counts as less, and symbols as beyond all."""
+    return np.where(b > a, b, a) if a.dtype != object else np.full(a.shape, np.inf, dtype=object)
 
 
 def largest(a: Eight) -> float:

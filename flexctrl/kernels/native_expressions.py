@@ -297,7 +297,9 @@ class Expressions:
             less = self._value("Eight", f"fneg {EIGHT} {product.text}").text
             return self._value("Eight", f"call {EIGHT} @llvm.fma.v8f64({EIGHT} {one}, {EIGHT} {other}, {EIGHT} {less})")
         if name == "larger":
-            return self._value("Eight", f"call {EIGHT} @llvm.maxnum.v8f64({EIGHT} {a}, {EIGHT} {arguments[1].text})")
+            b = arguments[1].text
+            more = self._value("bool", f"fcmp ogt {EIGHT} {b}, {a}").text  # one instruction with what follows
+            return self._value("Eight", f"select <8 x i1> {more}, {EIGHT} {b}, {EIGHT} {a}")
         if name == "largest":
             return self._value("float", f"call double @llvm.vector.reduce.fmax.v8f64({EIGHT} {a})")
         return self._value("float", f"call reassoc double @llvm.vector.reduce.fadd.v8f64(double 0.0, {EIGHT} {a})")

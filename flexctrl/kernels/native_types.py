@@ -75,7 +75,6 @@ ZERO = {"i64": "0", "double": "0.0", "i1": "false", "void": "", "ptr": "null", E
 DECLARATIONS = (
     *(f"declare double @llvm.{n}.f64({'double, double' if n == 'copysign' else 'double'})" for n in INTRINSICS),
     f"declare {EIGHT} @llvm.fabs.v8f64({EIGHT})",
-    f"declare {EIGHT} @llvm.maxnum.v8f64({EIGHT}, {EIGHT})",
     f"declare {EIGHT} @llvm.fma.v8f64({EIGHT}, {EIGHT}, {EIGHT})",
     "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)",
     f"declare double @llvm.vector.reduce.fmax.v8f64({EIGHT})",

@@ -52,7 +52,7 @@ def accept(m: March) -> None:
         square = square + told * told
         reach = larger(eight(m.reach[i:]), abs(eight(f.q[i:]) - eight(m.first[i:])))
         way = reach * eight(m.weight[i:])
-        far = larger(far, zero - larger(zero - way, zero - one))  # no more than 1, whatever it was before
+        far = larger(far, zero - larger(zero - one, zero - way))  # no more than 1, whatever it was before
         put(m.reach[i:], reach)
         put(m.trend[i:], change)
         put(m.algorithmic[i:], blended(m, rate, eight(m.rate[i:]), eight(m.algorithmic[i:])))
