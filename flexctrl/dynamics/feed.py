@@ -15,7 +15,7 @@ from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.piecewise import ROUND_OFF
 from flexctrl.dynamics.law_state import error, softened, trapezoidal
 from flexctrl.dynamics.run import Tolerance
-from flexctrl.dynamics.said import CommandError, blamed, reals, state_of
+from flexctrl.dynamics.said import FAULTS, CommandError, blamed, reals, state_of
 from flexctrl.errors import ControllerError
 from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import FLOAT, Compiled
@@ -184,7 +184,7 @@ class Feed:
             return Supply(self.base, np.zeros(0), np.zeros(0))
         try:
             x = state_of(self.controller, self.controller.initial(), "initial state")
-        except Exception as error:
+        except FAULTS as error:
             raise blamed(error, state.t)  # noqa: B904 - its cause is set
         return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self.evaluate(state, x)
 
@@ -201,12 +201,12 @@ class Feed:
         """Return the inputs from a sample instant on, and the controller's state."""
         c = self.controller
         assert c is not None
-        if self._asked is not None and (said := self._said(self._asked, t, x, y)) is not None:
-            return said
         try:
+            if self._asked is not None and (said := self._said(self._asked, t, x, y)) is not None:
+                return said
             u = self._total(c.command(t, x, y))
             return u, state_of(c, c.update(t, x, y), "update", x.size) if x.size else x
-        except Exception as error:
+        except FAULTS as error:
             raise blamed(error, t)  # noqa: B904 - its cause is set
 
     def restart(self, state: State, supply: Supply) -> Supply:
@@ -237,7 +237,7 @@ class Feed:
         try:
             rate = state_of(c, c.rate(t, x, y), "rate", x.size) if x.size else x
             return self._total(c.command(t, x, y)), rate
-        except Exception as error:
+        except FAULTS as error:
             raise blamed(error, t)  # noqa: B904 - its cause is set
 
     def within(self, state: State, x: np.ndarray) -> Supply:
@@ -296,7 +296,7 @@ class Feed:
                 return Supply(np.array(self._total(c.command(t, before.x, y))), before.x, before.x)
             x, rate = trapezoidal(c, t, y, (before.x, before.rate), h)
             return Supply(np.array(self._total(c.command(t, x, y))), x, rate).after(before, h)
-        except Exception as error:
+        except FAULTS as error:
             raise blamed(error, t)  # noqa: B904 - its cause is set
 
     def gains(self, state: State, supply: Supply, h: float, seeds: tuple[float, float, float]) -> np.ndarray:
@@ -336,7 +336,7 @@ class Feed:
 
         try:
             return error(before, after, (state.t, h), tolerance, soften)
-        except Exception as fault:
+        except FAULTS as fault:
             raise blamed(fault, state.t)  # noqa: B904 - its cause is set
 
     def _gain(self, state: State, supply: Supply, h: float) -> np.ndarray:

@@ -35,6 +35,7 @@ from flexctrl.dynamics.records.rows import Rows
 from flexctrl.dynamics.records.tensions import Interval
 from flexctrl.dynamics.renewing import renew
 from flexctrl.dynamics.run import Status, Tolerance
+from flexctrl.dynamics.said import FAULTS
 from flexctrl.dynamics.steps import (
     Brief,
     Counts,
@@ -258,7 +259,7 @@ class Journey:
     def _tell_progress(self) -> None:
         try:
             self.plan.tell(self.point.state.t / self.plan.until)
-        except Exception as error:
+        except FAULTS as error:
             raise Unwritten(f"progress raised {type(error).__name__}: {error}") from error
 
     def _judge(self) -> None:

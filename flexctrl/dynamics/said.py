@@ -11,7 +11,10 @@ from flexctrl.design.controller import Controller
 from flexctrl.errors import ControllerError, shortened
 from flexctrl.kernels.kernel import FLOAT
 
-__all__ = ["CommandError", "blamed", "reals", "state_of"]
+__all__ = ["FAULTS", "CommandError", "blamed", "reals", "state_of"]
+
+FAULTS = (Exception, SystemExit)
+"""What a law, an event or ``progress`` may raise to end a run that keeps what it has: by `sys.exit`, too."""
 
 _TEXTS = "SU"
 """Kinds of numpy's types that it would read numbers out of."""
@@ -21,12 +24,12 @@ class CommandError(ControllerError):
     """A controller says what is no finite number, or raises an exception: that is its cause."""
 
 
-def blamed(error: Exception, t: float) -> ControllerError:
+def blamed(error: Exception | SystemExit, t: float) -> ControllerError:
     """Return what a run says of an exception in a controller.
 
     Parameters
     ----------
-    error : Exception
+    error : Exception or SystemExit
     t : float
         When the controller was asked [s].
 
@@ -34,8 +37,8 @@ def blamed(error: Exception, t: float) -> ControllerError:
     -------
     ControllerError
     """
-    found = error
-    if not isinstance(found, ControllerError):
+    found = error if isinstance(error, ControllerError) else None
+    if found is None:
         found = CommandError(f"the controller raised {type(error).__name__}: {error}")
         found.__cause__ = error
     found.asked = t

@@ -103,9 +103,10 @@ def simulate(
     Returns
     -------
     Run
-        Whatever happens once it has begun: a step that fails, an exception in the controller, a full disk and Ctrl-C
-        end the run with their status, and all that was computed until then. So does Ctrl-C while the controller is
-        asked for the first time: the run stands at its start.
+        Whatever happens once it has begun: a step that fails, an exception in the controller (`sys.exit` there, too: it
+        ends the run, not the program, until ``raise run.fault``), a full disk and Ctrl-C end the run with their status,
+        and all that was computed until then. So does Ctrl-C while the controller is asked for the first time: the run
+        stands at its start.
 
     Raises
     ------

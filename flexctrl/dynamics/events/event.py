@@ -9,6 +9,7 @@ from enum import Enum
 
 import numpy as np
 
+from flexctrl.dynamics.said import FAULTS
 from flexctrl.errors import StructureError
 from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_finite
@@ -118,7 +119,7 @@ class Event:
         try:
             given = self.of(signals)
             found = math.nan if _is_answer(given) else float(given)
-        except Exception as error:
+        except FAULTS as error:
             raise EventError(f"event {self.name!r}: its function raised {type(error).__name__}: {error}") from error
         if _is_answer(given):
             raise EventError(

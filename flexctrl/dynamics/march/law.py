@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.feed import Feed
+from flexctrl.dynamics.said import FAULTS
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Reals, Runs, Wholes
 from flexctrl.model.flat.flat import clear
@@ -162,7 +163,7 @@ class Sampling:
         assert found is not None
         try:
             rows = found.samples(passed + 1, count, self.law.period)
-        except (Exception, KeyboardInterrupt):
+        except (*FAULTS, KeyboardInterrupt):
             rows = _until_one_fails(found, np.arange(passed + 1, passed + 1 + count) * self.law.period)
         self.law.table[: rows.size] = rows.ravel()
         return passed, len(rows)
@@ -174,7 +175,7 @@ def _until_one_fails(found: Lowered, times: np.ndarray) -> np.ndarray:
     for t in times.tolist():
         try:
             rows.append(found.now(t))
-        except (Exception, KeyboardInterrupt):
+        except (*FAULTS, KeyboardInterrupt):
             break
     return np.array(rows).reshape(-1, len(found.clocks))
 
