@@ -17,6 +17,10 @@ __all__ = ["Controller", "IOSystemController", "LinearController", "as_controlle
 
 
 _VALUES, _METHODS = ("inputs", "outputs", "sample_time"), ("initial", "command", "rate", "update")
+_WRITTEN = {
+    "initial": "def initial(self): return np.zeros(0)",
+    "command": "def command(self, t, x, y): return …",
+}
 
 
 @runtime_checkable
@@ -373,6 +377,11 @@ def _from_object(candidate: Any) -> Controller:
     missing = [name for name in ("inputs", "outputs", "initial", "command") if name not in told]
     if missing and hasattr(candidate, "build"):
         raise ControllerError(f"a {type(candidate).__name__} is no controller yet; give the scene's law, scene.law")
+    if values := [name for name in missing if hasattr(candidate, name)]:
+        raise ControllerError(
+            f"controller {type(candidate).__name__}: its {values[0]} is {shortened(getattr(candidate, values[0]))}, no "
+            f"method; write it as one: {_WRITTEN[values[0]]}"
+        )
     if missing:
         raise ControllerError(
             f"a {type(candidate).__name__} is no controller, it has no {', '.join(missing)}; give a named "

@@ -13,6 +13,7 @@ from flexctrl.errors import EquilibriumError, LinearizationError, MechanismError
 from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
 from flexctrl.model.consistent import admitted, off_rails
+from flexctrl.model.holding import coordinate_held
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import bent, displaced_beyond, overturned
 from flexctrl.model.places import wandered
@@ -56,6 +57,18 @@ class Rest:
     model: Model = field(repr=False)
     held: tuple[str, ...] = ()
     brakes: tuple[tuple[str, float], ...] = ()
+
+    @cached_property
+    def holding(self) -> dict[str, float]:
+        """The forces that hold what is held, by the names in ``held`` [N or N m].
+
+        An input that acts on it alone bears it by as much: a motor's torque what holds ``<drive>_source``.
+        """
+        from flexctrl.model.braked import bearing  # which makes such equilibria
+
+        numbers = {name: self.model.coordinate(name) for name in self.held if name in self.model.coordinates}
+        force = Balance(bearing(self), self.inputs).whole_force(self.state.loose)
+        return {name: -float(force[i]) for name, i in numbers.items()} | dict(self.brakes)
 
     @cached_property
     def unstable(self) -> int:
@@ -207,7 +220,8 @@ def _held(model: Model, hold: Mapping[str, float]) -> dict[int, float]:
     if not isinstance(hold, Mapping):
         raise StructureError(f"equilibrium: hold = {shortened(hold)}; expected displacements by name of coordinate")
     return {
-        model.coordinate(name): check_finite(value, f"hold {name!r}", "equilibrium") for name, value in hold.items()
+        coordinate_held(model, name): check_finite(value, f"hold {name!r}", "equilibrium")
+        for name, value in hold.items()
     }
 
 

@@ -11,7 +11,10 @@ from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS
 from flexctrl.structure.naming import node_of
 from flexctrl.structure.structure import Structure
 
-__all__ = ["check_free", "own_coordinate", "raw_place"]
+__all__ = ["check_free", "coordinate_held", "own_coordinate", "raw_place"]
+
+_FEW = 10
+"""As many names are told."""
 
 
 def own_coordinate(model: Model, name: str) -> str:
@@ -30,6 +33,40 @@ def own_coordinate(model: Model, name: str) -> str:
         return name if name in model.coordinates else ""
     number = int(model.motion.place[_cell(model.structure, name)])
     return model.coordinates[number] if number < model.n else ""
+
+
+def coordinate_held(model: Model, name: str) -> int:
+    """Return the number of a coordinate that is to be held.
+
+    Parameters
+    ----------
+    model : Model
+    name : str
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    StructureError
+        For what is none: where the machine has such a freedom, with what can be held here, and what holds it elsewhere.
+    """
+    if not isinstance(name, str) or name in model.coordinates:
+        return model.coordinate(name)
+    try:
+        own, there = own_coordinate(model, name), raw_place(model, name) >= 0
+    except StructureError:
+        own, there = "", False
+    if own:
+        raise StructureError(f"hold {name!r}: name it as this model does, {own!r}")
+    if not there:
+        return model.coordinate(name)
+    here = ", ".join(model.coordinates[:_FEW]) + " …" * (model.n > _FEW)
+    raise StructureError(
+        f"hold {name!r}: no coordinate of this model, in which it follows from others or stands still, as what is "
+        f"between is rigid; what can be held here: {here or 'nothing'}. Scene(…, hold=…) holds it in every model"
+    )
 
 
 def check_free(model: Model, name: str) -> None:

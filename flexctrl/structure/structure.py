@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.frozen import frozen
 from flexctrl.structure.bodies import PointMass, RigidBody
+from flexctrl.structure.chains import BeamChain
 from flexctrl.structure.drives import Drive, LinearDrive
 from flexctrl.structure.elements import Part
 from flexctrl.structure.freedoms import FREEDOMS, TRAVEL, check_name, listed, parse_direction
@@ -276,13 +277,15 @@ def _typed(items: Iterable, kinds: object, what: str) -> tuple:
     allowed = kinds.__args__  # type: ignore[attr-defined]
     for item in found:
         if not isinstance(item, allowed):
-            names = ", ".join(k.__name__ for k in allowed)
+            names = ", ".join(k.__name__ for k in (*allowed, *[Trolley] * (PointMass in allowed)))
             raise StructureError(f"Structure: {shortened(item)} among {what}; expected one of {names}{_belongs(item)}")
     return found
 
 
 def _belongs(item: object) -> str:
     """Where what stands in a wrong list belongs."""
+    if isinstance(item, BeamChain):
+        return f"; of a chain put *{item.name}.beams among elements and *{item.name}.welds among joints"
     lists = {"elements": Part, "joints": Joint, "drives": Drive, "inputs": Input, "outputs": Output}
     right = [what for what, kinds in lists.items() if isinstance(item, kinds)]
     return f"; put a {type(item).__name__} among {right[0]}" if right else ""

@@ -165,6 +165,24 @@ def test_own_controller_lacking_the_method_its_time_base_needs():
         as_controller(Unset())
 
 
+@pytest.mark.parametrize(
+    ("name", "given", "message"),
+    [
+        (
+            "initial",
+            np.zeros(2),
+            r"Integrating: its initial is array\(.*no method; .*: def initial\(self\): return np.z",
+        ),
+        ("command", 3.0, r"its command is 3.0, no method; write it as one: def command\(self, t, x, y\)"),
+    ],
+)
+def test_a_value_where_a_method_is_asked_for_is_told(name, given, message):
+    law = Integrating()
+    setattr(law, name, given)
+    with pytest.raises(ControllerError, match=message):
+        as_controller(law)
+
+
 def test_a_method_that_is_not_needed_may_be_none():
     class Unset(Integrating):
         sample_time, update = 0.0, None

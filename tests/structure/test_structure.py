@@ -12,6 +12,7 @@ from flexctrl.errors import StructureError
 SECTION = fc.Section(EA=2e5, EI_y=157, EI_z=157, GJ=157, rhoA=1.0, rhoJ=1e-4)
 A = fc.Beam("a", (0, 0, 0), (1, 0, 0), SECTION)
 B = fc.Beam("b", (1, 0, 0), (2, 0, 0), SECTION, elements=2)
+RING = fc.BeamChain("ring", [(0, 0, 0), (1, 0, 0), (1, 1, 0)], SECTION)
 ROPE = fc.Rope("rope", (1, 0, 0), (1, 0, -1), EA=1e3)
 LOAD = fc.PointMass("load", (1, 0, -1), 5.0)
 BODY = fc.RigidBody("body", (1, 0, 0.5), 5.0, (1, 1, 1), {"foot": (1, 0, 0), "head": (1, 0, 1)})
@@ -160,7 +161,9 @@ def test_the_node_of_an_equal_part_is_as_good():
         ([A, CLAMP], [], {}, "among elements; expected one of .*; put a Support among joints"),
         ([A], [fc.Weld(A.end, B.start)], {}, "'structure'; add b to its elements"),
         ([A], [A], {}, "among joints; expected one of Support, Weld, Pin, Hinge, Slide"),
-        ([SECTION], [], {}, "among elements; expected one of Beam"),
+        ([SECTION], [], {}, "among elements; expected one of Beam, Rope, Spring, PointMass, RigidBody, Trolley$"),
+        ([RING], [], {}, r"put \*ring.beams among elements and \*ring.welds among joints"),
+        (RING.beams, [RING], {}, r"put \*ring.beams among elements and \*ring.welds among joints"),
         (A, [], {}, "Structure: elements = .*; expected a list"),
         ([A], CLAMP, {}, "Structure: joints = .*; expected a list"),
         ("abc", [], {}, "elements = 'abc'; expected a list"),

@@ -21,6 +21,7 @@ from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
 from flexctrl.model.eased import Eased, eased
 from flexctrl.model.equilibrium import Rest, equilibrium
+from flexctrl.model.holding import coordinate_held
 from flexctrl.model.model import Model
 from flexctrl.model.overturned import overturned
 from flexctrl.model.paths.course import Course, Direction, Station
@@ -216,7 +217,7 @@ def equilibrium_path(
     if not pushed.any():
         raise StructureError("equilibrium_path: the load is nothing; name an input, e.g. load={'push': 1.0}")
     goals = _goals(model, until)
-    held = {model.coordinate(name): check_finite(value, name, "hold") for name, value in (hold or {}).items()}
+    held = {coordinate_held(model, name): check_finite(value, name, "hold") for name, value in (hold or {}).items()}
     count = check_whole(most, "most", "equilibrium_path", least=2)
     balance = Balance(model, model.input_vector(inputs or {}), held)
     try:
