@@ -81,7 +81,8 @@ def _certified(c: Certificate) -> list[tuple[str, str, str]]:
 def _in_words(name: str, c: Certificate) -> list[str]:
     lines = [f"{name}: rigid-body modes: {'; '.join(c.rigid_modes)}"] if c.rigid_modes else []
     lines += [f"{name}: loads without a potential: {', '.join(c.loads)}"] if c.loads else []
-    return lines + ([f"{name}: constant forces on {', '.join(c.held)}"] if c.held else [])
+    lines += [f"{name}: constant forces on {', '.join(c.held)}"] if c.held else []
+    return lines + [f"{name}: {note}" for note in c.notes]
 
 
 def _references(told: Mapping[str, Mapping[str, Any]]) -> str:

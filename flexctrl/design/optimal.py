@@ -267,8 +267,14 @@ def _reason(equation: _Riccati, plant: Any, blame: tuple[str, str]) -> str:
         for complaint, fails in zip(blame, tests, strict=True):
             if fails(pole):
                 name = plant.state_labels[int(np.argmax(np.abs(shape)))]
-                return f"{complaint} the mode at {pole:.4g} (mostly state {name!r})"
+                return f"{complaint} the mode at {pole:.4g} (mostly state {name!r}){_unfelt(plant)}"
     return "check the scaling of the model and of the weights"
+
+
+def _unfelt(plant: Any) -> str:
+    """What is to be said of inputs that no state feels."""
+    names = ", ".join(name for name, column in zip(plant.input_labels, plant.B.T, strict=True) if not column.any())
+    return f"; no state feels {names}: was all that it acts on held in the equilibrium?" if names else ""
 
 
 def _beyond(poles: np.ndarray, sampled: bool) -> np.ndarray:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from flexctrl.frozen import frozen
 
 
@@ -35,6 +38,9 @@ class Certificate:
     held : tuple of str
         What the equilibrium held and the model has let go of: the forces that held it, constant, are part of the
         equilibrium, and no inputs.
+    idle : tuple of str
+        Inputs that do nothing here: all that they act on is held. To let go of it linearise about ``rest.state`` under
+        inputs that bear what `Rest.holding` tells.
     """
 
     residual: float
@@ -48,6 +54,30 @@ class Certificate:
     gyroscopic: float = 0.0
     frequency_error: float = 0.0
     held: tuple[str, ...] = ()
+    idle: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of inputs."""
+        if not self.idle:
+            return ()
+        return (
+            f"inputs without effect, as all that they act on is held: {', '.join(self.idle)}; "
+            "linearize(model, at=rest.state, inputs=…) lets go of it, under inputs that bear what rest.holding tells",
+        )
+
+    def heard(self, inputs: Sequence[str]) -> Certificate:
+        """Return it for some of the inputs.
+
+        Parameters
+        ----------
+        inputs : sequence of str
+
+        Returns
+        -------
+        Certificate
+        """
+        return replace(self, idle=tuple(name for name in self.idle if name in inputs))
 
     def __str__(self) -> str:
         rigid = "; ".join(self.rigid_modes) or "none"
@@ -59,5 +89,5 @@ class Certificate:
             f"smallest pivot of M {self.definiteness:.1e}, Taylor slope {self.taylor_slope:.2f}, "
             f"condition of M {self.condition_mass:.1e}, of K {self.condition_stiffness:.1e}{turning}, "
             f"lowest frequencies within {self.frequency_error:.1e}; "
-            f"rigid-body modes: {rigid}"
+            f"{'; '.join((f'rigid-body modes: {rigid}', *self.notes))}"
         )

@@ -115,14 +115,16 @@ class LinearModel:
         """
         u = _indices(self.inputs if inputs is None else inputs, self.inputs, "input")
         y = _indices(self.outputs if outputs is None else outputs, self.outputs, "output")
+        kept = tuple(self.inputs[i] for i in u)
         return replace(
             self,
             B=self.B[:, u],
             Cq=self.Cq[y],
             Cv=self.Cv[y],
             D=self.D[np.ix_(y, u)],
-            inputs=tuple(self.inputs[i] for i in u),
+            inputs=kept,
             outputs=tuple(self.outputs[i] for i in y),
+            certificate=self.certificate and self.certificate.heard(kept),
         )
 
     def projected(

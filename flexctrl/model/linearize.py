@@ -48,11 +48,12 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     Returns
     -------
     LinearModel
-        In the order of ``model.coordinates``; inputs and outputs are deviations. Its ``certificate``
-        tells why it can be trusted. What a `Rest` holds is held. Where the shaft of a drive is so stiff that K would
-        hold nothing of what it drives, the coordinate ``<drive>_twist``, θ_d − R s, stands in place of the motor's
-        angle ``<drive>_source``; of a motor that is held, or far heavier than what it drives, in place of a coordinate
-        of what it drives.
+        In the order of ``model.coordinates``; inputs and outputs are deviations. Its ``certificate`` tells why it can
+        be trusted. What a `Rest` holds is held, and the certificate tells which inputs do nothing by that;
+        ``at=rest.state`` under inputs that bear what ``rest.holding`` tells lets go of it. Where the shaft of a drive
+        is so stiff that K would hold nothing of what it drives, the coordinate ``<drive>_twist``, θ_d − R s, stands in
+        place of the motor's angle ``<drive>_source``; of a motor that is held, or far heavier than what it drives, in
+        place of a coordinate of what it drives.
 
     Raises
     ------
@@ -103,8 +104,28 @@ def _about(balance: Balance, state: State) -> LinearModel:
     loads = without_energy(model, balance.u)
     linear, asymmetry = _derivative(balance, state, bool(loads))
     slope = taylor_slope(_push(balance, state), linear.K, balance.unit[free])
+    idle = _idle(linear, balance, state)
     linear = with_twists(linear, balance, state)
-    return linear.certified(certify(linear, residual, asymmetry, slope, loads, model.motion, state))
+    found = certify(linear, residual, asymmetry, slope, loads, model.motion, state)
+    return linear.certified(replace(found, idle=idle))
+
+
+def _idle(linear: LinearModel, balance: Balance, state: State) -> tuple[str, ...]:
+    """Inputs that act on what is held, and on nothing else, if not by way of a motor's lag."""
+    model, lever = balance.model, balance.lever[:, None]
+    whole = model.motion.jacobian(model.place(state)).T @ model.reach(state, balance.u)
+    felt = np.abs(whole.toarray() / lever).max(axis=0, initial=0.0)
+    moved = np.abs(linear.B / lever[balance.free])
+    moved[_pushing_nothing(linear, np.isin(balance.free, model.motion.inner))] = 0.0
+    left = moved.max(axis=0, initial=0.0)
+    return tuple(linear.inputs[i] for i in np.flatnonzero((felt > 0.0) & (left <= _ROUND_OFF * felt)))
+
+
+def _pushing_nothing(linear: LinearModel, inner: np.ndarray) -> np.ndarray:
+    """Which of the inner coordinates nothing feels or reads but inner ones."""
+    feel = abs(linear.M) + abs(linear.C) + abs(linear.K)
+    read = np.abs(linear.Cq).sum(axis=0) + np.abs(linear.Cv).sum(axis=0)
+    return inner & (np.asarray(feel[~inner].sum(axis=0)).ravel() + read == 0.0)
 
 
 def all_free(linear: LinearModel, rest: Rest) -> LinearModel:

@@ -1,0 +1,67 @@
+"""Inputs that nothing feels, and inputs that come twice: with the equilibrium that a run begins in, and by a law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from flexctrl.dynamics.linear_motion.plant import LinearPlant
+from flexctrl.model.equilibrium import Rest
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.journey import Journey
+
+__all__ = ["twice", "unfelt"]
+
+_ALIKE = 0.2
+"""A law of deviations commands next to nothing at rest, one that bears a load by itself about all of it."""
+
+
+def unfelt(journey: Journey) -> tuple[str, ...]:
+    """Return what is to be said of inputs of a linear model that are in force and act on nothing but what is held.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    tuple of str
+    """
+    plan = journey.plan
+    if not isinstance(plan.model, LinearPlant) or plan.model.linear.certificate is None:
+        return ()
+    feed, names = plan.feed, plan.model.inputs
+    commanded = () if feed.controller is None else feed.writes
+    used = [name for i, name in enumerate(names) if feed.base[i] or i in commanded]
+    return plan.model.linear.certificate.heard(used).notes
+
+
+def twice(journey: Journey, start: object, inputs: Mapping[str, float] | None) -> tuple[str, ...]:
+    """Return what is to be said of a law that commands at the start about what the equilibrium there brings along.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+    start : object
+        Where it began.
+    inputs : mapping of str to float or None
+        What was given in place of what an equilibrium brings.
+
+    Returns
+    -------
+    tuple of str
+    """
+    feed, u = journey.plan.feed, journey.origin.u
+    if not isinstance(start, Rest) or inputs is not None or feed.controller is None or not u.size:
+        return ()
+    brought, named = feed.base, journey.plan.model.inputs
+    found = [i for i in feed.writes if brought[i] and abs(u[i] - 2.0 * brought[i]) <= _ALIKE * abs(brought[i])]
+    return tuple(
+        f"{named[i]}: the equilibrium that it starts from brings {brought[i]:.5g} along and the controller commands "
+        f"{u[i] - brought[i]:.5g} at the start, so {u[i]:.5g} act; if the controller is to give all of it, "
+        "start=rest.state"
+        for i in found
+    )
