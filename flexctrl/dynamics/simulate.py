@@ -24,6 +24,7 @@ from flexctrl.dynamics.methods.checked import Checked, checked
 from flexctrl.dynamics.misreading import misread
 from flexctrl.dynamics.notes.answers import Manner, answers
 from flexctrl.dynamics.notes.beside import can_be_told, is_cut, may_grow, shorter
+from flexctrl.dynamics.notes.commands import twice
 from flexctrl.dynamics.notes.heeded import heeded
 from flexctrl.dynamics.notes.leaving import leaves
 from flexctrl.dynamics.notes.rates import are_asked, said_of_rates
@@ -75,7 +76,9 @@ def simulate(
     until : float
         End [s].
     start : State, Rest or Checkpoint, optional
-        Where to begin; default: the shape as drawn, at rest. A `Rest` brings its constant inputs along. The clock of
+        Where to begin; default: the shape as drawn, at rest. A `Rest` brings its constant inputs along, to which the
+        controller's commands add: those of a law of deviations belong there, a law that bears the load by itself begins
+        in ``rest.state`` (a note tells where a load seems to be borne twice). The clock of
         a run from these begins at 0, whatever the ``t`` of the state; only a `Checkpoint` brings its time along. From a
         `Checkpoint` the run goes on as if it had not been stopped, bit for bit; model, controller, method,
         tolerance, events and ``every`` must be those of the run it was taken from; an event may become ``terminal``, or
@@ -152,7 +155,8 @@ def simulate(
         began = time.thread_time()
         journey, run = travelled(plan, start, events_of(events), record, spacing)
         beginning = replace(beginning, cost=time.thread_time() - began) if beginning else None
-        looked, cut = run, False
+        looked = run = noted(run, *twice(journey, start, inputs))
+        cut = False
         try:
             looked = _growing(run, journey, beginning)
             if check and looked.status is not Status.FAILED:
