@@ -30,7 +30,10 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["LinearMomenta", "Momenta", "momenta_of"]
+__all__ = ["LinearMomenta", "Momenta", "inertia", "momenta_of"]
+
+_FAR = 1e60
+"""Accelerations beside which nothing else is felt: a spring of 1e12 Nm/rad on 1e-12 kg m² makes 1e24 rad/s²."""
 
 _LINES = (SPRING, ROPE, HEAVY_ROPE)
 
@@ -151,12 +154,30 @@ class LinearMomenta:
 
     def of(self, state: State, v: np.ndarray) -> np.ndarray:
         """Return the momenta of some rates."""
-        model = self.model
-        return model.balance(state, v, np.zeros(model.n)) - model.balance(state, v, v)
+        return inertia(self.model, state, v)
 
     def excess(self, middle: State, span: float) -> Excess | None:
         """Return None: lines keep their directions."""
         return None
+
+
+def inertia(model: Plant, state: State, a: np.ndarray) -> np.ndarray:
+    """Return M a, without the rounding of forces beside which it is nothing: those of a loaded machine at rest, say.
+
+    The balance is linear in accelerations: it is asked for far larger ones, beside which forces are nothing.
+
+    Parameters
+    ----------
+    model : Plant
+    state : State
+    a : numpy.ndarray, shape (n,)
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+    """
+    size, still = float(np.abs(a).max(initial=0.0)), np.zeros(model.n)
+    return model.balance(state, still, a / size * _FAR) * (-size / _FAR) if size else still
 
 
 def momenta_of(model: Plant) -> Momenta | LinearMomenta:

@@ -8,6 +8,7 @@ import pytest
 import flexctrl as fc
 from flexctrl.dynamics.methods.masses import Masses
 from flexctrl.dynamics.steps import Counts
+from flexctrl.model.momenta import inertia
 
 
 def top() -> fc.Model:
@@ -44,7 +45,12 @@ def test_they_are_those_by_the_mass_matrix(make):
         u = rng.standard_normal(len(model.inputs))
         told, still = masses.accelerations(state, u, np.zeros(model.n)), np.zeros(model.n)
         loads = model.loads(state, u)
-        found = masses.solve(lambda a, s=state, f=loads: -model.balance(s, s.v, a) - f, state, still)
+        found = masses.solve(
+            lambda a, s=state, f=loads: -model.balance(s, s.v, a) - f,
+            lambda a, s=state: inertia(model, s, a),
+            state,
+            still,
+        )
         np.testing.assert_allclose(told, found, rtol=1e-9, atol=1e-9 * np.abs(found).max())
 
 

@@ -14,11 +14,14 @@ from flexctrl.errors import SingularMatrixError
 from flexctrl.frozen import frozen
 from flexctrl.model.flat.flattening import Flattened, can_be_flat, flatten
 from flexctrl.model.model import Model
+from flexctrl.model.momenta import inertia
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import Plan, Solve, factorise, plan
 from flexctrl.model.state import State
 
 __all__ = ["Masses"]
+
+Vectors = Callable[[np.ndarray], np.ndarray]
 
 _EXACT = 1e-12
 _SWEEPS = 12
@@ -102,28 +105,39 @@ class Masses:
         if self._entire is not None and (told := self._entire.accelerations(state, u)) is not None:
             return told
         loads = self.model.loads(state, u)
-        return self.solve(lambda a: -self.model.balance(state, state.v, a) - loads, state, guess)
+        return self.solve(
+            lambda a: -self.model.balance(state, state.v, a) - loads,
+            lambda a: inertia(self.model, state, a),
+            state,
+            guess,
+        )
 
-    def solve(self, gap: Callable[[np.ndarray], np.ndarray], state: State, guess: np.ndarray) -> np.ndarray:
+    def solve(self, gap: Vectors, weighed: Vectors, state: State, guess: np.ndarray) -> np.ndarray:
         """Return the root of what is linear with the mass matrix of a state as its slope.
 
         Conjugate gradients with the factors in use; where these are far from the masses here, new ones are made.
+
+        Parameters
+        ----------
+        gap : callable
+            What is to vanish. Near its root it is round-off, which tells nothing of its slope.
+        weighed : callable
+            The mass matrix times a motion.
+        state : State
+        guess : numpy.ndarray, shape (n,)
         """
         if self._solve is None:
             self.make(state)
         with np.errstate(over="ignore", invalid="ignore"):  # far too long a step; who takes it sees what is not finite
-            value, done = self._conjugate(gap, guess, _SWEEPS)
+            value, done = self._conjugate(gap(guess), weighed, guess, _SWEEPS)
             if done:
                 return value
             self.make(state)
-            return self._conjugate(gap, value, _SWEEPS)[0]
+            return self._conjugate(gap(value), weighed, value, _SWEEPS)[0]
 
-    def _conjugate(
-        self, gap: Callable[[np.ndarray], np.ndarray], guess: np.ndarray, sweeps: int
-    ) -> tuple[np.ndarray, bool]:
+    def _conjugate(self, left: np.ndarray, weighed: Vectors, guess: np.ndarray, sweeps: int) -> tuple[np.ndarray, bool]:
         assert self._solve is not None
-        value, start = guess, gap(guess)
-        residual, direction, power = -start, np.zeros_like(guess), np.inf
+        value, residual, direction, power = guess, -left, np.zeros_like(guess), np.inf
         for _ in range(sweeps):
             change = -self._solve(residual)
             if self._size(change) <= _EXACT * self._size(value + change):
@@ -131,7 +145,7 @@ class Masses:
             with np.errstate(over="ignore", invalid="ignore"):  # a trial far too long: it is turned down below
                 before, power = power, float(residual @ change)
                 direction = change + (power / before) * direction
-                pushed = gap(guess + direction) - start
+                pushed = weighed(direction)
                 curvature = float(direction @ pushed)
             if not np.isfinite(curvature) and np.isfinite(change).all():
                 return value + change, False  # too large to be squared

@@ -12,6 +12,7 @@ without drift. Motors behind rigid shafts and ropes have momenta of their own: s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -315,14 +316,17 @@ class _Stepper:
     def _rates(self, state: State, momenta: np.ndarray, motors: np.ndarray) -> np.ndarray:
         """The rates of some momenta."""
         if not motors.size:
-            return self.masses.solve(lambda v: self.momenta.of(state, v) - momenta, state, state.v)
+            return self._moving(lambda v: self.momenta.of(state, v), momenta, state)
         levers = self.motors.levers(state)
 
-        def gap(v: np.ndarray) -> np.ndarray:
-            wound = levers.T @ (self.motors.inertias * (levers @ v) - motors)
-            return self.momenta.of(state, v) - momenta + wound
+        def of(v: np.ndarray) -> np.ndarray:
+            return self.momenta.of(state, v) + levers.T @ (self.motors.inertias * (levers @ v))
 
-        return self.masses.solve(gap, state, state.v)
+        return self._moving(of, momenta + levers.T @ motors, state)
+
+    def _moving(self, of: Callable[[np.ndarray], np.ndarray], momenta: np.ndarray, state: State) -> np.ndarray:
+        """The rates with some momenta, which rates have as told."""
+        return self.masses.solve(lambda v: of(v) - momenta, of, state, state.v)
 
     def _stale(self, middle: State, h: float) -> bool:
         made = self.tangent
