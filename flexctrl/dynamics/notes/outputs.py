@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["Fast", "OutputErrors", "by_rows", "by_sums", "fast", "placed", "reach", "seen", "told_from", "ways"]
 
 _TOLD, _BESIDE = 0.05, 2.0
-_ROUND_OFF = 1e-12
-"""Of what outputs are where nodes move by sizes and radians: less is the last digits of places."""
+_ROUND_OFF, _LEAST = 1e-12, 1e-9
+"""Of what outputs are where nodes move by sizes and radians: less is the last digits of places, and of equilibria."""
 _NAMED = 3
 _LEFT = 16.0 / 9.0
 """Two runs that lag by φ and φ/4 behind a vibration ±a are ¾ φ a apart; what is extrapolated is off by ½ φ² a."""
@@ -184,7 +184,7 @@ def _seen(journey: Journey, y: np.ndarray, sight: sp.csr_matrix) -> tuple[np.nda
     model = journey.plan.model
     assert isinstance(model, Model)
     yards = yardsticks(model)
-    least = _ROUND_OFF * (sight @ np.where(np.isfinite(yards), yards, 0.0))
+    least = _LEAST * (sight @ np.where(np.isfinite(yards), yards, 0.0))
     # what no freedom moves has last digits all the same: freedoms turn the coupler of a parallelogram by nothing
     least = np.maximum(least, _ROUND_OFF * output_yardsticks(model, journey.mark.size))
     way = ways(journey, y)
