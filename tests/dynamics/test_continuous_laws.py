@@ -181,22 +181,53 @@ def test_a_law_that_says_no_number_is_told():
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_kernel_says_what_the_law_does(law):
-    """State, rate and command at the end of a step of the trapezoidal rule, solved by the law itself."""
+def test_the_kernels_say_what_the_law_does(law):
+    """Command, rate and slope; the latter against differences of the law's own rate."""
     given = LAWS[law]()
     found = answering(given)
-    rng, h, t, n = np.random.default_rng(0), 3e-3, 0.05, len(given.initial())
-    y, x0 = rng.normal(size=len(given.inputs)), 1e-3 * rng.normal(size=n)
-    rate0 = given.rate(t - h, x0, y) if n else x0
-    x, clocks = x0, [clock(t) for clock in found.clocks]
-    run = found.kernel.function()
-    for _ in range(3):
-        answer = np.array(run(np.concatenate([y, x, x0, rate0, [h], clocks]), found.values)).ravel()
-        command, x, rate = np.split(answer, [found.commands, found.commands + n])
+    rng, t, n = np.random.default_rng(0), 0.05, len(given.initial())
+    y, x = rng.normal(size=len(given.inputs)), 1e-3 * rng.normal(size=n)
+    told = np.concatenate([y, x, [clock(t) for clock in found.clocks]])
+    command, rate = np.split(np.array(found.kernel.function()(told, found.values)).ravel(), [found.commands])
     assert np.allclose(command, given.command(t, x, y), rtol=1e-10, atol=1e-12)
-    if n:
-        assert np.allclose(rate, given.rate(t, x, y), rtol=1e-8, atol=1e-10)
-        assert np.allclose(x, x0 + 0.5 * h * (rate0 + rate), rtol=1e-8, atol=1e-12)
+    if not n:
+        return
+    assert np.allclose(rate, given.rate(t, x, y), rtol=1e-8, atol=1e-10)
+    slope = found.slopes.copy()
+    if found.slope is not None:
+        slope[found.places] = np.array(found.slope.function()(told, found.values)).ravel()
+    d = 1e-6
+    differences = [(given.rate(t, x + e, y) - given.rate(t, x - e, y)) / (2 * d) for e in d * np.eye(n)]
+    assert np.allclose(slope.reshape(n, n), differences, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("pace", PACES)
+@pytest.mark.parametrize("states", [16, 40, 75])
+def test_laws_of_many_states_are_asked_in_the_loops(states, pace, monkeypatch):
+    """An observer of many modes: filters from 5 to 300 rad/s that do not keep to axes of their own."""
+    rng = np.random.default_rng(states)
+    turned = np.linalg.qr(rng.normal(size=(states, states)))[0]
+    rates = np.linspace(5.0, 300.0, states)
+    A, B, C = -turned * rates @ turned.T, turned @ rates[:, None], np.full((1, states), -900.0 / states) @ turned.T
+    law = control.StateSpace(A, B, C, [[-300.0]], inputs=["travel"], outputs=["push"])
+    told = fc.Tracking(law, {"travel": Shaped(MinimumJerk(0.3, 0.2, at=0.02), zvd(40.0))})
+    a, b, plain = both(crane(), monkeypatch, controller=told, until=0.05, method=PACES[pace])
+    alike(a, b, 2e-4)
+    assert plain <= 2
+
+
+def test_stopped_integrators_among_many_states_are_asked_in_the_loops(monkeypatch):
+    """Entries of the slope that come and go beside those that stay: an integrator beside 14 filters."""
+    rates = np.concatenate([[0.0], np.linspace(5.0, 300.0, 14)])
+    B, C = np.where(rates, rates, 1.0)[:, None], np.concatenate([[-2000.0], np.full(14, -60.0)])[None]
+    law = control.StateSpace(-np.diag(rates), B, C, [[-300.0]], inputs=["travel"], outputs=["push"])
+    told = fc.Tracking(AntiWindup(law, {"push": 40.0}), {"travel": Step(0.2, at=0.013)})
+    found = answering(told)
+    assert 0 < found.places.size <= 15
+    a, b, plain = both(crane(), monkeypatch, controller=told, until=0.2, method=PACES["fixed"])
+    alike(a, b, 1e-3)
+    assert np.abs(a["push"]).max() == pytest.approx(40.0)
+    assert plain <= 2
 
 
 WRAPPERS = {

@@ -21,11 +21,15 @@ class Answer:
         Of the machine.
     states, clocks, commands, width : int
         Of the law: its states, what depends on time alone, its commands, coefficients of what depends on time.
-    step : Runs
-        The kernel.
+    step, slope : Runs
+        The kernels.
     work, answer : Reals
-        What it reads: outputs, its state near the end of the step, state and rate at the start, length of the step,
-        clocks. What it says: commands, state and rate at the end.
+        What they read: outputs, the law's state near the end of the step, state and rate at the start, clocks. What it
+        says: commands, and the rate there.
+    slopes, factors, order : Reals, Reals, Wholes
+        ∂f/∂x of the law's rate f; what `flexctrl.kernels.dense` has made of 1 − h/2 ∂f/∂x.
+    off : Reals
+        What is left of the trapezoidal rule, and what it asks for.
     writes : Wholes
         The inputs commanded.
     base, u, last, trend, said : Reals
@@ -48,12 +52,14 @@ class Answer:
         How fast its rate changed over the last step, and how large it has been.
     bent : int
         Whether there was such a step.
+    changing : int
+        How many entries of ∂f/∂x are not the same for good.
     reading : int
         How many outputs it reads; 0: what it commands depends on time and its state alone.
     tries, still, wanted : int
         How often the inputs were put right in this step, how often that moved nothing; rows to be answered.
-    most : float
-        The largest gap.
+    most, span : float
+        The largest gap; the length of step that the factors are for.
     """
 
     outputs: int
@@ -63,8 +69,13 @@ class Answer:
     commands: int
     width: int
     step: Runs
+    slope: Runs
     work: Reals
     answer: Reals
+    slopes: Reals
+    factors: Reals
+    order: Wholes
+    off: Reals
     writes: Wholes
     base: Reals
     u: Reals
@@ -88,14 +99,17 @@ class Answer:
     bend: Reals
     reached: Reals
     bent: int = 0
+    changing: int = 0
     reading: int = 0
     tries: int = 0
     still: int = 0
     wanted: int = 0
     most: float = 0.0
+    span: float = 0.0
 
 
 def no_answer() -> Answer:
     """Return what there is without a continuous law."""
     e, none = np.zeros(0), np.zeros(0, dtype=int)
-    return Answer(0, 0, 0, 0, 0, 0, (), e, e, none, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e)
+    tail = e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e, e
+    return Answer(0, 0, 0, 0, 0, 0, (), (), e, e, e, e, none, e, none, *tail)

@@ -160,8 +160,7 @@ class Answerer(Marcher):
         law, feed = self.law, self.feed
         assert feed.answering is not None
         clocks = [clock.along(times) for clock in feed.answering.clocks]
-        zero = np.zeros((len(times), law.states))
-        table = np.column_stack([outputs, x, x, zero, np.zeros(len(times)), *clocks])
+        table = np.column_stack([outputs, x, np.zeros((len(times), 2 * law.states)), *clocks])
         work, found = law.work.copy(), np.tile(law.base, (len(times), 1))
         run = self._numbers.bound(recite)
         for start in range(0, len(times), _ROWS):
@@ -183,8 +182,8 @@ def _serves(known: Feed, feed: Feed) -> bool:
 
 def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
     n, m, s, c, k = len(feed.model.outputs), len(feed.model.inputs), law.states, len(law.clocks), law.commands
-    wide, width = n + 3 * s + 1 + c, max((clock.width for clock in law.clocks), default=0)
-    gather = np.concatenate([feed.reads, n + np.arange(3 * s + 1 + c)])
+    wide, width = n + 3 * s + c, max((clock.width for clock in law.clocks), default=0)
+    gather = np.concatenate([feed.reads, n + np.arange(s), n + 3 * s + np.arange(c)])[None]
     last, trend, said = np.zeros((3, m))
     gap, before, change, felt, row = np.zeros((5, k))
     return Answer(
@@ -194,9 +193,14 @@ def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
         clocks=c,
         commands=k,
         width=width,
-        step=(backend.bind(law.kernel, gather[None], law.values[None], np.arange(law.kernel.n_out)[None]),),
+        step=(backend.bind(law.kernel, gather, law.values[None], np.arange(law.kernel.n_out)[None]),),
+        slope=() if law.slope is None else (backend.bind(law.slope, gather, law.values[None], law.places[None]),),
         work=np.zeros(wide),
         answer=np.zeros(law.kernel.n_out),
+        slopes=law.slopes.copy(),
+        factors=np.zeros(s * s),
+        order=np.zeros(s, dtype=int),
+        off=np.zeros(s),
         writes=np.array(feed.writes, dtype=int),
         base=np.zeros(m),
         u=flat.u,
@@ -219,6 +223,7 @@ def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
         kept=np.zeros(s),
         bend=np.zeros(s),
         reached=np.zeros(s),
+        changing=law.places.size,
         reading=feed.reads.size,
     )
 

@@ -13,6 +13,7 @@ from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.books import reach
 from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
 from flexctrl.dynamics.march.step import step
+from flexctrl.kernels.dense import full_factors, full_solve
 from flexctrl.kernels.eights import eight, larger, largest
 from flexctrl.model.flat.flat import clear, drive, load
 from flexctrl.model.flat.solving import copy_on
@@ -59,9 +60,8 @@ def foresee(m: March) -> None:
     x = a.work[a.outputs :]
     for i in range(a.states):
         x[i] = x[a.states + i] + m.h * x[2 * a.states + i]
-    x[3 * a.states] = m.h
     t = m.t + m.h
-    now = x[3 * a.states + 1 :]
+    now = x[3 * a.states :]
     for k in range(a.clocks):
         s = t - a.origins[k]
         value = 0.0
@@ -76,23 +76,57 @@ def asked(m: March) -> int:
     if m.gauges.moving == 1 and m.swift != 1 and m.whole != 1:
         drive(m.flat)
     read(m.gauges, m.flat.z, a.work)
+    status = say(a)
+    if a.states == 0 or status != DONE:
+        return status
     for _ in range(NEARER):
         for i in range(a.states):
-            a.sides[i] = a.answer[a.commands + a.states + i]
-        clear(a.commands + 2 * a.states, a.answer)
-        a.step[0](a.work, a.answer)
-        total = 0.0
-        for i in range(a.commands + 2 * a.states):
-            total += a.answer[i]
-        if not math.isfinite(total):
+            a.sides[i] = a.answer[a.commands + i]
+        if nearer(m) == FAILED:
             return FAILED
-        x = a.work[a.outputs :]
-        for i in range(a.states):
-            x[i] = a.answer[a.commands + i]
         if at_end(m):
             return DONE
     between(m)
     return DONE
+
+
+def say(a: Answer) -> int:
+    """Ask the law at its state; tell whether what it says are numbers."""
+    clear(a.commands + a.states, a.answer)
+    a.step[0](a.work, a.answer)
+    total = 0.0
+    for i in range(a.commands + a.states):
+        total += a.answer[i]
+    return DONE if math.isfinite(total) else FAILED
+
+
+def nearer(m: March) -> int:
+    """Take a step of Newton's method towards the law's state at the end; tell whether the law says numbers there."""
+    a = m.answer
+    x = a.work[a.outputs :]
+    n = a.states
+    for i in range(n):
+        a.off[i] = x[i] - x[n + i] - 0.5 * m.h * (x[2 * n + i] + a.answer[a.commands + i])
+    soften(m)
+    for i in range(n):
+        x[i] -= a.off[i]
+    return say(a)
+
+
+def soften(m: March) -> None:
+    """Solve with 1 − h/2 ∂f/∂x at the law's state; most laws leave it as it is while steps are of one length."""
+    a = m.answer
+    n = a.states
+    if a.changing > 0 or m.h != a.span:
+        a.span = m.h
+        if a.changing > 0:
+            a.slope[0](a.work, a.slopes)
+        for k in range(n * n):
+            a.factors[k] = -0.5 * m.h * a.slopes[k]
+        for i in range(n):
+            a.factors[(n + 1) * i] += 1.0
+        full_factors(n, a.factors, a.order)
+    full_solve(n, a.factors, a.order, a.off)
 
 
 def at_end(m: March) -> bool:
@@ -105,7 +139,7 @@ def at_end(m: March) -> bool:
     for i in range(a.states):
         before = x[a.states + i]
         first = 0.5 * m.h * x[2 * a.states + i]
-        last = 0.5 * m.h * a.answer[a.commands + a.states + i]
+        last = 0.5 * m.h * a.answer[a.commands + i]
         if abs(x[i] - before - first - last) > _LEFT * (abs(x[i]) + abs(before) + abs(first) + abs(last)):
             return False
     return True
@@ -117,9 +151,7 @@ def between(m: March) -> None:
     x = a.work[a.outputs :]
     n = a.states
     for i in range(n):
-        a.kept[i] = x[n + i]
-        a.sides[n + i] = a.answer[a.commands + n + i]
-    x[3 * n] = 0.0  # the law is asked at a state that is given
+        a.sides[n + i] = a.answer[a.commands + i]
     low = 0.0
     high = 1.0
     share = 0.0
@@ -127,23 +159,18 @@ def between(m: March) -> None:
         share = 0.5 * (low + high)
         for i in range(n):
             rate = a.sides[i] + share * (a.sides[n + i] - a.sides[i])
-            x[n + i] = a.kept[i] + 0.5 * m.h * (x[2 * n + i] + rate)
-            x[i] = x[n + i]
-        clear(a.commands + 2 * n, a.answer)
-        a.step[0](a.work, a.answer)
+            x[i] = x[n + i] + 0.5 * m.h * (x[2 * n + i] + rate)
+        say(a)
         turned = 0.0
         for i in range(n):
             apart = a.sides[n + i] - a.sides[i]
-            turned += (a.answer[a.commands + n + i] - a.sides[i] - share * apart) * apart
+            turned += (a.answer[a.commands + i] - a.sides[i] - share * apart) * apart
         if turned > 0.0:
             low = share
         else:
             high = share
     for i in range(n):
-        a.answer[a.commands + i] = x[i]
-        a.answer[a.commands + n + i] = a.sides[i] + share * (a.sides[n + i] - a.sides[i])
-        x[n + i] = a.kept[i]
-    x[3 * n] = m.h
+        a.answer[a.commands + i] = a.sides[i] + share * (a.sides[n + i] - a.sides[i])
 
 
 def strayed_off(m: March) -> float:
@@ -154,21 +181,14 @@ def strayed_off(m: March) -> float:
     x = a.work[a.outputs :]
     n = a.states
     for i in range(n):
-        a.sides[i] = a.answer[a.commands + i]
-        a.sides[n + i] = a.answer[a.commands + n + i]
-        a.kept[i] = m.h * m.h / 12.0 * ((a.sides[n + i] - x[2 * n + i]) / m.h - a.bend[i])
+        a.off[i] = m.h * m.h / 12.0 * ((a.answer[a.commands + i] - x[2 * n + i]) / m.h - a.bend[i])
+        a.kept[i] = a.off[i]
     worst = not_allowed(m)
     if worst <= CLEAR:
         return worst
+    soften(m)
     for i in range(n):
-        x[n + i] += a.kept[i]
-    clear(a.commands + 2 * n, a.answer)
-    a.step[0](a.work, a.answer)
-    for i in range(n):
-        x[n + i] -= a.kept[i]
-        a.kept[i] = min(abs(a.kept[i]), abs(a.answer[a.commands + i] - a.sides[i]))
-        a.answer[a.commands + i] = a.sides[i]
-        a.answer[a.commands + n + i] = a.sides[n + i]
+        a.kept[i] = min(abs(a.kept[i]), abs(a.off[i]))
     return not_allowed(m)
 
 
@@ -179,7 +199,7 @@ def not_allowed(m: March) -> float:
     young = YOUNG * (m.t + m.h)
     worst = 0.0
     for i in range(a.states):
-        rate = max(abs(x[2 * a.states + i]), abs(a.sides[a.states + i]))
+        rate = max(abs(x[2 * a.states + i]), abs(a.answer[a.commands + i]))
         allowed = LOOSE * (m.relative + m.absolute) * max(max(a.reached[i], abs(x[i])), young * rate)
         if allowed > 0.0:
             worst = max(worst, abs(a.kept[i]) / allowed)
@@ -295,23 +315,22 @@ def take(m: March) -> None:
     x = a.work[a.outputs :]
     a.bent = 1
     for i in range(a.states):
-        a.bend[i] = (a.answer[a.commands + a.states + i] - x[2 * a.states + i]) / m.h
+        a.bend[i] = (a.answer[a.commands + i] - x[2 * a.states + i]) / m.h
         a.reached[i] = max(a.reached[i], abs(x[i]))
         x[a.states + i] = x[i]
-        x[2 * a.states + i] = a.answer[a.commands + a.states + i]
+        x[2 * a.states + i] = a.answer[a.commands + i]
         told[a.inputs + i] = x[i]
-        told[a.inputs + a.states + i] = a.answer[a.commands + a.states + i]
+        told[a.inputs + a.states + i] = a.answer[a.commands + i]
 
 
 def recite(a: Answer) -> int:
     """Ask the law at instants whose states are known."""
-    wide = a.outputs + 3 * a.states + 1 + a.clocks
+    wide = a.outputs + 3 * a.states + a.clocks
     for k in range(a.wanted):
         asked_now = a.asked[wide * k :]
         for i in range(wide):
             a.work[i] = asked_now[i]
-        clear(a.commands + 2 * a.states, a.answer)
-        a.step[0](a.work, a.answer)
+        say(a)
         for i in range(a.commands):
             a.answers[a.commands * k + i] = a.answer[i]
     return 0
