@@ -11,6 +11,7 @@ from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.notes.adding import drifted
 from flexctrl.dynamics.notes.commands import unfelt
 from flexctrl.dynamics.notes.left_out import left_out, passed_over
+from flexctrl.dynamics.notes.many_states import many_states
 from flexctrl.dynamics.notes.outputs import by_sums
 from flexctrl.dynamics.notes.straying import strayed
 from flexctrl.dynamics.notes.unsized import little, unsized
@@ -74,7 +75,7 @@ def _judged(journey: Journey, y: np.ndarray) -> None:
     journey.drift = drift = drifted(journey)
     journey.outputs = by_sums(journey, y)
     journey.notes += strayed(journey) + unsized(journey) + little(journey) + unsure(journey, y) + left_out(journey)
-    journey.notes += passed_over(journey) + unfelt(journey)
+    journey.notes += passed_over(journey) + unfelt(journey) + many_states(journey)
     if journey.status is not Status.FAILED:
         journey.notes += (drift.note,) * bool(drift.note) + journey.outputs.notes
 
