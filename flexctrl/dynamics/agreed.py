@@ -15,6 +15,7 @@ from flexctrl.dynamics.run import Run
 
 __all__ = ["agreed"]
 
+_SECOND = 2.0
 _LOOKS = 64
 """Instants at which two are looked at."""
 
@@ -23,7 +24,7 @@ def agreed(other: Other, known: tuple[Other, ...], journey: Journey, order: floa
     """Return until when a run beside agrees with the nearest one known, from where both began.
 
     What goes on from a part that was cut may be near one of them by chance, wrong as both are. Nothing is asked
-    where others have been laid beside all of it.
+    where others have been laid beside all of it, nor of methods of high order, which part as tolerances tell.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def agreed(other: Other, known: tuple[Other, ...], journey: Journey, order: floa
     callable
         No later than a time [s].
     """
-    if not known or not is_after_a_cut(journey):
+    if not known or not is_after_a_cut(journey) or order > _SECOND:
         return float
     nearest = min(known, key=lambda one: one.beside.longer)
     left = abs(nearest.beside.longer**order - other.beside.longer**order)

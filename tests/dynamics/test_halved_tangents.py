@@ -26,6 +26,16 @@ def chain(EA: float, elements: int = 520) -> fc.Model:
     return fc.assemble(fc.Structure([beam], [fc.Support(beam.start, held="u v w")], [], [], outputs), EFFECTS)
 
 
+def dry() -> fc.Model:
+    """Its end rubs on a wall."""
+    free = chain(SOFT).structure
+    beam = free.elements[0]
+    mass = fc.PointMass("mass", beam.end.position, 0.1)
+    joints = [*free.joints, fc.Pin(beam.end, mass.node)]
+    drawn = fc.Structure([beam, mass], joints, [], [], free.outputs)
+    return fc.assemble(drawn, [*EFFECTS, fc.CoulombFriction({"mass.u": fc.Coulomb(2.0)})])
+
+
 @pytest.fixture
 def halved(monkeypatch):
     """Whether the tangent was solved with in single precision, after each call of the loops."""
@@ -71,8 +81,9 @@ def test_a_run_goes_on_with_the_same_bits(halved):
     [
         (lambda: chain(SOFT, 490), 0),
         (lambda: chain(SOFT), 1),
+        (dry, 0),
     ],
-    ids=["few nodes", "many"],
+    ids=["few nodes", "many", "what sticks"],
 )
 def test_only_large_machines_keep_a_tangent_twice(machine, brief, monkeypatch):
     sizes, do = [], Loops._do
