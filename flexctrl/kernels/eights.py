@@ -23,13 +23,13 @@ def put(x: np.ndarray, value: Eight | float) -> None:
     x[:8] = value
 
 
-def put_six(y: np.ndarray, x: np.ndarray) -> None:
-    """Copy the first six entries of one vector into another, in two moves."""
+def put_six(y: np.ndarray, x: np.ndarray | Eight) -> None:
+    """Copy the first six entries of one vector, or of eight, into another, in two moves."""
     y[:6] = x[:6]
 
 
-def add_six(y: np.ndarray, x: np.ndarray) -> None:
-    """Add the first six entries of one vector to those of another, in two moves."""
+def add_six(y: np.ndarray, x: np.ndarray | Eight) -> None:
+    """Add the first six entries of one vector, or of eight, to those of another, in two moves."""
     y[:6] += x[:6]
 
 

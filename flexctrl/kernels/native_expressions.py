@@ -286,7 +286,7 @@ class Expressions:
             self._put(f"store {EIGHT} {self._cast(arguments[1], 'Eight').text}, ptr {a}, align 8")
             return Value(None, "")
         if name in ("put_six", "add_six"):
-            self._six(a, arguments[1].text, name == "add_six")
+            self._six(a, arguments[1], name == "add_six")
             return Value(None, "")
         if name in ("rounded", "lost"):
             kind = "Eight" if name == "lost" or "Eight" in (arguments[0].type, arguments[1].type) else "float"
@@ -313,19 +313,31 @@ class Expressions:
         self._put(f"store {SHORT} {short}, ptr {place}, align 4")
         return Value(None, "")
 
-    def _six(self, goal: str, source: str, added: bool) -> None:
+    def _six(self, goal: str, source: Value, added: bool) -> None:
         """Read all of it before any is written, which LLVM may not do by itself: goal and source might overlap."""
-        ends = [self._value("ptr", f"getelementptr double, ptr {at}, i64 4").text for at in (goal, source)]
-        moves = (("<4 x double>", goal, source), ("<2 x double>", *ends))
-        values = [self._value("Eight", f"load {kind}, ptr {start}, align 8").text for kind, _, start in moves]
+        moves = (("<4 x double>", goal), ("<2 x double>", self._beyond_four(goal)))
+        values = self._first_six(source)
         if added:
-            others = [self._value("Eight", f"load {kind}, ptr {to}, align 8").text for kind, to, _ in moves]
+            others = [self._value("Eight", f"load {kind}, ptr {to}, align 8").text for kind, to in moves]
             values = [
-                self._value("Eight", f"fadd {move[0]} {one}, {other}").text
-                for move, one, other in zip(moves, values, others, strict=True)
+                self._value("Eight", f"fadd {kind} {one}, {other}").text
+                for (kind, _), one, other in zip(moves, values, others, strict=True)
             ]
-        for (kind, to, _), value in zip(moves, values, strict=True):
+        for (kind, to), value in zip(moves, values, strict=True):
             self._put(f"store {kind} {value}, ptr {to}, align 8")
+
+    def _first_six(self, source: Value) -> list[str]:
+        """Four and two of a vector's first entries, or of a register's."""
+        if source.type == "Eight":
+            lanes = ("i32 0, i32 1, i32 2, i32 3", "i32 4, i32 5")
+            kinds = [f"<{some.count('i32')} x i32> <{some}>" for some in lanes]
+            cut = f"shufflevector {EIGHT} {source.text}, {EIGHT} poison"
+            return [self._value("Eight", f"{cut}, {kind}").text for kind in kinds]
+        starts = (("<4 x double>", source.text), ("<2 x double>", self._beyond_four(source.text)))
+        return [self._value("Eight", f"load {kind}, ptr {start}, align 8").text for kind, start in starts]
+
+    def _beyond_four(self, place: str) -> str:
+        return self._value("ptr", f"getelementptr double, ptr {place}, i64 4").text
 
     def _calling(self, callee: Callable[..., Any], arguments: list[Value]) -> Value:
         parameters, result = signature(callee)

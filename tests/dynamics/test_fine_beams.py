@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import flexctrl as fc
+from flexctrl.dynamics.march.swaying import sway_back, sway_on
 from flexctrl.model.flat import axes
 from flexctrl.model.flat.flattening import flatten
 
@@ -54,6 +56,20 @@ def test_the_motion_is_that_of_tangents_made_more_often(monkeypatch, machine, el
     assert with_sway.report.factorisations < 0.6 * without.report.factorisations
     assert with_sway.report.newton_iterations <= 1.02 * without.report.newton_iterations
     np.testing.assert_allclose(with_sway.y, without.y, rtol=0, atol=1e-3)
+
+
+def test_what_forces_do_is_the_transposed_of_what_motions_do():
+    rng = np.random.default_rng(0)
+    R = Rotation.random(random_state=1).as_matrix()
+    bent, motion, push = rng.normal(size=(3, 6))
+    bent[3:] /= np.linalg.norm(bent[3:])
+    moved, pushed = motion.copy(), push.copy()
+    sway_on(R.ravel(), bent, moved[:3], moved[3:])
+    sway_back(R.ravel(), bent, pushed[:3], pushed[3:])
+    kappa, way = bent[:3], bent[3:]
+    turned = motion[3:] + kappa * (way @ motion[:3]) - motion[:3] * (way @ kappa)
+    np.testing.assert_allclose(moved, [*R @ motion[:3], *R @ turned], atol=1e-14)
+    assert moved @ push == pytest.approx(motion @ pushed, rel=1e-13)
 
 
 @pytest.mark.parametrize(("machine", "count"), [(chain(40), 0), (chain(100), 98), (forked(300), 295)])

@@ -136,6 +136,8 @@ def moves(m: Record) -> int:
     while inner.table[1] != m.flag:
         put_six(m.x[2:], m.x)
         add_six(m.y[3:], m.y)
+        add_six(m.y[20:], 3.0 * eight(m.x) + eight(m.y[1:]))
+        put_six(m.y[30:], 0.5 * eight(m.x[3:]))
         m.flag = inner.table[1]
     return inner.table[0] if inner.weight > 0.5 else 0
 

@@ -7,7 +7,7 @@ is that axes that meet in a piece have turned against each other; see also `sway
 from __future__ import annotations
 
 from flexctrl.dynamics.march.record import Factors
-from flexctrl.dynamics.march.swaying import bend, lead, sway_back, sway_on, unturned
+from flexctrl.dynamics.march.swaying import bend, lead, sway_back, sway_on, turned_by, unturned
 from flexctrl.kernels.eights import eight, larger, largest
 from flexctrl.kernels.native import Reals
 from flexctrl.model.flat.axes import Axes
@@ -94,27 +94,26 @@ def solved_with(axes: Axes, factors: Factors, fronts: Fronts, down: Reals, up: R
 def turn_back(axes: Axes, factors: Factors, b: Reals) -> None:
     """See forces from the axes as they were."""
     for k in range(axes.count):
-        for i in range(2 * k, 2 * k + 2):
-            if axes.triples[i] >= 0:
-                unturned(factors.turned[9 * k :], b[axes.triples[i] :])
+        moment = axes.triples[2 * k]
+        force = axes.triples[2 * k + 1]
         if factors.swaying > 0 and axes.share[k] > 0.0:
-            sway_back(factors.bends[6 * k :], b[axes.triples[2 * k + 1] :], b[axes.triples[2 * k] :])
+            sway_back(factors.turned[9 * k :], factors.bends[6 * k :], b[force:], b[moment:])
+        else:
+            if force >= 0:
+                unturned(factors.turned[9 * k :], b[force:])
+            if moment >= 0:
+                unturned(factors.turned[9 * k :], b[moment:])
 
 
 def turn_on(axes: Axes, factors: Factors, b: Reals) -> None:
     """See motions in the axes as they were from space."""
     for k in range(axes.count):
+        turn = axes.triples[2 * k]
+        place = axes.triples[2 * k + 1]
         if factors.swaying > 0 and axes.share[k] > 0.0:
-            sway_on(factors.bends[6 * k :], b[axes.triples[2 * k + 1] :], b[axes.triples[2 * k] :])
-        for i in range(2 * k, 2 * k + 2):
-            if axes.triples[i] >= 0:
-                turned_by(factors.turned[9 * k :], b[axes.triples[i] :])
-
-
-def turned_by(R: Reals, x: Reals) -> None:
-    """Turn a vector."""
-    first = R[0] * x[0] + R[1] * x[1] + R[2] * x[2]
-    second = R[3] * x[0] + R[4] * x[1] + R[5] * x[2]
-    x[2] = R[6] * x[0] + R[7] * x[1] + R[8] * x[2]
-    x[0] = first
-    x[1] = second
+            sway_on(factors.turned[9 * k :], factors.bends[6 * k :], b[place:], b[turn:])
+        else:
+            if place >= 0:
+                turned_by(factors.turned[9 * k :], b[place:])
+            if turn >= 0:
+                turned_by(factors.turned[9 * k :], b[turn:])

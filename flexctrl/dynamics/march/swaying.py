@@ -16,7 +16,7 @@ from flexctrl.model.flat.axes import Axes
 from flexctrl.model.flat.workspace import Flat
 from flexctrl.model.laws.kinds import NODE_SLOT
 
-__all__ = ["bend", "lead", "sway_back", "sway_on", "unturned"]
+__all__ = ["bend", "lead", "sway_back", "sway_on", "turned_by", "unturned"]
 
 
 def lead(axes: Axes, f: Flat, bends: Reals) -> None:
@@ -47,22 +47,44 @@ def bend(axes: Axes, turned: Reals, bends: Reals) -> None:
             unturned(turned[9 * k :], bent)
 
 
-def sway_back(bent: Reals, force: Reals, moment: Reals) -> None:
-    """Add to a force what the moment does, on turns that follow displacements."""
-    way = bent[3:]
-    curved = dotted(bent, moment)
-    twisted = dotted(bent, way)
-    for i in range(3):
-        force[i] += way[i] * curved - moment[i] * twisted
+def sway_back(R: Reals, bent: Reals, force: Reals, moment: Reals) -> None:
+    """See a force and a moment from axes as they were; add to the force what the moment does, on turns that follow."""
+    m0 = R[0] * moment[0] + R[3] * moment[1] + R[6] * moment[2]
+    m1 = R[1] * moment[0] + R[4] * moment[1] + R[7] * moment[2]
+    m2 = R[2] * moment[0] + R[5] * moment[1] + R[8] * moment[2]
+    curved = bent[0] * m0 + bent[1] * m1 + bent[2] * m2
+    twisted = bent[0] * bent[3] + bent[1] * bent[4] + bent[2] * bent[5]
+    f0 = R[0] * force[0] + R[3] * force[1] + R[6] * force[2] + (bent[3] * curved - m0 * twisted)
+    f1 = R[1] * force[0] + R[4] * force[1] + R[7] * force[2] + (bent[4] * curved - m1 * twisted)
+    f2 = R[2] * force[0] + R[5] * force[1] + R[8] * force[2] + (bent[5] * curved - m2 * twisted)
+    force[0] = f0
+    force[1] = f1
+    force[2] = f2
+    moment[0] = m0
+    moment[1] = m1
+    moment[2] = m2
 
 
-def sway_on(bent: Reals, x: Reals, turn: Reals) -> None:
-    """Add to a turn what the displacement lacks in shear."""
-    way = bent[3:]
-    moved = dotted(way, x)
-    twisted = dotted(bent, way)
-    for i in range(3):
-        turn[i] += bent[i] * moved - x[i] * twisted
+def sway_on(R: Reals, bent: Reals, place: Reals, turn: Reals) -> None:
+    """Add to a turn what the displacement lacks in shear; see both from space."""
+    moved = bent[3] * place[0] + bent[4] * place[1] + bent[5] * place[2]
+    twisted = bent[0] * bent[3] + bent[1] * bent[4] + bent[2] * bent[5]
+    a0 = turn[0] + (bent[0] * moved - place[0] * twisted)
+    a1 = turn[1] + (bent[1] * moved - place[1] * twisted)
+    a2 = turn[2] + (bent[2] * moved - place[2] * twisted)
+    turned_by(R, place)
+    turn[0] = R[0] * a0 + R[1] * a1 + R[2] * a2
+    turn[1] = R[3] * a0 + R[4] * a1 + R[5] * a2
+    turn[2] = R[6] * a0 + R[7] * a1 + R[8] * a2
+
+
+def turned_by(R: Reals, x: Reals) -> None:
+    """Turn a vector."""
+    first = R[0] * x[0] + R[1] * x[1] + R[2] * x[2]
+    second = R[3] * x[0] + R[4] * x[1] + R[5] * x[2]
+    x[2] = R[6] * x[0] + R[7] * x[1] + R[8] * x[2]
+    x[0] = first
+    x[1] = second
 
 
 def unturned(R: Reals, x: Reals) -> None:

@@ -306,8 +306,9 @@ def factor(f: Fronts, entries: Reals, diagonal: Reals, down: Reals, up: Reals) -
     """Factorise the matrix in ``entries``, which are used up; return the unknown whose pivot vanishes, or −1.
 
     The columns of pivots go to ``down``, front by front, and the rows right of them, by columns, to ``up``; each
-    has eight places more than numbers. With unknowns beyond the degrees of freedom, ``diagonal`` is left with the
-    pivots: what such a degree of freedom carries stands in the rows of others.
+    has eight places more than numbers. Where a front touches one node alone, that one's rows come first.
+    With unknowns beyond the degrees of freedom, ``diagonal`` is left with the pivots: what such a degree of
+    freedom carries stands in the rows of others.
     """
     for i in range(f.n):
         diagonal[i] = abs(entries[f.diagonal[i]])
@@ -325,8 +326,15 @@ def factor(f: Fronts, entries: Reals, diagonal: Reals, down: Reals, up: Reals) -
             if f.beyond > 0:
                 diagonal[f.first[s] + k] = abs(pivot)
             sweep(size, lead, k, 1.0 / pivot, a, a[k * lead :])
-        below = put_down(size, 0, pivots, lead, a, below, down)
-        right = put_down(pivots, pivots, size, lead, a, right, up)
+        for k in range(pivots):
+            # of nodes what the next one waits for comes first: it stays in a register
+            if f.onto[s] >= 0:
+                below = put_down(NODE, a[k * lead + pivots :], below, down)
+                below = put_down(pivots, a[k * lead :], below, down)
+            else:
+                below = put_down(size, a[k * lead :], below, down)
+        for k in range(pivots, size):
+            right = put_down(pivots, a[k * lead :], right, up)
         if f.parent[s] >= 0:
             parent = f.parent[s]
             rest = size - pivots
@@ -351,14 +359,11 @@ def sweep(size: int, lead: int, k: int, inverse: float, a: Reals, column: Reals)
     column[k] = inverse
 
 
-def put_down(rows: int, first: int, last: int, lead: int, a: Reals, at: int, numbers: Reals) -> int:
-    """Put the upper rows of some columns one after the other; return where they end."""
-    for k in range(first, last):
-        column = a[k * lead :]
-        for i in range(0, rows, 8):
-            put(numbers[at + i :], eight(column[i:]))
-        at += rows
-    return at
+def put_down(rows: int, column: Reals, at: int, numbers: Reals) -> int:
+    """Put some rows of a column behind those before; return where they end."""
+    for i in range(0, rows, 8):
+        put(numbers[at + i :], eight(column[i:]))
+    return at + rows
 
 
 def extend(rest: int, lead: int, a: Reals, wide: int, into: Wholes, parent: Reals) -> None:

@@ -91,10 +91,10 @@ def node_forward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
         two = two + own[k] * eight(column[8:])
         three = three + own[k + 1] * eight(column[2 * NODE :])
         four = four + own[k + 1] * eight(column[2 * NODE + 8 :])
+    add_six(onto, one + three)
     put(work, one + three)
     put(work[8:], two + four)
-    put_six(own, work)
-    add_six(onto, work[NODE:])
+    put_six(own, work[NODE:])
 
 
 def pair_forward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
@@ -113,12 +113,12 @@ def pair_forward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
         four = four + own[k + 1] * eight(column[3 * NODE :])
         five = five + own[k + 1] * eight(column[3 * NODE + 8 :])
         six = six + own[k + 1] * eight(column[3 * NODE + 16 :])
-    put(own, one + four)
-    put(work, two + five)
-    put(work[8:], three + six)
-    for i in range(4):
-        own[8 + i] = work[i]
-    add_six(onto, work[4:])
+    add_six(onto, one + four)
+    put(work, one + four)
+    put(work[8:], two + five)
+    put(work[16:], three + six)
+    put_six(own, work[NODE:])
+    put_six(own[NODE:], work[2 * NODE :])
 
 
 def node_backward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
@@ -128,8 +128,7 @@ def node_backward(own: Reals, onto: Reals, a: Reals, work: Reals) -> None:
     for j in range(2, NODE, 2):
         one = one - onto[j] * eight(a[NODE * j :])
         two = two - onto[j + 1] * eight(a[NODE * j + NODE :])
-    put(work, one + two)
-    add_six(own, work)
+    add_six(own, one + two)
 
 
 def copy_on(n: int, x: Reals, y: Reals) -> None:
