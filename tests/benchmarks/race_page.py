@@ -67,8 +67,9 @@ torsion, Exudyn's cable has none.
 Our time per step grows with an exponent of {growth} over chains of 10 to {largest} elements (goal: 1.05, {verdict}).
 From 100 on, where what a step costs by itself counts no more, it is {large}. Both are of
 steps {first} to {last}, one motion for all sizes, through the whip of the free end. {told}
-From 500 elements on nodes are eliminated one by one, not two at once: that is a third more work in solving, and a quarter fewer numbers; and they are placed, turned and pushed
-64 at a time, while they are near. 10,000 go through 16 MB an iteration, in a cache that processors share.
+From 500 elements on nodes are eliminated one by one, not two at once: that is a third more work in solving, and a
+quarter fewer numbers; and they are placed, turned and pushed 64 at a time, while they are near. 10,000 go through 16
+MB an iteration, in a cache that processors share.
 
 Each run is timed right after three steps of the same code, as the crane's are right after themselves. Right after a
 run of the other, with caches full of what that needs, 1,000 steps of 100 elements took us a third longer, 400 of 3,000
@@ -77,15 +78,16 @@ a sixth: setting out is Python. So it was timed until 30 November 2026. Within o
 and 0.13 and at 0.08, 0.09 and 0.11, the first crane at 0.31 and at 0.30.
 
 Ratios belong to a machine less than seconds do, and do all the same. On a host (AMD, AVX-512, a far cache of 32 MB)
-where nodes were eliminated one by one from 4,000 elements on, the crane came out at 0.27, 0.13 and 0.08, easy chains of
-100 to 3,000 elements at 0.18 to 0.16, full swings at 0.08 to 0.09, growth, here and below from 100 elements on, at 0.98 and
-1.00 (up to 1.05, and 1.08 beside other work), a controller at 6.5 µs, a cold start at 1.1 s. On another (Intel, AVX-512, its far cache slower) easy
-chains came out at 0.18 to 0.32 within three hours, full swings at 0.11 to 0.16, growth at 1.03 to 1.05 (easy) and 1.09
-to 1.13 (full swing), the crane at 0.29 to 0.32, 0.13 to 0.15 and 0.09 to 0.10. Forces take an eighth less since, a step
-of 100 elements 8 % less, one of 1,000 4 %: ratios gained what they had missed, and growth lost as much. Tiles took 8 to
-9 % off a step of 10,000, reading less another 8, and tangents that fine beams keep longer 20 % through the whip. All
-these exponents were of steps 100 to 400 of 10,000 elements beside steps 500 to 2,500 of fewer: 1.07 in the full
-swing was 1.14 over one motion. Tangents in single precision took 5 to 12 % off steps of 3,000 elements and more since.
+where nodes were eliminated one by one from 4,000 elements on, the crane came out at 0.27, 0.13 and 0.08, easy chains
+of 100 to 3,000 elements at 0.18 to 0.16, full swings at 0.08 to 0.09, growth, here and below from 100 elements on, at
+0.98 and 1.00 (up to 1.05, and 1.08 beside other work), a controller at 6.5 µs, a cold start at 1.1 s. On another
+(Intel, AVX-512, its far cache slower) easy chains came out at 0.18 to 0.32 within three hours, full swings at 0.11 to
+0.16, growth at 1.03 to 1.05 (easy) and 1.09 to 1.13 (full swing), the crane at 0.29 to 0.32, 0.13 to 0.15 and 0.09 to
+0.10. Forces take an eighth less since, a step of 100 elements 8 % less, one of 1,000 4 %: ratios gained what they had
+missed, and growth lost as much. Tiles took 8 to 9 % off a step of 10,000, reading less another 8, and tangents that
+fine beams keep longer 20 % through the whip. All these exponents were of steps 100 to 400 of 10,000 elements beside
+steps 500 to 2,500 of fewer: 1.07 in the full swing was 1.14 over one motion. Tangents in single precision took 5 to
+12 % off steps of 3,000 elements and more since.
 """
 _SWING = """\
 The full swing of {elements} elements over {steps} steps, through the lowest point and the whip of the
