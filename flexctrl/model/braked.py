@@ -21,7 +21,7 @@ from flexctrl.frozen import frozen
 from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.balance import Balance
 from flexctrl.model.eased import told
-from flexctrl.model.equilibrium import Rest, equilibrium, settled
+from flexctrl.model.equilibrium import Rest, equilibrium, motors_bearing, settled
 from flexctrl.model.holding import own_coordinate, raw_place
 from flexctrl.model.linkages.chart import inverse_tangents
 from flexctrl.model.model import Model
@@ -170,7 +170,7 @@ def rest_held(model: Model, hold: Mapping[str, float], inputs: Mapping[str, floa
     at_work, there = told(balance, found.state)
     forces = at_work.brakes(there, at_work.whole_force(there)) if isinstance(at_work, Braked) else None
     brakes = tuple((name, 0.0 if forces is None else float(forces[i])) for name, i in zip(lost, wanted, strict=True))
-    return replace(found, held=held, brakes=brakes)
+    return motors_bearing(replace(found, held=held, brakes=brakes))
 
 
 def bearing(rest: Rest) -> Model:

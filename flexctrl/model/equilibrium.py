@@ -12,6 +12,7 @@ import numpy as np
 from flexctrl.errors import EquilibriumError, LinearizationError, MechanismError, StructureError, shortened
 from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
+from flexctrl.model.built_up import borne_by_motors
 from flexctrl.model.consistent import admitted, off_rails
 from flexctrl.model.holding import coordinate_held
 from flexctrl.model.model import Model
@@ -33,7 +34,7 @@ class Rest:
     Attributes
     ----------
     state : State
-        The equilibrium; at rest.
+        The equilibrium; at rest. A motor that is held and lags (`MotorLag`) has built up the torque that holds it.
     residual : float
         Largest unbalanced force relative to the forces at work (moments: over the size of the machine); 0 where
         it is lost in the round-off of the positions.
@@ -185,7 +186,21 @@ def equilibrium(
         start = admitted(model, start, "equilibrium: start")
     begin = (start or model.rest).loose
     held |= {i: float(begin.q[i]) for i in model.motion.frozen}
-    return settled(Balance(model, model.input_vector(inputs or {}), held), begin, tolerance)
+    return motors_bearing(settled(Balance(model, model.input_vector(inputs or {}), held), begin, tolerance))
+
+
+def motors_bearing(rest: Rest) -> Rest:
+    """Return an equilibrium in which motors that lag have built up the torques that hold them.
+
+    Parameters
+    ----------
+    rest : Rest
+
+    Returns
+    -------
+    Rest
+    """
+    return replace(rest, state=borne_by_motors(rest.model, rest.state, rest.holding)) if rest.held else rest
 
 
 def settled(balance: Balance, start: State, tolerance: float = 1e-9) -> Rest:

@@ -14,6 +14,7 @@ from flexctrl.linear.place import Place
 from flexctrl.model.audit import audit
 from flexctrl.model.balance import Balance
 from flexctrl.model.braked import balance_of, bearing
+from flexctrl.model.built_up import built_up
 from flexctrl.model.certify import certify, taylor_slope
 from flexctrl.model.consistent import admitted
 from flexctrl.model.eased import eased
@@ -80,7 +81,8 @@ def linearize(model: Model, at: Rest | State | None = None, inputs: Mapping[str,
     _refuse_spins(model, () if not isinstance(rest, Rest) else rest.held)
     state = admitted(model, state, "linearize: at").loose
     if isinstance(rest, Rest):
-        return _about(balance_of(replace(rest, model=model, inputs=u)), state)
+        balance = balance_of(replace(rest, model=model, inputs=u))
+        return _about(balance, built_up(balance, state))
     return _about(Balance(model, u, _frozen(model, state)), state)
 
 
@@ -173,6 +175,7 @@ def released(rest: Rest) -> LinearModel:
     model, state = bearing(rest), rest.state.loose
     frozen = _frozen(model, state)
     free = Balance(model, rest.inputs, frozen)
+    state = built_up(free, state)
     held = np.array([model.coordinates[i] in rest.held for i in free.free], dtype=bool)
     _refuse_spins(model, ())
     try:

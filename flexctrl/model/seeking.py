@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from flexctrl.errors import EquilibriumError
 from flexctrl.model.balance import Balance
+from flexctrl.model.built_up import built_up
 from flexctrl.model.eased import Eased, eased
 from flexctrl.model.overturned import overturned
 from flexctrl.model.recounted import recounted
@@ -44,6 +45,7 @@ def found(balance: Balance, start: State, tolerance: float) -> Found:
     EquilibriumError
         If no search finds one.
     """
+    start = built_up(balance, start)
     force = balance.force(start)
     if not np.isfinite(force).all():
         raise EquilibriumError("no equilibrium found: the start's own forces are not finite; start from another shape")

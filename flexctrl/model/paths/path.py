@@ -19,6 +19,8 @@ from flexctrl.errors import (
 )
 from flexctrl.frozen import frozen
 from flexctrl.model.balance import Balance
+from flexctrl.model.braked import balance_of
+from flexctrl.model.built_up import built_up
 from flexctrl.model.eased import Eased, eased
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.holding import coordinate_held
@@ -252,7 +254,8 @@ def _outset(
     """The first equilibrium, and its λ."""
     if isinstance(start, PathPoint):
         return start.rest.state, start.factor
-    return equilibrium(model, hold, inputs, start).state, 0.0
+    rest = equilibrium(model, hold, inputs, start)
+    return built_up(balance_of(rest), rest.state), 0.0
 
 
 def _behind(ease: Eased, model: Model, rest: Rest) -> Rest:
