@@ -216,13 +216,14 @@ def test_laws_of_many_states_are_asked_in_the_loops(states, pace, monkeypatch):
     assert plain <= 2
 
 
-def test_a_law_of_more_states_is_told_of():
+@pytest.mark.parametrize("method", [fc.GeneralizedAlpha(2e-3), fc.Richardson(fc.GeneralizedAlpha(2e-3))], ids=str)
+def test_a_law_of_more_states_is_told_of(method):
     """150 filters beside a gain: plain steps, and a note that names the law's size and what to do."""
     n = 150
     law = control.StateSpace(
         -10.0 * np.eye(n), np.ones((n, 1)), np.full((1, n), -100.0 / n), [[-300.0]], inputs=["travel"], outputs=["push"]
     )
-    how = {"until": 0.01, "method": fc.Unchecked(fc.GeneralizedAlpha(2e-3))}
+    how = {"until": 0.01, "method": fc.Unchecked(method)}
     a, b = (fc.simulate(crane(), one, **how).report.notes for one in (law, fc.Sampled(law, 2e-3)))
     (note,) = (one for one in a if "150 states" in one)
     assert "Sampled" in note

@@ -30,7 +30,8 @@ def many_states(journey: Journey) -> tuple[str, ...]:
     tuple of str
     """
     feed = journey.plan.feed
-    if not (feed.continuous and isinstance(journey.stepper, Stepper) and journey.mark.steps):
+    plain = getattr(journey.stepper, "fine", journey.stepper)  # of two that go side by side (`Richardson`)
+    if not (feed.continuous and isinstance(plain, Stepper) and journey.mark.steps):
         return ()
     states = np.size(journey.point.supply.x)
     if states < _MANY:
