@@ -75,3 +75,24 @@ def test_a_law_that_bears_the_load_within_a_fifth_is_one_that_bears_it():
     for share, count in ((0.79, 0), (0.81, 1), (1.19, 1), (1.21, 0)):
         law = fc.OpenLoop({"torque": Constant(share * WEIGHT)})
         assert len(told(fc.simulate(model, fc.Sampled(law, 0.01), until=0.05, start=rest))) == count
+
+
+SLOW = {
+    "delayed": lambda law: fc.Delayed(law, 2),
+    "delayed before limits": lambda law: fc.Saturated(fc.Delayed(law, 1), {"torque": 1e5}),
+    "rate": lambda law: fc.RateLimited(law, {"torque": 1e6}),
+    "rate and delay": lambda law: fc.RateLimited(fc.Delayed(law, 3), {"torque": 1e6}),
+}
+
+
+@pytest.mark.parametrize("name", SLOW)
+def test_commands_that_come_through_later_are_told_as_well(name):
+    """Nothing comes of the law at the start; then the load is hauled in by its weight again, and is told to be."""
+    model, rest = borne({"torque": WEIGHT})
+    law = SLOW[name](fc.Sampled(fc.OpenLoop({"torque": lambda t: WEIGHT}), 0.01))
+    run = fc.simulate(model, law, until=0.3, start=rest, every=0.1)
+    assert run["torque"][-1] == pytest.approx(2.0 * WEIGHT)
+    assert "commands -7357.5 at the start, so -14715 act once that has come through" in told(run)[0]
+    assert not told(fc.simulate(model, law, until=0.05, start=rest.state))
+    pd = control.ss([], [], [], [[-900.0, -300.0]], inputs=["angle", "speed"], outputs=["torque"])
+    assert not told(fc.simulate(model, SLOW[name](fc.Sampled(pd, 0.001)), until=0.05, start=rest))

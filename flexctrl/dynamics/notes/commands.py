@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
 from flexctrl.model.equilibrium import Rest
 
 if TYPE_CHECKING:
+    from flexctrl.design.controller import Controller
+    from flexctrl.dynamics.feed import Feed
     from flexctrl.dynamics.journey import Journey
+    from flexctrl.model.state import State
 
 __all__ = ["twice", "unfelt"]
 
@@ -58,10 +64,37 @@ def twice(journey: Journey, start: object, inputs: Mapping[str, float] | None) -
     if not isinstance(start, Rest) or inputs is not None or feed.controller is None or not u.size:
         return ()
     brought, named = feed.base, journey.plan.model.inputs
+    late = _wished(feed, journey.origin.state)
+    if late.size:
+        u = feed.base.copy()
+        np.add.at(u, list(feed.writes), late)
+    then = " once that has come through" if late.size else ""
     found = [i for i in feed.writes if brought[i] and abs(u[i] - 2.0 * brought[i]) <= _ALIKE * abs(brought[i])]
     return tuple(
         f"{named[i]}: the equilibrium that it starts from brings {brought[i]:.5g} along and the controller commands "
-        f"{u[i] - brought[i]:.5g} at the start, so {u[i]:.5g} act; if the controller is to give all of it, "
+        f"{u[i] - brought[i]:.5g} at the start, so {u[i]:.5g} act{then}; if the controller is to give all of it, "
         "start=rest.state"
         for i in found
     )
+
+
+def _wished(feed: Feed, state: State) -> np.ndarray:
+    """What a law commands at the start that hardware lets through by and by; empty where all of it comes at once."""
+    law = _held_back(feed.controller)
+    if law is not None:
+        with suppress(Exception):  # of which the run's status tells
+            return np.asarray(law.command(0.0, law.initial(), feed.measured(state)), dtype=float).ravel()
+    return np.zeros(0)
+
+
+def _held_back(law: Controller | None) -> Controller | None:
+    """The controller inside all that delays commands, or limits their rates."""
+    from flexctrl.design.hardware import Delayed, RateLimited  # not for runs without a controller
+    from flexctrl.design.wrapping import Wrapper
+
+    found = None
+    while isinstance(law, Wrapper):
+        if (isinstance(law, Delayed) and law.samples) or isinstance(law, RateLimited):
+            found = law.controller
+        law = law.controller
+    return found
