@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,7 +13,12 @@ from flexctrl.design.wrapping import by_name, check_plant, matrix
 from flexctrl.errors import ControllerError, DesignError
 from flexctrl.frozen import frozen
 
-__all__ = ["Estimator", "Regulator", "bryson", "kalman", "lqg", "lqr"]
+__all__ = ["Estimator", "IdleInputWarning", "Regulator", "bryson", "kalman", "lqg", "lqr"]
+
+
+class IdleInputWarning(UserWarning):
+    """An input that no state feels: a law on it does nothing."""
+
 
 _TOLERANCE = 1e-8  # largest Riccati residual accepted, relative to the terms of the equation
 
@@ -114,12 +120,18 @@ def lqr(plant: Any, state_cost: np.ndarray, input_cost: np.ndarray) -> Regulator
     ------
     DesignError
         If no stabilising solution was found; names the mode that cannot be moved or that the cost does not see.
+
+    Warns
+    -----
+    IdleInputWarning
+        For inputs that no state feels, as of a motor that is held: their gains are zero.
     """
     check_plant(plant, "lqr")
     A, B = plant.A, plant.B
     Q, R = _cost(state_cost, len(A), "state cost"), _cost(input_cost, B.shape[1], "input cost")
     equation = _Riccati(A, B, Q, R, bool(plant.isdtime(strict=True)))
     K, S, residual = _checked(equation, plant, "lqr", ("no input moves", "the state cost does not see"))
+    _warn_of_idle(plant)
     return Regulator(K, S, np.linalg.eigvals(A - B @ K), residual)
 
 
@@ -273,8 +285,23 @@ def _reason(equation: _Riccati, plant: Any, blame: tuple[str, str]) -> str:
 
 def _unfelt(plant: Any) -> str:
     """What is to be said of inputs that no state feels."""
-    names = ", ".join(name for name, column in zip(plant.input_labels, plant.B.T, strict=True) if not column.any())
+    names = ", ".join(_idle(plant))
     return f"; no state feels {names}: was all that it acts on held in the equilibrium?" if names else ""
+
+
+def _idle(plant: Any) -> list[str]:
+    return [name for name, column in zip(plant.input_labels, plant.B.T, strict=True) if not column.any()]
+
+
+def _warn_of_idle(plant: Any) -> None:
+    if not (names := _idle(plant)):
+        return
+    warnings.warn(
+        f"lqr: no state feels {', '.join(names)}, so gains there are zero. Where all that an input acts on is held, "
+        "linearize(model, at=rest.state, inputs=…) lets go of it, under inputs that bear what rest.holding tells",
+        IdleInputWarning,
+        stacklevel=3,
+    )
 
 
 def _beyond(poles: np.ndarray, sampled: bool) -> np.ndarray:

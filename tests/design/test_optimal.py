@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from functools import partial
 
 import control as ct
@@ -10,6 +11,7 @@ import pytest
 from flexctrl.design import (
     ControllerError,
     DesignError,
+    IdleInputWarning,
     Sampled,
     as_controller,
     bryson,
@@ -199,3 +201,20 @@ def test_what_cannot_be_is_refused(broken, message):
 def test_a_free_command_is_refused():
     with pytest.raises(DesignError):
         lqr(double_integrator(), np.eye(2), [[0.0]])
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_inputs_that_no_state_feels_are_told(sampled):
+    """A motor that is held: the other input's gains are those of the plant without it, its own are zero."""
+    A, B = np.array([[0.0, 1.0], [-1.0, -0.1]]), np.array([[0.0, 0.0], [0.0, 1.0]])
+    plant = ct.ss(A, B, np.eye(2), np.zeros((2, 2)), inputs=["hoist", "travel"], outputs=["x", "v"])
+    alone = ct.ss(A, B[:, 1:], np.eye(2), np.zeros((2, 1)), inputs=["travel"], outputs=["x", "v"])
+    if sampled:
+        plant, alone = (ct.sample_system(one, 0.1, copy_names=True) for one in (plant, alone))
+    with pytest.warns(IdleInputWarning, match=r"no state feels hoist, so gains there are zero.*rest\.holding"):
+        found = lqr(plant, np.eye(2), np.eye(2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        expected = lqr(alone, np.eye(2), np.eye(1))
+    assert not found.gain[0].any()
+    assert found.gain[1] == pytest.approx(expected.gain[0], rel=1e-9)
