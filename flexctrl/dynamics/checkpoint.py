@@ -20,7 +20,7 @@ from flexctrl.dynamics.origin import Origin
 from flexctrl.dynamics.records.books import Sums
 from flexctrl.dynamics.run import Tolerance
 from flexctrl.dynamics.steps import Counts, Mark, Pace, Point
-from flexctrl.errors import StructureError
+from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.structure.freedoms import check_path, check_seconds, written
@@ -182,7 +182,9 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
             version = content["format"]
             found = _unpacked(content["checkpoint"], file) if version == _FORMAT else None
     except OSError as error:
-        raise StructureError(f"load_checkpoint: {path} cannot be read: {error.strerror or error}") from error
+        raise StructureError(
+            f"load_checkpoint: {path} cannot be read: {error.strerror or error}{_beside(Path(path))}"
+        ) from error
     except _UNREADABLE as error:
         raise StructureError(f"{path} is no checkpoint: {error}; give a file that Checkpoint.save wrote") from error
     if version != _FORMAT:
@@ -193,6 +195,12 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     if not isinstance(found, Checkpoint):
         raise StructureError(f"{path} holds a {type(found).__name__}; give a file that Checkpoint.save wrote")
     return found
+
+
+def _beside(path: Path) -> str:
+    """What to give in place of a file: one of those in its folder."""
+    others = sorted(other.name for other in path.parent.glob("*.npz") if other != path)
+    return did_you_mean(path.name, others) or "; give a file that Checkpoint.save wrote"
 
 
 @frozen

@@ -131,7 +131,8 @@ class RigidBody:
             If the body has no point of that name.
         """
         if not isinstance(name, str) or name not in self.points:
-            raise StructureError(f"RigidBody {self.name!r} has no point {name!r}{did_you_mean(name, self.points)}")
+            known = did_you_mean(name, self.points) or f"; it has none: give it points={{{name!r}: (x, y, z)}}"
+            raise StructureError(f"RigidBody {self.name!r} has no point {name!r}{known}")
         return Node(self.name, 1 + list(self.points).index(name), self.points[name])
 
 

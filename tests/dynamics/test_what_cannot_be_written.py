@@ -71,7 +71,10 @@ def test_what_a_full_disk_does_not_take_is_told_and_no_part_is_left(run, tmp_pat
 
 
 def test_a_checkpoint_that_is_not_there_is_told(tmp_path):
-    with pytest.raises(StructureError, match=r"load_checkpoint: .*run.npz cannot be read: No such file"):
+    with pytest.raises(StructureError, match=r"load_checkpoint: .*run.npz cannot be read: No such file.*; give a file"):
+        fc.load_checkpoint(tmp_path / "run.npz")
+    (tmp_path / "run_1.npz").touch()
+    with pytest.raises(StructureError, match=r"cannot be read: No such file.*; did you mean 'run_1.npz'\?"):
         fc.load_checkpoint(tmp_path / "run.npz")
     with pytest.raises(StructureError, match=r"load_checkpoint: path = .* is a folder; expected the name of a file"):
         fc.load_checkpoint(tmp_path)

@@ -34,6 +34,8 @@ WRONG = {
         lambda l: l.reduce(fc.RelativeError(0.1), using=fc.BalancedTruncation(4)),
         "using = BalancedTruncation.*function of its order",
     ),
+    "a number for an interface": (lambda l: fc.CraigBampton(999), r"interface = 999; expected names.*modes=10"),
+    "a word for an interface": (lambda l: fc.CraigBampton("tip"), "interface = 'tip'; expected names"),
     "fewer than no modes": (lambda l: fc.CraigBampton((l.coordinates[0],), -2), "modes = -2"),
     "a band below zero": (lambda l: l.reduce(fc.ModalTruncation(4)).error_up_to(-1.0), r"hz = -1\.0"),
     "a band up to nothing": (lambda l: l.reduce(fc.ModalTruncation(4)).error_up_to(np.nan), "hz = nan"),

@@ -160,6 +160,10 @@ def test_names_are_identifiers(name):
         (lambda: beam().node(1.0), "there is no node 1.0"),
         (lambda: body(points={"eye": (0, 0, 0)}).point("eyes"), "no point 'eyes'; did you mean 'eye'"),
         (lambda: body().point(3), "no point 3"),
+        (
+            lambda: fc.RigidBody("hook", (0, 0, 0), 1.0, (1, 1, 1)).point("b"),
+            r"no point 'b'; it has none: give it points=",
+        ),
         (lambda: body(points=[("eye", (0, 0, 0))]), "points = .*expected a mapping"),
         (lambda: body(inertia=(1, 1, 5)), "belong to no body"),
         (lambda: body(inertia=(1, 1, -1)), "belong to no body"),

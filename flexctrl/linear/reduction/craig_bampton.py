@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from flexctrl.errors import LinearizationError, ReductionError, did_you_mean
+from flexctrl.errors import LinearizationError, ReductionError, did_you_mean, shortened
 from flexctrl.frozen import frozen
 from flexctrl.linear.eigen import Eigenpairs, complete_pairs, coordinate_scales, lowest_pairs
 from flexctrl.linear.model import LinearModel
@@ -48,6 +48,12 @@ class CraigBampton:
     static_correction: bool = False
 
     def __post_init__(self) -> None:
+        named = isinstance(self.interface, tuple | list) and all(isinstance(name, str) for name in self.interface)
+        if not named:
+            raise ReductionError(
+                f"CraigBampton: interface = {shortened(self.interface)}; expected names of coordinates, as "
+                f"CraigBampton(('beam_4_u',), modes={self.modes!r})"
+            )
         whole = isinstance(self.modes, int) and self.modes >= 0
         if not whole and not isinstance(self.modes, BelowFrequency):
             raise ReductionError(
