@@ -37,6 +37,24 @@ def test_what_is_smaller_than_errors_of_steps(push):
     assert not any("nothing moves" in note for note in fit.report.notes)
 
 
+@pytest.mark.parametrize("until", [1.0, 10.0, 60.0])
+@pytest.mark.parametrize("push", [1e-6, 1e-5, 1e-4, 4e-4])
+@pytest.mark.parametrize("method", [None, fc.ExplicitRungeKutta()])
+def test_all_of_what_is_smaller_than_errors_of_steps_may_be_wrong(method, push, until):
+    """Explicit steps that see nothing to resolve are unstable, and have it grow a hundred times."""
+    run = fc.simulate(oscillator(), until=until, inputs={"push": push}, method=method)
+    assert run.report.error >= min(off(run, push), 1.0)
+    assert run.report.output_errors["x"] >= min(off(run, push), 1.0)
+
+
+@pytest.mark.parametrize("push", [4e-3, 4e-2, 0.4])
+def test_a_swing_in_opposition_is_all_wrong(push):
+    """It was told as half of what it is: no more than its amplitude, which is half of the way to and fro."""
+    run = fc.simulate(oscillator(), until=60.0, inputs={"push": push})
+    assert off(run, push) > 0.8
+    assert run.report.error == pytest.approx(1.0, abs=0.01)
+
+
 def test_what_rests_or_moves_is_not_named():
     for inputs in ({}, {"push": 1.0}):
         assert not fc.simulate(oscillator(), until=1.0, inputs=inputs).report.notes

@@ -91,3 +91,12 @@ def test_what_moves_by_little_beside_what_is_large_is_told_of(way, method):
     assert run.report.output_errors["x"] > 0.1
     assert any(note.startswith("x has moved by") for note in run.report.notes)
     assert run.report.output_errors["far"] < 1e-3
+
+
+@pytest.mark.parametrize("way", [1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("method", [None, fc.ExplicitRungeKutta()])
+def test_what_moves_by_little_is_off_by_no_more_than_is_told(way, method):
+    model, start = beside_a_crane(way)
+    run = fc.simulate(model, until=2.0, every=0.01, start=start, method=method)
+    off = np.abs(run["x"] - 1.0 - way * np.sin(20.0 * run.t)).max() / np.ptp(run["x"])
+    assert off < run.report.output_errors["x"]

@@ -9,7 +9,8 @@ import numpy as np
 
 from flexctrl.dynamics.notes.lengths import usual
 from flexctrl.dynamics.notes.percent import percent
-from flexctrl.dynamics.records.absurd import missed
+from flexctrl.dynamics.notes.unsized import faint, is_faint
+from flexctrl.dynamics.records.absurd import LOOKED_AT, missed
 from flexctrl.dynamics.scales import farthest, yardsticks
 from flexctrl.dynamics.steps import Controlled, Fixed
 
@@ -56,9 +57,10 @@ def drifted(journey: Journey) -> Drift:
 
     Of a local error counts what is along the motion: a share κ = Σ e v / Σ h v² of the time that goes by. Over a way
     Σ h |v| to and fro that is up to π/2 κ Σ h |v|. What is across, or turns round as the motion does, does not add up.
-    No more is told than how far the freedom has moved, nor than twice the width 2 V/ω of what is late, V = 4/π Σ h v² /
-    Σ h |v| and ω² = Σ h a² / Σ h v²: fast ripples on a slow motion are only as late as they are wide. That growth makes
-    errors larger is not seen. What no law leads runs off with its speed, too, where a method takes or makes energy: see
+    Of a motion that is little against what each step may err by, all may be wrong. Of others no more is told than how
+    far the freedom has moved, to and fro, nor than twice the width 2 V/ω of what is late, V = 4/π Σ h v² / Σ h |v| and
+    ω² = Σ h a² / Σ h v²: fast ripples on a slow motion are only as late as they are wide. That growth makes errors
+    larger is not seen. What no law leads runs off with its speed, too, where a method takes or makes energy: see
     `_run_off`.
 
     Parameters
@@ -75,17 +77,21 @@ def drifted(journey: Journey) -> Drift:
         return Drift()
     went = (sums.swept > 0.0) & np.isfinite(sums.ahead * sums.path / sums.swept)
     late = 0.5 * math.pi * np.abs(sums.ahead[went]) * sums.path[went] / sums.swept[went]
-    off, width = np.zeros(model.n), np.zeros(model.n)
-    off[went] = np.minimum(late, sums.moved[went])
+    off, width, to_and_fro = np.zeros(model.n), np.zeros(model.n), 2.0 * sums.moved
+    off[went] = np.minimum(late, to_and_fro[went])
     width[went] = _width(sums.swept[went], sums.bent[went], sums.path[went])
     most = np.maximum(farthest(model, sums.moved), _REST * plan.tolerance.negligible) * yardsticks(model)
     lags = np.minimum(stepper.remains(off / most), width / most)
     ran = _run_off(journey) / most
     shares = np.maximum(lags, ran)
     worst = int(np.argmax(shares))
-    share, freedom = float(shares[worst]), model.coordinates[worst]
+    share, freedom = min(float(shares[worst]), 1.0), model.coordinates[worst]
+    parts = faint(journey)
+    off = np.where(parts, np.maximum(shares, 1.0), shares) * _judged(most)  # dense output may go beyond steps
+    if is_faint(journey, parts):  # a note of its own says so
+        return Drift(1.0, freedom, "", off, 1.0)
     note = _note(journey, share, freedom) if share > _TOLD else ""
-    return Drift(share, freedom, note, shares * _judged(most), float(ran.max()))
+    return Drift(share, freedom, note, off, float(ran.max()))
 
 
 def _judged(yard: np.ndarray) -> np.ndarray:
@@ -94,9 +100,12 @@ def _judged(yard: np.ndarray) -> np.ndarray:
 
 
 def _width(swept: np.ndarray, bent: np.ndarray, path: np.ndarray) -> np.ndarray:
-    """Twice how far what is fast in a motion goes to and fro; of several frequencies that is less than the widest."""
+    """Twice how far what is fast in a motion goes to and fro; of several frequencies that is less than the widest.
+
+    Paths are of all steps, the others of those looked at.
+    """
     with np.errstate(divide="ignore", over="ignore"):
-        return np.asarray(16.0 / math.pi * swept**1.5 / (path * np.sqrt(bent)))
+        return np.asarray(16.0 / math.pi * LOOKED_AT * swept**1.5 / (path * np.sqrt(bent)))
 
 
 def _run_off(journey: Journey) -> np.ndarray:

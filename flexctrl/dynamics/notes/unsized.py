@@ -6,16 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.scales import turning, yardsticks
+from flexctrl.dynamics.scales import farthest, turning, yardsticks
 from flexctrl.dynamics.steps import Controlled
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["little", "unsized"]
+__all__ = ["faint", "is_faint", "little", "unsized"]
 
 _LITTLE, _NOTHING, _FIT = 20.0, 1e-2, 1e-3
 """Absolute tolerances that a motion goes through: a few errors of steps, no more than rounding; what fits."""
+_ROUNDING = 1e-3
+"""Where a part rests beside what moves, and has outputs of its own."""
 
 
 def unsized(journey: Journey) -> tuple[str, ...]:
@@ -58,10 +60,10 @@ def little(journey: Journey) -> tuple[str, ...]:
     -------
     tuple of str
     """
-    plan, reach, tolerance = journey.plan, journey.books.reach, journey.plan.tolerance
+    plan, tolerance = journey.plan, journey.plan.tolerance
     if not (plan.model.structure.sized and isinstance(plan.method.pace, Controlled) and journey.mark.steps):
         return ()
-    gone = float((journey.books.sums.moved / reach).max(initial=0.0))
+    gone = float((journey.books.sums.moved / journey.books.reach).max(initial=0.0))
     if not _NOTHING * tolerance.absolute < gone < _LITTLE * tolerance.absolute:
         return ()
     fit = _FIT * 10.0 ** np.floor(np.log10(gone))
@@ -69,3 +71,45 @@ def little(journey: Journey) -> tuple[str, ...]:
         f"nothing moves by more than {gone:.1g} of the machine's size or of a radian, and each step may err by "
         f"{tolerance.absolute:.1g} of that: give Tolerance({tolerance.relative:g}, {fit:.0e})",
     )
+
+
+def faint(journey: Journey) -> np.ndarray:
+    """Return which freedoms are of parts that move by little against what each step may err by, shape (n,).
+
+    Nothing is known of them, whatever is estimated: steps are as long as if nothing moved there. Samples keep them
+    shorter than the tolerance would.
+
+    Parameters
+    ----------
+    journey : Journey
+        At its end.
+
+    Returns
+    -------
+    numpy.ndarray
+    """
+    plan, mark, pace = journey.plan, journey.mark, journey.plan.method.pace
+    gone = farthest(plan.model, journey.books.sums.moved)
+    if not (isinstance(pace, Controlled) and mark.steps):
+        return np.zeros(gone.shape, dtype=bool)
+    shorter = min(1.0, journey.point.state.t / (mark.steps * mark.size)) if plan.feed.sample_time else 1.0
+    allowed = plan.tolerance.absolute * shorter**pace.steepness
+    return np.asarray((gone > _ROUNDING * allowed) & (gone < _LITTLE * allowed))
+
+
+def is_faint(journey: Journey, parts: np.ndarray) -> bool:
+    """Tell whether all that moves by more than rounding is faint.
+
+    Parameters
+    ----------
+    journey : Journey
+    parts : numpy.ndarray, shape (n,)
+        Which freedoms are of faint parts.
+
+    Returns
+    -------
+    bool
+    """
+    gone = farthest(journey.plan.model, journey.books.sums.moved)
+    worst = int(np.argmax(gone))
+    return bool(parts[worst] and gone[worst] > _NOTHING * journey.plan.tolerance.absolute)
