@@ -58,7 +58,7 @@ def drifted(journey: Journey) -> Drift:
     Of a local error counts what is along the motion: a share κ = Σ e v / Σ h v² of the time that goes by. Over a way
     Σ h |v| to and fro that is up to π/2 κ Σ h |v|. What is across, or turns round as the motion does, does not add up.
     Of a motion that is little against what each step may err by, all may be wrong. Of others no more is told than how
-    far the freedom has moved, to and fro, nor than twice the width 2 V/ω of what is late, V = 4/π Σ h v² / Σ h |v| and
+    far the freedom has moved, to and fro, nor than the width 2 V/ω of what is late, V = 4/π Σ h v² / Σ h |v| and
     ω² = Σ h a² / Σ h v²: fast ripples on a slow motion are only as late as they are wide. That growth makes errors
     larger is not seen. What no law leads runs off with its speed, too, where a method takes or makes energy: see
     `_run_off`.
@@ -100,12 +100,12 @@ def _judged(yard: np.ndarray) -> np.ndarray:
 
 
 def _width(swept: np.ndarray, bent: np.ndarray, path: np.ndarray) -> np.ndarray:
-    """Twice how far what is fast in a motion goes to and fro; of several frequencies that is less than the widest.
+    """How far what is fast in a motion goes to and fro; of several frequencies that is less than the widest.
 
     Paths are of all steps, the others of those looked at.
     """
     with np.errstate(divide="ignore", over="ignore"):
-        return np.asarray(16.0 / math.pi * LOOKED_AT * swept**1.5 / (path * np.sqrt(bent)))
+        return np.asarray(8.0 / math.pi * LOOKED_AT * swept**1.5 / (path * np.sqrt(bent)))
 
 
 def _run_off(journey: Journey) -> np.ndarray:
