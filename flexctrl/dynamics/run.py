@@ -140,7 +140,7 @@ class Report:
         How far conditions that close rigid loops were violated [rad, or shares of what they span].
     drift : float
         What errors of steps may have added up to, over the largest motion (at most a radian or the machine's size); 0
-        where a linear model is integrated exactly.
+        where `Exact` takes the steps, of which ``error`` alone tells what a law that it interpolates leaves.
     drifted : str
         The degree of freedom in which that is most.
     error : float
@@ -151,10 +151,11 @@ class Report:
     output_errors : mapping of str to float
         By how much outputs may be off at an instant, each over the range of its own values (1: all of it): a
         deflection of millimetres beside a travel of metres. Forces and rates by other runs laid beside, by how they
-        ring after loads that are put on at once, or by how large they get in a finer run (over their largest value),
-        whichever tells more; where none of these is there, nothing is told of them. Empty for linear
-        models; places that move, and rates that are, no more than absolute tolerances are left out, and tensions that
-        are no more than what the last digits of places make.
+        ring after loads that are put on at once, or by how large they get in a finer run (over their largest
+        value), whichever tells more; where none of these is there, nothing is told of them. Of linear models all
+        outputs are told of by a finer run under continuous laws that are not linear; empty for others. Places that
+        move, and rates that are, no more than absolute tolerances are left out, and tensions that are no more than
+        what the last digits of places make.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str

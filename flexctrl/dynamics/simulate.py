@@ -17,6 +17,7 @@ from flexctrl.dynamics.checking import laid_beside
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, check_same
 from flexctrl.dynamics.events.event import Event
 from flexctrl.dynamics.feed import feed_of
+from flexctrl.dynamics.interpolated import halved, interpolates
 from flexctrl.dynamics.interrupt import Interruption
 from flexctrl.dynamics.journey import Journey, Plan
 from flexctrl.dynamics.linear_motion.plant import LinearPlant
@@ -208,6 +209,8 @@ def _compared(run: Run, journey: Journey, check: Checked, beginning: Beginning |
             run = noted(bounced(told, run, journey, beginning), *unseen(journey))
         else:
             run = seen_until(run, run.final.t)
+    elif beginning and interpolates(journey):
+        run = halved(run, journey, check, beginning)
     elif beginning and is_cut(journey):
         run = noted(run, f"{UNCHECKED} (interrupted)")
     told = turned_over(said_of_rates(ringing(run, journey), journey), journey)

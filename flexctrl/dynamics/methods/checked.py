@@ -120,14 +120,16 @@ class Checked(_Wrapped):
     more by a shaft whose vibration steps do not see: it is run once more by a method that damps that (ρ = 0). What this
     tells of outputs counts if it is more, and a note says by what they bounce.
 
-    Steps of one length are checked where it has gone so far twelve times, to and fro. Where forces or rates are then a
-    hundredth of their range apart, one in half the steps tells of these; what has met four corners is confirmed by one
-    in a quarter of the steps, as what is told past corners comes from one in half. Where samples keep nearly all
-    steps short the other run is a finer one, in half the steps, for what has turned so, for corners, for forces and
-    rates, and for laws that meet limits; in a quarter of the steps for laws that jump by half a percent of what they
-    say, and twice more under a law that misreads by as much as it is off, if nothing is told. Nothing is run again for
-    linear models and what is integrated exactly. A sampled law in Python is asked again as a copy of what it was before
-    the run; what goes on from a `Checkpoint` is laid beside what goes on from where the run beside stood.
+    Steps of one length are checked where it has gone so far twelve times, to and fro. Where forces or rates are
+    then a hundredth of their range apart, one in half the steps tells of these; what has met four corners is
+    confirmed by one in a quarter of the steps, as what is told past corners comes from one in half. Where samples
+    keep nearly all steps short the other run is a finer one, in half the steps, for what has turned so, for
+    corners, for forces and rates, and for laws that meet limits; in a quarter of the steps for laws that jump by
+    half a percent of what they say, and twice more under a law that misreads by as much as it is off, if nothing is
+    told. Of linear models, and of what `Exact` takes steps of, a run in half the steps is made under continuous
+    laws that are not linear, which `Exact` interpolates; of others nothing is run again. A sampled law in Python is
+    asked again as a copy of what it was before the run; what goes on from a `Checkpoint` is laid beside what goes
+    on from where the run beside stood.
 
     Parameters
     ----------

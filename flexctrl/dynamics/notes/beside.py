@@ -77,7 +77,7 @@ def can_be_told(journey: Journey) -> bool:
     Returns
     -------
     bool
-        False for linear models, what is integrated exactly, and where the run ended early.
+        False for linear models and `Exact`, of which `interpolated` tells, and where the run ended early.
     """
     return journey.status in (Status.FINISHED, Status.STOPPED) and _has_steps_to_judge(journey)
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Gap", "between", "gap_at", "interpolated", "is_short"]
 
 _POINTS, _FEW = 4, 1500
+_DUST = 1e-9
 _INSTANTS, _FEWER, _GOLDEN = 16, 8, 0.5 * (5.0**0.5 - 1.0)
 
 
@@ -75,7 +76,8 @@ def between(run: Run, other: Run, journey: Journey, taken: int) -> Gap:
     Gap
     """
     model = journey.plan.model
-    assert isinstance(model, Model)
+    if not isinstance(model, Model):
+        return _of_outputs(run, other, journey)
     instants = _INSTANTS if taken <= _FEW else 0 if placed(model) else _FEWER  # rows of rates tell nothing of places
     if instants and _kept(run, other, journey):
         return _of_tracks(run, other, journey, instants)
@@ -180,6 +182,24 @@ def _of_rows(run: Run, other: Run, journey: Journey) -> Gap:
         return Gap.unseen(run)
     worst = names[int(np.argmax(apart.max(axis=0)))]
     return Gap(t, np.maximum.accumulate(apart.max(axis=1)) / _most(journey), worst, read)
+
+
+def _of_outputs(run: Run, other: Run, journey: Journey) -> Gap:
+    """All outputs of a linear model, row by row, over how far each goes, and its coordinates at the end."""
+    model, near, way = journey.plan.model, 1e-9 * run.final.t, np.ptp(run.y, axis=0) if len(run.y) else np.zeros(0)
+    within = (other.t >= run.t[0] - near) & (other.t <= run.final.t + near) if len(run.t) >= _POINTS else []
+    rows = np.zeros((0, way.size))
+    t = other.t[within] if way.size and len(within) else np.zeros(0)
+    if t.size:
+        rows = np.abs(other.y[within] - interpolated(run.t, run.y, t))
+    yards = output_yardsticks(model, journey.mark.size) * _most(journey)
+    apart = rows / np.where(way > _DUST * yards, way, np.inf)
+    last = np.abs(other.final.q - run.final.q) / _most(journey)
+    names, ends = [*run.outputs, *model.coordinates], np.append(np.zeros(way.size), last)
+    apart = np.vstack([np.hstack([apart, np.zeros((len(apart), last.size))]), ends])
+    worst = names[int(np.argmax(apart.max(axis=0)))]
+    size = np.maximum.accumulate(apart.max(axis=1))
+    return Gap(np.append(t, run.final.t), size, worst, rows.max(axis=0, initial=0.0))
 
 
 def interpolated(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:

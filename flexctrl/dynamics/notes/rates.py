@@ -311,7 +311,8 @@ def said_of_rates(run: Run, journey: Journey) -> Run:
     """
     model, report = journey.plan.model, run.report
     if not isinstance(model, Model):  # linear equations; `judging` is None where they are solved exactly
-        return run if journey.judging is None else replace(run, report=replace(report, notes=(*report.notes, _LINEAR)))
+        known = journey.judging is None or report.output_errors
+        return run if known else replace(run, report=replace(report, notes=(*report.notes, _LINEAR)))
     names = [model.outputs[i] for i in _judged(run, journey, _LITTLE)]
     shares = {name: report.output_errors.get(name, 0.0) for name in names if not is_named(name, report.notes)}
     far = [name for name in shares if shares[name] > max(_NOTED, _BESIDE * report.error)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexctrl.dynamics.notes.gap import Gap, gap_at
 from flexctrl.dynamics.run import Run
+from flexctrl.model.model import Model
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -76,7 +77,8 @@ def is_after_a_cut(journey: Journey) -> bool:
 def _narrowed(run: Run, other: Run, journey: Journey, within: tuple[float, float], least: float) -> float:
     """Until when it is so between two instants: as far as steps are kept that need not all be taken again."""
     low, high = within
-    if not (run.track.stretches and other.track.stretches) or journey.plan.feed.sample_time:
+    kept = run.track.stretches and other.track.stretches and isinstance(journey.plan.model, Model)
+    if not kept or journey.plan.feed.sample_time:
         return low
     if low <= (begin := max(run.track.starts[0], other.track.starts[0])):
         if journey.begin and gap_at(run, other, journey, begin) > least:

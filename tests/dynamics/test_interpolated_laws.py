@@ -1,0 +1,110 @@
+"""Laws that `Exact` interpolates leave errors that add up and grow: a finer run tells of each output."""
+
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import flexctrl as fc
+
+DAMPING, SHAKEN, PACE = 0.15, 0.3, 1.0
+EVERY = 0.2
+
+
+class Wells:
+    """Two magnets that draw a mass out of the middle, and what shakes it."""
+
+    inputs, outputs, sample_time = ("x", "v"), ("pull",), 0.0
+
+    def initial(self):
+        return np.zeros(0)
+
+    def command(self, t, x, y):
+        return np.array([2.0 * y[0] - y[0] ** 3 + SHAKEN * np.cos(PACE * t)])
+
+    def rate(self, t, x, y):
+        return np.zeros(0)
+
+
+def sprung(damping: float = DAMPING) -> fc.Model:
+    mass = fc.PointMass("mass", (0, 0, 0), 1.0)
+    spring = fc.Spring("spring", (-10, 0, 0), mass.node, stiffness=1.0, damping=damping)
+    return fc.assemble(
+        fc.Structure(
+            [mass, spring],
+            [fc.Support(spring.start), fc.Pin(spring.end, mass.node), fc.Support(mass.node, "v w")],
+            inputs=[fc.Force("pull", mass.node, "x")],
+            outputs=[fc.Position("x", mass.node, "x"), fc.Velocity("v", mass.node, "x")],
+        ),
+        [],
+    )
+
+
+def shaken(kind: str, method: fc.Integrator | None, until: float) -> tuple[fc.Run, np.ndarray]:
+    """A run, and by how much each output is off over its range."""
+    model = sprung()
+    machine = fc.linearize(model) if kind == "linear" else model
+    run = fc.simulate(machine, Wells(), until=until, every=EVERY, start=model.displace([0.2]), method=method)
+    assert run.status is fc.Status.FINISHED
+    true = solve_ivp(
+        lambda t, z: [z[1], z[0] - DAMPING * z[1] - z[0] ** 3 + SHAKEN * np.cos(PACE * t)],
+        (0.0, until + EVERY),
+        [0.2, 0.0],
+        t_eval=run.t,
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-13,
+    ).y.T
+    return run, np.abs(run.y - true).max(axis=0) / np.ptp(true, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "method"),
+    [
+        ("linear", None),
+        ("small", fc.Exact(0.2)),
+        ("linear", fc.AdaptiveAlpha()),
+        ("linear", fc.Richardson(fc.GeneralizedAlpha(0.05))),
+    ],
+)
+@pytest.mark.parametrize("until", [15.0, 90.0])
+def test_what_grows_under_a_law_that_is_interpolated_is_told(kind, method, until):
+    """Of the linear default half of the motion was off at 90 s, and the report told 0."""
+    run, off = shaken(kind, method, until)
+    told = [run.report.output_errors[name] for name in ("x", "v")]
+    assert (told >= np.minimum(0.6 * off, 0.5)).all()
+    assert (told <= np.maximum(4.0 * off, 0.02)).all()
+    assert run.report.error >= 0.6 * min(off[0], 0.5)
+    assert any("by a finer run" in note for note in run.report.notes) == (run.report.error > 0.03)
+
+
+@pytest.mark.parametrize("step", [0.2, 0.5])
+def test_a_linear_law_on_a_model_in_small_motion_is_told_as_it_is(step):
+    """Against the exponential of the closed loop: interpolated there, and closed on the linear model."""
+    model, law = sprung(0.0), control.ss([[-3.0]], [[1.0, 0.5]], [[-4.0]], [[-6.0, -1.0]])
+    law.set_inputs(["x", "v"])
+    law.set_outputs(["pull"])
+    run = fc.simulate(model, law, until=5.0, every=0.1, start=model.displace([0.2]), method=fc.Exact(step))
+    loop = np.array([[0.0, 1.0, 0.0], [-1.0 - 6.0, -1.0, -4.0], [1.0, 0.5, -3.0]])
+    true = np.array([expm(loop * t) @ [0.2, 0.0, 0.0] for t in run.t])[:, :2]
+    off = np.abs(run.y - true).max(axis=0) / np.ptp(true, axis=0)
+    told = np.array([run.report.output_errors[name] for name in ("x", "v")])
+    assert (off > 1e-8).all()
+    assert (told >= 0.5 * off).all()
+    assert (told <= 20.0 * off).all()
+    exact = fc.simulate(fc.linearize(model), law, until=5.0, every=0.1, start=model.displace([0.2]))
+    assert exact.y == pytest.approx(true, abs=1e-11)
+    assert not exact.report.output_errors
+
+
+def test_nothing_is_run_again_where_nothing_is_interpolated_or_it_is_not_wanted():
+    model = sprung()
+    held = fc.simulate(fc.linearize(model), until=5.0, every=EVERY, inputs={"pull": 1.0})
+    unasked, _ = shaken("linear", fc.Unchecked(fc.Exact(EVERY)), 30.0)
+    for run in (held, unasked):
+        assert not run.report.error
+        assert not run.report.output_errors
+        assert not run.report.notes
