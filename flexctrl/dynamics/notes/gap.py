@@ -145,15 +145,19 @@ def _of_tracks(run: Run, other: Run, journey: Journey, instants: int) -> Gap:
 
 
 def _farthest(run: Run, other: Run, model: Model, within: tuple[float, float]) -> np.ndarray:
-    """Instants at which places and angles among the outputs are farthest apart as rows have it, those that are most."""
+    """Instants at which places and angles among the outputs are farthest apart as rows have it, those that are most;
+    and those since when they are by half of all, a quarter, and so on: growth shows there.
+    """
     rows, judged = np.flatnonzero((other.t > within[0]) & (other.t < within[1])), placed(model)
     if len(run.t) < _POINTS or not len(rows) or not judged:
         return np.zeros(0)
     yards = output_yardsticks(model, 1.0)[judged]
     apart = np.abs(other.y[rows][:, judged] - interpolated(run.t, run.y[:, judged], other.t[rows]))
     apart = np.nan_to_num(apart / np.where(yards > 0.0, yards, np.inf), posinf=0.0)
-    far = np.argmax(apart, axis=0)
-    return other.t[rows[far[np.argsort(-apart.max(axis=0))[:_FEWER]]]]
+    far = np.argmax(apart, axis=0)[np.argsort(-apart.max(axis=0))[:_FEWER]]
+    so_far = np.maximum.accumulate(apart.max(axis=1))
+    halves = np.searchsorted(so_far, so_far[-1] * 0.5 ** np.arange(1, _FEWER + 1))
+    return other.t[rows[np.append(far, halves)]]
 
 
 def _of_rows(run: Run, other: Run, journey: Journey) -> Gap:
