@@ -19,7 +19,7 @@ from flexctrl.dynamics.notes.lengths import usual
 from flexctrl.dynamics.notes.outputs import ways
 from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.notes.rates import Apart
-from flexctrl.dynamics.others import Beginning, made
+from flexctrl.dynamics.others import UNCHECKED, Beginning, made, noted
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.scales import farthest, output_yardsticks
 from flexctrl.dynamics.steps import Controlled
@@ -47,8 +47,6 @@ def interpolates(journey: Journey) -> bool:
     bool
         Where `Exact` interpolates a law, and under a continuous law on a linear model by any other method.
     """
-    if journey.status not in (Status.FINISHED, Status.STOPPED) or not journey.mark.steps:
-        return False
     feed, stepper = journey.plan.feed, plain_of(journey.stepper)
     if isinstance(stepper, ExactStepper):
         return feed.continuous and not stepper.closed
@@ -70,6 +68,8 @@ def halved(run: Run, journey: Journey, method: Checked, beginning: Beginning) ->
     -------
     Run
     """
+    if run.status is Status.INTERRUPTED:
+        return noted(run, f"{UNCHECKED} (interrupted)")
     run, other = made(run, journey, _finer(journey, method), beginning)
     if other is None:
         return run

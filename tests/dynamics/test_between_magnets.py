@@ -117,6 +117,17 @@ def test_nothing_is_run_again_where_nothing_is_interpolated_or_it_is_not_wanted(
         assert not run.report.notes
 
 
+def test_what_is_interrupted_is_not_called_right():
+    def stop(share):
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    model = sprung(0.15)
+    run = fc.simulate(fc.linearize(model), Wells(), until=20.0, start=model.displace([0.2]), progress=stop)
+    assert run.status is fc.Status.INTERRUPTED
+    assert run.report.notes == ("how far small differences have grown is not told by another run (interrupted)",)
+
+
 @pytest.mark.parametrize(("damping", "pace"), [(0.05, 1.2), (0.15, 1.0), (0.2, 1.0)])
 def test_a_run_is_right_until_it_says(damping, pace):
     """It said 41.9 s of the first, where it had been off by a tenth since 40.4 s: 16 instants were looked at."""
