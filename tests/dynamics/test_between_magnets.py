@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import flexctrl as fc
+from flexctrl.dynamics.notes.lengths import in_words
 
 EVERY = 0.2
 
@@ -86,6 +87,11 @@ def test_what_grows_under_a_law_that_is_interpolated_is_told(kind, method, until
     assert (told <= np.maximum(4.0 * off, 0.02)).all()
     assert run.report.error >= 0.6 * min(off[0], 0.5)
     assert any("by a finer run" in note for note in run.report.notes) == (run.report.error > 0.03)
+
+
+@pytest.mark.parametrize(("length", "words"), [(0.158, "0.16"), (0.14, "0.1"), (0.199, "0.2"), (1.2e-4, "0.0001")])
+def test_a_remedy_is_no_step_as_long_as_the_one_taken(length, words):
+    assert in_words(length, 0.2) == words
 
 
 @pytest.mark.parametrize("step", [0.2, 0.5])

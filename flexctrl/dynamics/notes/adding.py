@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from flexctrl.dynamics.notes.lengths import usual
+from flexctrl.dynamics.notes.lengths import in_words, usual
 from flexctrl.dynamics.notes.percent import percent
 from flexctrl.dynamics.notes.unsized import faint, is_faint
 from flexctrl.dynamics.records.absurd import LOOKED_AT, missed
@@ -155,6 +155,7 @@ def remedy(journey: Journey, share: float) -> str:
         less *= min(1.0, journey.point.state.t / (mark.steps * mark.size)) ** pace.steepness  # samples keep them short
         said = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
-        finer = usual(journey) * (_AIM / share) ** (1.0 / max(2.0 * power, plan.method.order))
-        said = f"take steps of {finer:.1g} s"
+        step = usual(journey)
+        finer = step * (_AIM / share) ** (1.0 / max(2.0 * power, plan.method.order))
+        said = f"take steps of {in_words(finer, step)} s"
     return said + ", or take Richardson of the method" * (plan.method.order == 2 and share < _ASTRAY)

@@ -12,7 +12,7 @@ import numpy as np
 from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.gap import Gap
 from flexctrl.dynamics.notes.heard import heard
-from flexctrl.dynamics.notes.lengths import as_many, usual
+from flexctrl.dynamics.notes.lengths import as_many, in_words, usual
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.notes.peaks import unresolved
 from flexctrl.dynamics.notes.percent import percent
@@ -337,5 +337,6 @@ def _note(journey: Journey, gap: Gap, error: float, right: float, kind: str) -> 
         less, asked = finer**pace.steepness, plan.tolerance
         remedy = f"give Tolerance({less * asked.relative:.1g}, {less * asked.absolute:.1g})"
     else:
-        remedy = f"take steps of {finer * usual(journey):.1g} s"
+        step = usual(journey)
+        remedy = f"take steps of {in_words(finer * step, step)} s"
     return f"{said}; {said_until(journey.origin, right, f'{TOLD:.0%}')}: {remedy}"

@@ -11,12 +11,28 @@ from flexctrl.dynamics.steps import Controlled
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["as_many", "usual"]
+__all__ = ["as_many", "in_words", "usual"]
 
 _SHORTER = 0.25
 """Of the time, steps may be shorter than those that are usual."""
 _HALVED = 1.3
 """So many more steps than were planned."""
+
+
+def in_words(length: float, step: float) -> str:
+    """Return a length of steps in words: in one digit, or in two where one would make it as long as a step.
+
+    Parameters
+    ----------
+    length, step : float
+        [s]
+
+    Returns
+    -------
+    str
+    """
+    short = f"{length:.1g}"
+    return short if float(short) < 0.9 * step else f"{length:.2g}"
 
 
 def usual(journey: Journey) -> float:
