@@ -379,6 +379,10 @@ class Balance:
         """Return the largest of some displacements, in radians or sizes of the machine."""
         return float(np.abs(step / self.unit).max(initial=0.0))
 
+    def moved_freely(self, step: np.ndarray) -> float:
+        """Return the same of the free coordinates alone: what is held goes as far whatever else happens."""
+        return float(np.abs(step[self.free] / self.unit[self.free]).max(initial=0.0))
+
     def part(self, start: State, holding: np.ndarray, done: float) -> Balance:
         """Return the way to this balance from a start that forces ``holding`` hold: 0 there, 1 here.
 

@@ -156,12 +156,13 @@ class _Search:
     def __init__(self, newton: Newton, start: State, shift: float, watched: bool) -> None:
         balance = newton.balance
         force, there = balance.force(start), balance.astray(start) == 0.0
-        self.scale = max(balance.scale(start), 0.0 if there else _DUST_OF * balance.called_forth(start))
+        called = 0.0 if there else balance.called_forth(start)
+        self.scale = max(balance.scale(start), _DUST_OF * called)
         self.newton, self.balance = newton, balance
         self.shift, self.floor, self.most = shift, 1e-7 * shift, _FASTEST * shift
         # what is not yet in its place calls forth what no force at the start tells of
-        all_left = float(not there and (watched or not balance.loaded))
-        self.best, self.least = start, max(balance.relative(force, self.scale), all_left)
+        untold = watched or not balance.loaded or not force.any()
+        self.best, self.least = start, max(balance.relative(force, self.scale), untold * called / self.scale)
         self.here = _Iterate(start, None, force, self.least)
         self.before, self.iterations, self.stalled = np.inf, 0, 0
         self.steady = self.contracting = True
@@ -183,7 +184,7 @@ class _Search:
             return self._held_faster()
         size = self.balance.moved(step)
         share = min(1.0, newton.reach / size) if size > 0.0 else 1.0
-        if self.shift and share < _TOO_FAR:
+        if self.shift and self.newton.reach < _TOO_FAR * self.balance.moved_freely(step):
             return self._held_faster()
         there = newton.after(here, step, share, self.scale)
         if not there.left <= 1e3 * max(here.left, newton.tolerance):

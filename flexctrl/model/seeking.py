@@ -135,8 +135,7 @@ def _loaded(balance: Balance, start: State, tolerance: float) -> Found:
 def _hung(balance: Balance, start: State, tolerance: float) -> Found:
     """Where masses lead a shape to that does not stand by itself."""
     force = balance.force(start)
-    load = max(float(np.abs(force / balance.lever[balance.free]).max(initial=0.0)), 1e-300)
-    shift = 10.0 * load / (balance.heaviest * balance.size) if force.size else 0.0
+    shift = _first_shift(balance, start, force) if force.size else 0.0
     found = _softly(balance, start, shift, tolerance)
     if not found.done:
         found = follow(balance, start, tolerance, strict=False)[0]
@@ -148,6 +147,13 @@ def _hung(balance: Balance, start: State, tolerance: float) -> Found:
     if not found.done:
         raise EquilibriumError(_complaint(balance, found), found.state, found.residual)
     return found
+
+
+def _first_shift(balance: Balance, start: State, force: np.ndarray) -> float:
+    """How fast masses hold at first, by the loads; where nothing is pushed yet, by what goes to its place [1/s²]."""
+    load = float(np.abs(force / balance.lever[balance.free]).max())
+    heaviest = balance.heaviest if load else float(balance.felt.max())
+    return 10.0 * max(load or balance.called_forth(start), 1e-300) / (heaviest * balance.size)
 
 
 def _softly(balance: Balance, start: State, shift: float, tolerance: float) -> Found:

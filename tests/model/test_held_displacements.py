@@ -93,3 +93,22 @@ def test_a_flexible_jib_slews_with_its_motor_whatever_its_weight(angle):
     )
     scene = fc.Scene(structure, (fc.Gravity(), fc.Flexible(), fc.LargeRotation()), hold={"slew_source": 200.0 * angle})
     assert scene.rest.outputs["y"] == pytest.approx(8.0 * np.sin(angle), abs=1e-9)
+
+
+@pytest.mark.parametrize("lag", [(), (fc.MotorLag({"motor": 0.02, "other": 0.01}),)], ids=["at once", "lagging"])
+@pytest.mark.parametrize(("ratio", "stiffness", "inertia"), [(1.0, 0.01, 0.3), (1.0, 500.0, 0.0), (100.0, 1e9, 0.3)])
+@pytest.mark.parametrize(("angle", "torque"), [(1e-3, 0.0), (0.3, 3.0), (2.0, 0.0), (6.0, 3.0)])
+def test_a_motor_held_elsewhere_leaves_what_is_free_beside_it_alone(angle, torque, ratio, stiffness, inertia, lag):
+    """Nothing pushes what may turn as it likes, which has no stiffness: no search got through its singular K."""
+    wheels = [fc.RigidBody(name, (x, 0, 0), 1.0, (1.0, 1.0, 2.0)) for name, x in (("held", 0.0), ("free", 5.0))]
+    drives = [
+        fc.RotaryDrive(name, wheel.node, axis="z", stiffness=stiffness, ratio=ratio, inertia=inertia)
+        for name, wheel in zip(("motor", "other"), wheels, strict=True)
+    ]
+    supports = [fc.Support(wheel.node, "u v w rx ry") for wheel in wheels]
+    structure = fc.Structure(wheels, supports, drives, [fc.MotorTorque("torque", "motor")])
+    model = fc.assemble(structure, [fc.Flexible(), fc.LargeRotation(), *lag])
+    rest = fc.equilibrium(model, hold={"motor_source": ratio * angle}, inputs={"torque": torque})
+    there = {"held_0_rz": angle, "free_0_rz": 0.0, "motor_source": ratio * angle, "other_source": 0.0}
+    assert [rest.state.q[model.coordinate(name)] for name in there] == pytest.approx([*there.values()], abs=1e-5)
+    assert rest.holding["motor_source"] == pytest.approx(-torque, abs=1e-5)
