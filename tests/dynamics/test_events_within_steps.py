@@ -97,3 +97,17 @@ def test_an_oscillator_under_long_explicit_steps_passes_zero_each_time():
     )
     assert run.report.steps < until * omega
     assert [e.t for e in run.events] == pytest.approx(np.arange(1, 26) * np.pi / omega, abs=0.05)
+
+
+@pytest.mark.parametrize("flown", [0.005, 0.01, 0.03, 0.09])
+@pytest.mark.parametrize(
+    "method", [fc.GeneralizedAlpha(0.1), fc.ConservingMidpoint(0.1), fc.ExplicitRungeKutta(), None]
+)
+def test_what_sets_out_from_zero_and_is_soon_back_is_told(method, flown):
+    """A ball thrown up from the very height that is asked for: back within a twentieth of a step it was passed over."""
+    ball = fc.PointMass("ball", (0, 0, 0), 1.0)
+    structure = fc.Structure([ball], [fc.Support(ball.node, "u v")], outputs=[fc.Position("z", ball.node, "z")])
+    model = fc.assemble(structure, [fc.Gravity(), fc.LargeRotation()])
+    thrown = model.drawn.with_(v=np.array([0.5 * 9.81 * flown]))
+    run = fc.simulate(model, start=thrown, until=0.5, method=method, events=[fc.Event("back", "z", 0.0)])
+    assert [event.t for event in run.events] == pytest.approx([flown], rel=1e-6)

@@ -102,9 +102,9 @@ def _probes(watch: Watch, curve: Curve, before: Point, after: Point, every: floa
 
 def _with_vertices(points: list[tuple[float, float]], gauge: int, value: _Along) -> list[tuple[float, float]]:
     """Add the vertices of parabolas through three points where they may lie across zero and these do not."""
-    found = list(points)
+    found, asked = list(points), gauge < len(value.watch.events)  # corners are let go of at zero again and again
     for (a, fa), (b, fb), (c, fc) in zip(points, points[1:], points[2:], strict=False):
-        if not (fa * fb > 0.0 and fb * fc > 0.0 and a < b < c):
+        if not ((fa * fb > 0.0 or (asked and fa == 0.0)) and fb * fc > 0.0 and a < b < c):
             continue
         before, after = (fb - fa) / (b - a), (fc - fb) / (c - b)
         bend = (after - before) / (c - a)
