@@ -28,6 +28,7 @@ from flexctrl.mechanics.rotation import logarithm
 from flexctrl.model.linkages.chart import LeaningRope
 from flexctrl.model.linkages.charting import chart_of
 from flexctrl.model.model import Model
+from flexctrl.model.motion import DENSE_UP_TO
 from flexctrl.model.plant import Plant
 from flexctrl.model.solve import factorise
 from flexctrl.model.state import State
@@ -268,7 +269,7 @@ class Difference:
         raw = np.concatenate([np.hstack([other.x - one.x, turned]).ravel(), driven, own[motion.inner]])
         if motion.plain:
             return motion.collect(other, raw) / motion.collect(other, np.ones(motion.raw))
-        T = motion.jacobian(other)
+        T = motion.dense_jacobian(other) if self.model.n <= DENSE_UP_TO else motion.jacobian(other)
         return factorise(sp.csr_matrix(T.T @ T))(T.T @ raw)
 
 
@@ -323,5 +324,6 @@ class _Course(Hermite):
     """
 
     def at(self, t: float) -> State:
-        state, (place, rate, _) = super().at(t), self.course(t)
+        place, rate, turning = self.course(t)
+        state = self.local.place(self.start, place, rate[: len(turning)] + turning, t)
         return state.with_(v=state.v + (rate - self.local.rates(self.start, place, state)[0])[: len(state.v)])

@@ -66,7 +66,7 @@ class Local:
         """Return how fast the coordinates change, and what their own turning adds to the accelerations."""
         if self._chart is None:
             return state.v, np.zeros(self.model.n)
-        return replace(self._chart, reference=self._widened(start)).rate(xi, state)
+        return self._from(start, self._chart).rate(xi, state)
 
     def between(self, start: State, end: State) -> np.ndarray:
         """Return the coordinates of the end of a step from its start."""
@@ -75,6 +75,12 @@ class Local:
             if min(turning.coordinates) >= 0 and max(turning.coordinates) >= self.model.n:
                 xi[list(turning.coordinates)] = logarithm((end.R[turning.node] @ start.R[turning.node].T)[None])[0]
         return xi
+
+    def _from(self, start: State, chart: Chart) -> Chart:
+        """The chart about a start: asked for at every stage of a step."""
+        if self.__dict__.get("_last", (None,))[0] is not start:
+            self.__dict__["_last"] = start, replace(chart, reference=self._widened(start))
+        return self.__dict__["_last"][1]
 
     def _widened(self, state: State) -> State:
         return replace(state, q=np.append(state.q, np.zeros(self.count - self.model.n)), v=np.zeros(self.count))
