@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -83,6 +84,7 @@ def _wished(feed: Feed, state: State) -> np.ndarray:
     law = _held_back(feed.controller)
     if law is not None:
         with suppress(Exception):  # of which the run's status tells
+            law = copy.deepcopy(law)  # one of one's own may remember what it is asked
             return np.asarray(law.command(0.0, law.initial(), feed.measured(state)), dtype=float).ravel()
     return np.zeros(0)
 
