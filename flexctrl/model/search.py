@@ -161,8 +161,9 @@ class _Search:
         self.newton, self.balance = newton, balance
         self.shift, self.floor, self.most = shift, 1e-7 * shift, _FASTEST * shift
         # what is not yet in its place calls forth what no force at the start tells of
-        untold = watched or not balance.loaded or not force.any()
-        self.best, self.least = start, max(balance.relative(force, self.scale), untold * called / self.scale)
+        left = balance.relative(force, self.scale)
+        untold = watched or not balance.loaded or left <= newton.tolerance
+        self.best, self.least = start, max(left, untold * called / self.scale)
         self.here = _Iterate(start, None, force, self.least)
         self.before, self.iterations, self.stalled = np.inf, 0, 0
         self.steady = self.contracting = True

@@ -22,7 +22,7 @@ from flexctrl.model.state import State
 __all__ = ["found"]
 
 _SOFT_REACH, _NEAR = (0.3, 0.1, 0.03), 0.1
-_IN_PLACE, _ASTRAY = 1e-15, 1e-12
+_IN_PLACE, _ASTRAY, _DUST = 1e-15, 1e-12, 1e-9
 _TAUT, _STIFFER = (300.0, 30.0, 3000.0), 10.0
 """How stiff ropes and beams are at first, over all loads; what they are stiffened by from search to search."""
 
@@ -151,9 +151,10 @@ def _hung(balance: Balance, start: State, tolerance: float) -> Found:
 
 def _first_shift(balance: Balance, start: State, force: np.ndarray) -> float:
     """How fast masses hold at first, by the loads; where nothing is pushed yet, by what goes to its place [1/s²]."""
-    load = float(np.abs(force / balance.lever[balance.free]).max())
-    heaviest = balance.heaviest if load else float(balance.felt.max())
-    return 10.0 * max(load or balance.called_forth(start), 1e-300) / (heaviest * balance.size)
+    load, called = float(np.abs(force / balance.lever[balance.free]).max()), balance.called_forth(start)
+    pushed = load > _DUST * called
+    heaviest = balance.heaviest if pushed else float(balance.felt.max())
+    return 10.0 * max(load if pushed else called, 1e-300) / (heaviest * balance.size)
 
 
 def _softly(balance: Balance, start: State, shift: float, tolerance: float) -> Found:
