@@ -31,6 +31,8 @@ _HALF = 0.5
 _DUST = 1e-9
 """Of what an output would be if all moved as far as what has moved farthest: less is last digits."""
 _NOTED, _BESIDE = 0.05, 2.0
+_ROWS = 4
+"""Of fewer nothing is known between them: their errors are those of the coordinates at the end."""
 _SAID = "by a finer run, {name} may be off by {far} of its range: see whether {finer} agrees"
 
 
@@ -92,7 +94,7 @@ def _finer(journey: Journey, method: Checked) -> Beside:
 
 def _shares(run: Run, other: Run, journey: Journey) -> dict[str, float]:
     """By how much each output is off, over its range, where that is more than last digits."""
-    if not run.y.size:
+    if not run.y.size or len(run.t) < _ROWS:
         return {}
     model = journey.plan.model
     way, most = ways(journey, run.y), Apart.of(run, other, _HALF).most

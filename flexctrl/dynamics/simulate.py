@@ -156,7 +156,7 @@ def simulate(
         began = time.thread_time()
         journey, run = travelled(plan, start, events_of(events), record, spacing)
         beginning = replace(beginning, cost=time.thread_time() - began) if beginning else None
-        looked = run = noted(run, *twice(journey, start, inputs))
+        looked = run = noted(run, *twice(journey, start, inputs, beginning))
         cut = False
         try:
             looked = _growing(run, journey, beginning)

@@ -47,6 +47,20 @@ def test_all_of_what_is_smaller_than_errors_of_steps_may_be_wrong(method, push, 
     assert run.report.output_errors["x"] >= min(off(run, push), 1.0)
 
 
+@pytest.mark.parametrize("push", [1e-5, 4e-4])
+def test_what_steps_follow_is_not_called_wrong_for_being_small(push):
+    """A push brought up in 100 radians of the spring's swing: 55 steps see all of that."""
+
+    def brought_up(t):
+        share = min(t / 5.0, 1.0)
+        return push * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+    run = fc.simulate(oscillator(), fc.OpenLoop({"push": brought_up}), until=6.0)
+    right = np.array([brought_up(t) for t in run.t]) / STIFFNESS
+    assert np.abs(run["x"] - 1.0 - right).max() < 0.02 * push / STIFFNESS
+    assert run.report.output_errors["x"] < 0.2
+
+
 @pytest.mark.parametrize("push", [4e-3, 4e-2, 0.4])
 def test_a_swing_in_opposition_is_all_wrong(push):
     """It was told as half of what it is: no more than its amplitude, which is half of the way to and fro."""

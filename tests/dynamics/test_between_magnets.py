@@ -134,6 +134,14 @@ def test_what_is_interrupted_is_not_called_right():
     assert run.report.notes == ("how far small differences have grown is not told by another run (interrupted)",)
 
 
+def test_of_few_rows_no_output_is_called_right():
+    """They were told as off by 0.0, as nothing was known between them."""
+    model = sprung(0.15)
+    run = fc.simulate(fc.linearize(model), Wells(), until=85.0, every=85.0, start=model.displace([0.2]))
+    assert run.report.error > 0.1
+    assert not run.report.output_errors
+
+
 @pytest.mark.parametrize(("damping", "pace"), [(0.05, 1.2), (0.15, 1.0), (0.2, 1.0)])
 def test_a_run_is_right_until_it_says(damping, pace):
     """It said 41.9 s of the first, where it had been off by a tenth since 40.4 s: 16 instants were looked at."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -14,9 +13,8 @@ from flexctrl.model.equilibrium import Rest
 
 if TYPE_CHECKING:
     from flexctrl.design.controller import Controller
-    from flexctrl.dynamics.feed import Feed
     from flexctrl.dynamics.journey import Journey
-    from flexctrl.model.state import State
+    from flexctrl.dynamics.others import Beginning
 
 __all__ = ["twice", "unfelt"]
 
@@ -45,7 +43,9 @@ def unfelt(journey: Journey) -> tuple[str, ...]:
     return plan.model.linear.certificate.heard(used).notes
 
 
-def twice(journey: Journey, start: object, inputs: Mapping[str, float] | None) -> tuple[str, ...]:
+def twice(
+    journey: Journey, start: object, inputs: Mapping[str, float] | None, beginning: Beginning | None
+) -> tuple[str, ...]:
     """Return what is to be said of a law that commands at the start about what the equilibrium there brings along.
 
     Parameters
@@ -56,6 +56,8 @@ def twice(journey: Journey, start: object, inputs: Mapping[str, float] | None) -
         Where it began.
     inputs : mapping of str to float or None
         What was given in place of what an equilibrium brings.
+    beginning : Beginning or None
+        With the law as it was then; without, what hardware lets through later is not told of.
 
     Returns
     -------
@@ -65,7 +67,7 @@ def twice(journey: Journey, start: object, inputs: Mapping[str, float] | None) -
     if not isinstance(start, Rest) or inputs is not None or feed.controller is None or not u.size:
         return ()
     brought, named = feed.base, journey.plan.model.inputs
-    late = _wished(feed, journey.origin.state)
+    late = _wished(journey, beginning)
     if late.size:
         u = feed.base.copy()
         np.add.at(u, list(feed.writes), late)
@@ -79,13 +81,16 @@ def twice(journey: Journey, start: object, inputs: Mapping[str, float] | None) -
     )
 
 
-def _wished(feed: Feed, state: State) -> np.ndarray:
+def _wished(journey: Journey, beginning: Beginning | None) -> np.ndarray:
     """What a law commands at the start that hardware lets through by and by; empty where all of it comes at once."""
-    law = _held_back(feed.controller)
-    if law is not None:
+    if beginning is None or _held_back(journey.plan.feed.controller) is None:
+        return np.zeros(0)
+    feed = beginning.again
+    law = _held_back(feed.controller) if feed else None
+    if feed and law:
         with suppress(Exception):  # of which the run's status tells
-            law = copy.deepcopy(law)  # one of one's own may remember what it is asked
-            return np.asarray(law.command(0.0, law.initial(), feed.measured(state)), dtype=float).ravel()
+            read = feed.measured(journey.origin.state)
+            return np.asarray(law.command(0.0, law.initial(), read), dtype=float).ravel()
     return np.zeros(0)
 
 

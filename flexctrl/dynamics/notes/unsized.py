@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.scales import farthest, turning, yardsticks
+from flexctrl.dynamics.scales import components, farthest, turning, yardsticks
 from flexctrl.dynamics.steps import Controlled
 
 if TYPE_CHECKING:
@@ -16,6 +16,8 @@ __all__ = ["faint", "is_faint", "little", "unsized"]
 
 _LITTLE, _NOTHING, _FIT = 20.0, 1e-2, 1e-3
 """Absolute tolerances that a motion goes through: a few errors of steps, no more than rounding; what fits."""
+_FOLLOWED, _MANY = 0.4, 40
+"""Radians in a step that are followed; steps of which one in four, looked at, tells how fast a part turns round."""
 _ROUNDING = 1e-3
 """Where a part rests beside what moves, and has outputs of its own."""
 
@@ -76,8 +78,8 @@ def little(journey: Journey) -> tuple[str, ...]:
 def faint(journey: Journey) -> np.ndarray:
     """Return which freedoms are of parts that move by little against what each step may err by, shape (n,).
 
-    Nothing is known of them, whatever is estimated: steps are as long as if nothing moved there. Samples keep them
-    shorter than the tolerance would.
+    Nothing is known of them, whatever is estimated, as steps are as long as if nothing moved there: but where these are
+    short for how fast it moves all the same, and many. Samples keep them shorter than the tolerance would.
 
     Parameters
     ----------
@@ -94,7 +96,16 @@ def faint(journey: Journey) -> np.ndarray:
         return np.zeros(gone.shape, dtype=bool)
     shorter = min(1.0, journey.point.state.t / (mark.steps * mark.size)) if plan.feed.sample_time else 1.0
     allowed = plan.tolerance.absolute * shorter**pace.steepness
-    return np.asarray((gone > _ROUNDING * allowed) & (gone < _LITTLE * allowed))
+    return np.asarray((gone > _ROUNDING * allowed) & (gone < _LITTLE * allowed) & _unresolved(journey))
+
+
+def _unresolved(journey: Journey) -> np.ndarray:
+    """Which freedoms are of parts that turn round, by ω² = Σ h a²/Σ h v², faster than steps follow, shape (n,)."""
+    model, sums, mark = journey.plan.model, journey.books.sums, journey.mark
+    part, yards = components(model), yardsticks(model)
+    swept, bent = (np.bincount(part, weights=some / yards**2) for some in (sums.swept, sums.bent))
+    step = journey.point.state.t / mark.steps
+    return np.asarray((bent * step**2 > _FOLLOWED**2 * swept)[part] | (mark.steps < _MANY))
 
 
 def is_faint(journey: Journey, parts: np.ndarray) -> bool:
