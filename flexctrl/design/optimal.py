@@ -21,6 +21,7 @@ class IdleInputWarning(UserWarning):
 
 
 _TOLERANCE = 1e-8  # largest Riccati residual accepted, relative to the terms of the equation
+_ROUNDING = 1e-10  # share of the largest eigenvalue below zero that products of matrices may leave
 
 
 @frozen(eq=False)
@@ -89,10 +90,14 @@ def bryson(plant: Any, outputs: Mapping[str, float], inputs: Mapping[str, float]
     check_plant(plant, "bryson")
     largest = by_name(outputs, plant.output_labels, np.inf, "bryson: outputs")
     command = by_name(inputs, plant.input_labels, np.inf, "bryson: inputs")
-    if np.isinf(command).any() or min(command.min(initial=1), largest.min(initial=1)) <= 0:
-        raise ControllerError(
-            f"bryson: every input of {list(plant.input_labels)} needs a largest command > 0, outputs too"
-        )
+    for name, value in [
+        *zip(plant.input_labels, command, strict=True),
+        *zip(plant.output_labels, largest, strict=True),
+    ]:
+        if not value > 0.0:
+            raise ControllerError(f"bryson: the largest value of {name!r} = {value:g}; expected a number > 0")
+    if free := [name for name, value in zip(plant.input_labels, command, strict=True) if np.isinf(value)]:
+        raise ControllerError(f"bryson: inputs: {', '.join(free)}: every input needs a largest command, finite and > 0")
     rows = plant.C / largest[:, None]
     return rows.T @ rows, np.diag(command**-2.0)
 
@@ -118,6 +123,8 @@ def lqr(plant: Any, state_cost: np.ndarray, input_cost: np.ndarray) -> Regulator
 
     Raises
     ------
+    ControllerError
+        For a cost of another shape, or one that is not symmetric or not (semi)definite as it must be.
     DesignError
         If no stabilising solution was found; names the mode that cannot be moved or that the cost does not see.
 
@@ -128,7 +135,7 @@ def lqr(plant: Any, state_cost: np.ndarray, input_cost: np.ndarray) -> Regulator
     """
     check_plant(plant, "lqr")
     A, B = plant.A, plant.B
-    Q, R = _cost(state_cost, len(A), "state cost"), _cost(input_cost, B.shape[1], "input cost")
+    Q, R = _semidefinite(state_cost, len(A), "state cost"), _definite(input_cost, B.shape[1], "input cost")
     equation = _Riccati(A, B, Q, R, bool(plant.isdtime(strict=True)))
     K, S, residual = _checked(equation, plant, "lqr", ("no input moves", "the state cost does not see"))
     _warn_of_idle(plant)
@@ -143,7 +150,7 @@ def kalman(plant: Any, process: np.ndarray, measurement: np.ndarray) -> Estimato
     plant : control.StateSpace
         Continuous (noise intensities) or sampled (covariances; the gain is that of the one-step predictor).
     process : numpy.ndarray, shape (n, n)
-        Noise on ẋ; ``plant.B @ W @ plant.B.T`` for noise on the inputs.
+        Noise on ẋ, positive semidefinite; ``plant.B @ W @ plant.B.T`` for noise on the inputs.
     measurement : numpy.ndarray, shape (n_outputs, n_outputs)
         Noise on y, positive definite.
 
@@ -153,12 +160,14 @@ def kalman(plant: Any, process: np.ndarray, measurement: np.ndarray) -> Estimato
 
     Raises
     ------
+    ControllerError
+        For noise of another shape, or that is not symmetric or not (semi)definite as it must be.
     DesignError
         If no stable filter was found; names the mode that no output sees or that no noise moves.
     """
     check_plant(plant, "kalman")
     A, C = plant.A, plant.C
-    W, V = _cost(process, len(A), "process noise"), _cost(measurement, len(C), "measurement noise")
+    W, V = _semidefinite(process, len(A), "process noise"), _definite(measurement, len(C), "measurement noise")
     equation = _Riccati(A.T, C.T, W, V, bool(plant.isdtime(strict=True)))
     K, P, residual = _checked(equation, plant, "kalman", ("no output sees", "the process noise does not move"))
     return Estimator(K.T, P, np.linalg.eigvals(A - K.T @ C), residual)
@@ -314,7 +323,25 @@ def _loses_rank(matrix: np.ndarray) -> bool:
     return bool(np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-9)
 
 
-def _cost(given: np.ndarray, n: int, what: str) -> np.ndarray:
+def _semidefinite(given: np.ndarray, n: int, what: str) -> np.ndarray:
+    array = _symmetric(given, n, what)
+    values = np.linalg.eigvalsh(array)
+    if values.size and values[0] < -_ROUNDING * np.abs(values).max():
+        raise ControllerError(f"the {what} must be positive semidefinite; its least eigenvalue is {values[0]:.4g}")
+    return array
+
+
+def _definite(given: np.ndarray, n: int, what: str) -> np.ndarray:
+    """What counts is whether it is so in units in which its diagonal is one: a motor in mN m beside one in kN m is."""
+    array = _symmetric(given, n, what)
+    unit = np.sqrt(np.maximum(array.diagonal(), 0.0))
+    if not unit.all() or np.linalg.eigvalsh(array / np.outer(unit, unit)).min(initial=1.0) <= 0.0:
+        least = np.linalg.eigvalsh(array)[0]
+        raise ControllerError(f"the {what} must be positive definite; its least eigenvalue is {least:.4g}")
+    return array
+
+
+def _symmetric(given: np.ndarray, n: int, what: str) -> np.ndarray:
     array = matrix(given, (n, n), f"the {what}")
     if not np.allclose(array, array.T, rtol=1e-10, atol=1e-12 * np.abs(array).max(initial=0.0)):
         raise ControllerError(f"the {what} must be symmetric")

@@ -212,8 +212,11 @@ def matrix(values: Any, shape: tuple[int, int], what: str) -> np.ndarray:
         array = np.atleast_2d(np.asarray(values, dtype=float))
     except (TypeError, ValueError):
         raise ControllerError(f"{what} = {shortened(values)}; expected a matrix of numbers, {shape}") from None
-    if array.shape != shape or not np.isfinite(array).all():
-        raise ControllerError(f"{what} must be finite and of shape {shape}, not {array.shape}")
+    if array.shape != shape:
+        raise ControllerError(f"{what} must be of shape {shape}, not {array.shape}")
+    if not np.isfinite(array).all():
+        row, column = np.argwhere(~np.isfinite(array))[0].tolist()
+        raise ControllerError(f"{what} must be finite; its entry [{row}, {column}] is {array[row, column]}")
     return array
 
 

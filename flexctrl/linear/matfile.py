@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from flexctrl.errors import LinearizationError, did_you_mean
+from flexctrl.errors import LinearizationError, StructureError, did_you_mean
 from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import PartMatrices
@@ -54,7 +54,7 @@ class Units:
 
     Raises
     ------
-    LinearizationError
+    StructureError
         For a name that is no unit, or a force that is not that of the others.
     """
 
@@ -69,10 +69,10 @@ class Units:
             name = getattr(self, kind)
             if not isinstance(name, str) or name not in known:
                 hint = did_you_mean(name, known) if isinstance(name, str) else f"; known: {', '.join(known)}"
-                raise LinearizationError(f"Units: {kind} = {name!r} is no unit of {kind}{hint}")
+                raise StructureError(f"Units: {kind} = {name!r} is no unit of {kind}{hint}")
         length, mass, time, force = (KNOWN_UNITS[kind][getattr(self, kind)] for kind in KNOWN_UNITS if kind != "angle")
         if abs(force / (mass * length / time**2) - 1.0) > 1e-6:
-            raise LinearizationError(
+            raise StructureError(
                 f"Units: {self.force} is not {self.mass}·{self.length}/{self.time}², so M q̈ and K q would not add; "
                 "give consistent units, e.g. Units('mm', 't', 's', 'N')"
             )
@@ -195,7 +195,10 @@ def load_units(path: str | Path) -> Units:
     found = dict(term.strip().split(" ", 1) for term in text.split(",") if " " in term.strip())
     if set(found) != {field.name for field in fields(Units)}:
         raise LinearizationError(f"{path} does not tell its units as save_mat writes them; it says {text!r}")
-    return Units(**found)
+    try:
+        return Units(**found)
+    except StructureError as error:
+        raise LinearizationError(f"{path} is in units that are none: {error}") from error
 
 
 def _content(path: str | Path) -> dict[str, Any]:

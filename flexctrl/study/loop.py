@@ -381,18 +381,27 @@ def _as_lti(plant: Any, dt: float) -> Any:
 
 
 def _check_names(plant: Any, input: str, output: str) -> None:
-    """Whether the signals that are given are there, before anything is looked at that hangs on more."""
+    """Whether the signals are given and there, before anything is looked at that hangs on more."""
     if isinstance(plant, ReducedStates):
         plant = plant.full
+    signals = {
+        kind: tuple(getattr(plant, f"{kind}s" if isinstance(plant, LinearModel) else f"{kind}_labels", ()))
+        for kind in ("input", "output")
+    }
+    unsaid = [kind for kind, name in (("input", input), ("output", output)) if not name and len(signals[kind]) > 1]
+    if unsaid:
+        told = " and ".join(f"{kind}=, one of: {', '.join(signals[kind])}" for kind in unsaid)
+        raise StructureError(f"open_loop: which {' and '.join(unsaid)} of the plant? Give {told}")
     for kind, name in (("input", input), ("output", output)):
-        known = getattr(plant, f"{kind}s" if isinstance(plant, LinearModel) else f"{kind}_labels", ())
-        if name and known:
-            _only(name, tuple(known), kind)
+        if name and signals[kind]:
+            _only(name, signals[kind], kind)
 
 
 def _only(name: str, known: tuple[str, ...], kind: str) -> str:
     if not name and len(known) == 1:
         return known[0]
+    if not known:
+        raise StructureError(f"open_loop: the plant has no {kind}s")
     if name not in known:
         raise StructureError(f"{kind} {name!r} is not a signal of the plant{did_you_mean(name, known)}")
     return name

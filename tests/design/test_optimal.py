@@ -185,11 +185,19 @@ def test_sampled_design_runs_as_the_controller_of_its_plant(sampled_loop):
 @pytest.mark.parametrize(
     ("broken", "message"),
     [
-        (lambda: lqr(double_integrator(), np.eye(3), [[1.0]]), r"state cost must be finite and of shape \(2, 2\)"),
+        (lambda: lqr(double_integrator(), np.eye(3), [[1.0]]), r"state cost must be of shape \(2, 2\), not \(3, 3\)"),
+        (lambda: lqr(double_integrator(), np.diag([1.0, np.nan]), [[1.0]]), r"finite; its entry \[1, 1\] is nan"),
+        (lambda: lqr(double_integrator(), np.diag([1.0, -3.0]), [[1.0]]), "semidefinite; its least eigenvalue is -3"),
+        (lambda: lqr(double_integrator(), [[0.0, 2.0], [2.0, 0.0]], [[1.0]]), "state cost .* least eigenvalue is -2"),
+        (lambda: lqr(double_integrator(), np.eye(2), [[0.0]]), "input cost must be positive definite; .* is 0"),
+        (lambda: kalman(double_integrator(), -np.eye(2), [[1.0]]), "process noise must be positive semidefinite"),
+        (lambda: kalman(double_integrator(), np.eye(2), -2.0 * np.eye(2)), "noise must be positive definite; .* is -2"),
         (lambda: lqr(double_integrator(), [[1.0, 1.0], [0.0, 1.0]], [[1.0]]), "state cost must be symmetric"),
         (lambda: kalman(double_integrator(), np.eye(2), np.eye(3)), "measurement noise must be"),
         (lambda: bryson(double_integrator(), {"y": 1.0}, {"u": 1.0}), "no signal 'y'"),
-        (lambda: bryson(double_integrator(), {"x": 1.0}, {}), "every input of .'u'. needs a largest command"),
+        (lambda: bryson(double_integrator(), {"x": 1.0}, {}), "inputs: u: every input needs a largest command"),
+        (lambda: bryson(double_integrator(), {"x": 0.0}, {"u": 1.0}), "the largest value of 'x' = 0; expected"),
+        (lambda: bryson(double_integrator(), {"x": 1.0}, {"u": -2.0}), "the largest value of 'u' = -2; expected"),
     ],
 )
 def test_what_cannot_be_is_refused(broken, message):
@@ -197,10 +205,14 @@ def test_what_cannot_be_is_refused(broken, message):
         broken()
 
 
-@pytest.mark.usefixtures("solver")
-def test_a_free_command_is_refused():
-    with pytest.raises(DesignError):
-        lqr(double_integrator(), np.eye(2), [[0.0]])
+def test_costs_are_definite_in_whatever_units():
+    """R of a motor in kN m beside one in mN m is definite, and Q of outputs less than states is so but for rounding."""
+    plant = ct.ss(np.diag([-1.0, -2.0, -3.0]), np.ones((3, 2)), np.ones((1, 3)), np.zeros((1, 2)))
+    ratio, units = np.array([[1.0, 0.5], [0.5, 1.0]]), np.diag([1e3, 1e-3])
+    row = np.array([[1.0, 1e3, 1e-3]])
+    law = lqr(plant, row.T @ row, units @ ratio @ units)
+    same = lqr(ct.ss(plant.A, plant.B @ np.linalg.inv(units), plant.C, plant.D), row.T @ row, ratio)
+    np.testing.assert_allclose(units @ law.gain, same.gain, rtol=1e-6, atol=1e-9 * np.abs(same.gain).max())
 
 
 @pytest.mark.parametrize("sampled", [False, True])

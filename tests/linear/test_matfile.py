@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from fixtures import structures as s
 from scipy.io import loadmat, savemat
 
-from flexctrl.errors import LinearizationError
+from flexctrl.errors import LinearizationError, StructureError
 from flexctrl.linear.matfile import Units, load_units
 from flexctrl.linear.model import LinearModel
 from flexctrl.linear.parts import PartMatrices
@@ -84,8 +84,12 @@ def test_units_are_those_given(tmp_path):
     text = str(loadmat(path)["units"][0])
     assert "length mm, mass t" in text
     assert "kg" not in text
-    with pytest.raises(LinearizationError, match="mass = ''"):
+    with pytest.raises(StructureError, match="mass = ''"):
         Units(mass="")
+    content = {k: v for k, v in loadmat(path).items() if not k.startswith("__")}
+    savemat(path, content | {"units": text.replace("mm", "parsec")})
+    with pytest.raises(LinearizationError, match=r"frame\.mat is in units that are none: .*'parsec'"):
+        load_units(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"no model", b"x" * 4096, b"MATLAB 5.0 MAT-file" + b"\0" * 300])

@@ -190,8 +190,10 @@ def test_nyquist_and_nichols_of_python_control_take_the_data():
 
 def test_what_cannot_be_a_loop_is_refused():
     linear = chain(3)
-    with pytest.raises(StructureError, match=r"output '' is not a signal"):
+    with pytest.raises(StructureError, match=r"which output of the plant\? Give output=, one of: x1, "):
         open_loop(linear, 1.0)
+    with pytest.raises(StructureError, match=r"which input and output .* input=, one of: f, g and output=, one of"):
+        open_loop(ct.ss([], [], [], np.ones((2, 2)), inputs=["f", "g"], outputs=["x", "v"]), 1.0)
     with pytest.raises(StructureError, match="'x9' is not a signal of the plant"):
         open_loop(linear, 1.0, output="x9")
     with pytest.raises(StructureError, match="2 degrees above"):

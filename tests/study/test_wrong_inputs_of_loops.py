@@ -78,7 +78,7 @@ def test_moments_of_a_model_without_signals():
     ],
 )
 def test_units_that_are_none_or_do_not_belong_together(names, said):
-    with pytest.raises(LinearizationError, match=said):
+    with pytest.raises(StructureError, match=said):
         Units(*names)
 
 
