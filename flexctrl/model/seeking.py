@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from flexctrl.errors import EquilibriumError
 from flexctrl.model.balance import Balance
 from flexctrl.model.built_up import built_up
+from flexctrl.model.driven import driven_freely
 from flexctrl.model.eased import Eased, eased
 from flexctrl.model.overturned import overturned
 from flexctrl.model.recounted import recounted
@@ -91,7 +92,7 @@ def _led(balance: Balance, start: State, tolerance: float) -> Found:
                 return led[-1]
         if led:
             return reduce(partial(_lasting, balance), led)
-        raise failure
+        raise _explained(balance, start, tolerance, failure) from None
 
 
 def _ever_stiffer(balance: Balance, start: State, taut: float) -> list[Balance]:
@@ -225,6 +226,21 @@ def _gave_way(balance: Balance, found: Found, share: float) -> str:
         f"it gives way, or may move freely (relative residual of the whole {found.residual:.3g}, worst at "
         f"{balance.worst(found.state)}). Follow it past that limit with flexctrl.equilibrium_path, or start near the "
         "shape expected"
+    )
+
+
+def _explained(balance: Balance, start: State, tolerance: float, failure: EquilibriumError) -> EquilibriumError:
+    """A failure with the motions that the loads drive freely from the start on, unless it tells of the whole's."""
+    told = isinstance(failure.state, State) and _pushed_freely(balance, failure.state)
+    if told or not (driven := driven_freely(balance, start, tolerance)):
+        return failure
+    it, its = ("it", "its load") if len(driven) == 1 else ("them", "their loads")
+    hold = ", ".join(f"{motion.lead!r}: …" for motion in driven)
+    return EquilibriumError(
+        f"no equilibrium found: nothing resists the motion of {', nor that of '.join(map(str, driven))}: hold {it} "
+        f"(hold={{{hold}}}) or balance {its}",
+        failure.state,
+        failure.residual,
     )
 
 
