@@ -351,6 +351,7 @@ RESULTS = """
     EnergyBalance Envelope EquilibriumPath ErrorReport Fidelity FrequencyResponse JoinTable Ladder Ledger
     LimitPoint LinearModel Loop Margins Modes Model Moment Node Occurrence PathEnd PathPoint Projection Reduced
     Report Rest RootLocus Run SensorChoice Spillover Start State Status WorkPrecision Zeros Estimator Regulator
-    Trajectory ControllerError DesignError CoarseGridWarning STEEL plot_envelope rail_force convolve Together
+    Trajectory ControllerError DesignError CoarseGridWarning IdleInputWarning STEEL plot_envelope rail_force convolve
+    Together
 """.split()  # noqa: SIM905
 """What is read, not made, and what takes any number of arguments."""

@@ -90,3 +90,16 @@ def test_paths_begin_in_balance():
     rest = standing()["soft"]
     path = fc.equilibrium_path(rest.model, {"lift_torque": 1.0}, until=2.0, hold={"lift_source": 0.0, "spin_source": 0})
     assert path.points[-1].rest.holding["lift_source"] == pytest.approx(1.0 + rest.holding["lift_source"] - 2.0)
+
+
+@pytest.mark.parametrize("lag", [True, False])
+def test_from_a_rest_a_motor_is_held_elsewhere_beside_a_wheel_that_is_free(lag):
+    """The last digits of forces in balance were taken for loads: τ = m g l cos φ/R + what twists the shaft no more."""
+    model = arms(fc.Flexible(), stiffness=50.0)
+    if not lag:
+        model = fc.assemble(
+            model.structure, [effect for effect in model.effects if not isinstance(effect, fc.MotorLag)]
+        )
+    rest = fc.equilibrium(model, hold={"lift_source": 0.0}, inputs={"lift_torque": 1.0})
+    moved = fc.equilibrium(model, hold={"lift_source": 0.2}, inputs={"lift_torque": -3.0}, start=rest.state)
+    assert moved.holding["lift_source"] - 3.0 == pytest.approx(WEIGHT * np.cos(moved.outputs["angle"]), rel=1e-9)
