@@ -84,9 +84,9 @@ def halved(run: Run, journey: Journey, method: Checked, beginning: Beginning) ->
 
 def _finer(journey: Journey, method: Checked) -> Beside:
     """Half the steps; those that go by a tolerance though they are of one length are refused by a lower one."""
-    tolerance, pace = journey.plan.tolerance, method.pace
-    finer = method.finer(tolerance, 0.0 if isinstance(pace, Controlled) else usual(journey), _HALF)
-    if isinstance(pace, Controlled):
+    tolerance = journey.plan.tolerance
+    finer = method.finer(tolerance, usual(journey), _HALF)
+    if isinstance(method.pace, Controlled):
         return finer
     tight = _HALF**method.order
     return replace(finer, tolerance=Tolerance(tight * tolerance.relative, tight * tolerance.absolute))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import control
+import numpy as np
 import pytest
 
 import flexctrl as fc
@@ -96,3 +97,31 @@ def test_commands_that_come_through_later_are_told_as_well(name):
     assert not told(fc.simulate(model, law, until=0.05, start=rest.state))
     pd = control.ss([], [], [], [[-900.0, -300.0]], inputs=["angle", "speed"], outputs=["torque"])
     assert not told(fc.simulate(model, SLOW[name](fc.Sampled(pd, 0.001)), until=0.05, start=rest))
+
+
+class Counting:
+    """A law of one's own that remembers in itself: it bears the load from its third answer on."""
+
+    inputs, outputs, sample_time = ("angle",), ("torque",), 0.01
+
+    def __init__(self):
+        self.asked = 0
+
+    def initial(self):
+        return np.zeros(0)
+
+    def command(self, t, x, y):
+        self.asked += 1
+        return np.array([WEIGHT if self.asked > 2 else 0.0])
+
+    def rate(self, t, x, y):
+        return np.zeros(0)
+
+
+def test_a_law_that_remembers_is_asked_as_it_was_and_is_left_alone():
+    """Asked once more after the run, it said what it came to command, as if it had at the start."""
+    model, rest = borne({"torque": WEIGHT})
+    bare, delayed = Counting(), Counting()
+    for law in (bare, fc.Delayed(delayed, 2)):
+        assert not told(fc.simulate(model, law, until=0.1, start=rest))
+    assert delayed.asked == bare.asked > 2
