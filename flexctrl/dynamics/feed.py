@@ -145,6 +145,11 @@ class Feed:
         return answering(self.controller)
 
     @cached_property
+    def spoken(self) -> bool:
+        """Whether the controller is continuous, and only Python can be asked for it."""
+        return self.continuous and self.answering is None
+
+    @cached_property
     def _asked(self) -> Callable[[np.ndarray, np.ndarray], None] | None:
         """The controller's kernel, where loops may use it too: so that it makes no difference who asks."""
         backend = getattr(self.model, "backend", None)
@@ -178,12 +183,18 @@ class Feed:
         """What the controller reads of a state."""
         return self.model.measure(state)[self.reads] if self.reads.size else np.zeros(0)
 
+    @property
+    def beginning(self) -> np.ndarray:
+        """The controller's state at the start."""
+        assert self.controller is not None
+        return state_of(self.controller, self.controller.initial(), "initial state")
+
     def first(self, state: State) -> Supply:
         """Return the inputs at the start."""
         if self.controller is None:
             return Supply(self.base, np.zeros(0), np.zeros(0))
         try:
-            x = state_of(self.controller, self.controller.initial(), "initial state")
+            x = self.beginning
         except FAULTS as error:
             raise blamed(error, state.t)  # noqa: B904 - its cause is set
         return self.sample(state, Supply(self.base, x, x)) if not self.continuous else self.evaluate(state, x)
@@ -240,9 +251,18 @@ class Feed:
         except FAULTS as error:
             raise blamed(error, t)  # noqa: B904 - its cause is set
 
+    def law_rate(self, t: float, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return how fast the state x of a continuous controller changes."""
+        c = self.controller
+        assert c is not None
+        try:
+            return state_of(c, c.rate(t, x, y), "rate", x.size)
+        except FAULTS as error:
+            raise blamed(error, t)  # noqa: B904 - its cause is set
+
     def within(self, state: State, x: np.ndarray) -> Supply:
         """Return these inputs within a step or at its end: one that ends where the command jumps does not feel it."""
-        return self.evaluate(state.with_(t=self._short_of_break(state.t)), x)
+        return self.evaluate(state.with_(t=self.short_of_break(state.t)), x)
 
     def between(self, before: Supply, after: Supply, share: tuple[float, float], state: State) -> Supply:
         """Return the inputs within a step: ``share`` of it done, and its length; the state there."""
@@ -281,10 +301,12 @@ class Feed:
         """Return the inputs at the end of a step of length h; the controller's state follows the trapezoidal rule."""
         if not self.continuous:
             return before
-        return self._answer(self._short_of_break(state.t), self.measured(state), before, h)
+        return self._answer(self.short_of_break(state.t), self.measured(state), before, h)
 
-    def _short_of_break(self, t: float) -> float:
+    def short_of_break(self, t: float) -> float:
         """Return t, or just before where the command jumps there: a step that ends at a jump does not feel it."""
+        if not (self.breaks or self.met):
+            return t
         near = _NEAR * abs(t) + 2.0 * ROUND_OFF  # what a trajectory takes for its break is a part of a second, too
         return t - near if any(abs(t - b) < near for b in (*self.breaks, *self.met)) else t
 
@@ -331,7 +353,7 @@ class Feed:
         assert c is not None
 
         def soften(off: np.ndarray) -> np.ndarray:
-            t, y = self._short_of_break(state.t), self.measured(state)
+            t, y = self.short_of_break(state.t), self.measured(state)
             return softened(c, t, y, (after.x, h), off)
 
         try:

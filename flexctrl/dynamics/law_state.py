@@ -14,12 +14,14 @@ from flexctrl.dynamics.said import state_of
 if TYPE_CHECKING:
     from flexctrl.dynamics.feed import Supply
 
-__all__ = ["CLEAR", "HALVINGS", "LOOSE", "NEARER", "YOUNG", "error", "softened", "trapezoidal"]
+__all__ = ["CLEAR", "HALVINGS", "LOOSE", "MANY", "NEARER", "YOUNG", "error", "slope_of", "softened", "trapezoidal"]
 
 NEARER, HALVINGS = 10, 24
 """Steps of Newton's method towards the state; halvings between the rates on both sides of a jump."""
 LOOSE, YOUNG = 3.0, 0.01
 """By how much errors of a law's state count less than those of places: it may do little. A share of the time so far."""
+MANY = 50
+"""States of a law whose slope, by differences, takes longer than all else of a step."""
 CLEAR = 1e-2
 """Errors over what is allowed that nothing needs to be known of."""
 _SMALL, _LEFT = 1e-7, 1e-12
@@ -58,7 +60,7 @@ def trapezoidal(
     x, f = x0 + h * rate0, rate0
     for _ in range(NEARER):
         before, f = f, rate(x)
-        slope = np.eye(x.size) - 0.5 * h * _slope(rate, x, f)
+        slope = np.eye(x.size) - 0.5 * h * slope_of(rate, x, f)
         step = np.linalg.solve(slope, x - x0 - 0.5 * h * (rate0 + f))
         x = x - step
         if np.abs(step).max() <= _LEFT * (1.0 + np.abs(x).max()):
@@ -140,11 +142,22 @@ def softened(c: Controller, t: float, y: np.ndarray, ends: tuple[np.ndarray, flo
     def rate(x: np.ndarray) -> np.ndarray:
         return state_of(c, c.rate(t, x, y), "rate", x.size)
 
-    return np.asarray(np.linalg.solve(np.eye(x.size) - 0.5 * h * _slope(rate, x, rate(x)), off))
+    return np.asarray(np.linalg.solve(np.eye(x.size) - 0.5 * h * slope_of(rate, x, rate(x)), off))
 
 
-def _slope(rate: _Map, x: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """∂f/∂x by differences, to the side on which less changes: a rate may jump right beside."""
+def slope_of(rate: Callable[[np.ndarray], np.ndarray], x: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """Return ∂f/∂x by differences, to the side on which less changes: a rate may jump right beside.
+
+    Parameters
+    ----------
+    rate : callable
+        x ↦ f
+    x, f : numpy.ndarray, shape (states,)
+
+    Returns
+    -------
+    numpy.ndarray, shape (states, states)
+    """
     J = np.empty((x.size, x.size))
     for i in range(x.size):
         d = np.zeros(x.size)

@@ -25,11 +25,11 @@ from flexctrl.model.state import State
 if TYPE_CHECKING:
     from flexctrl.dynamics.alpha.steps import Stepper
 
-__all__ = ["jumps", "slide"]
+__all__ = ["NOTICED", "jumps", "slide"]
 
 _FINE = 2.0**-16
 """Share of a jump to which the value between is found."""
-_JUMPS, _NOTICED = 1e-6, 1e-2
+_JUMPS, NOTICED = 1e-6, 1e-2
 _SWEEPS, _SETTLED = 8, 1e-3
 
 
@@ -63,7 +63,7 @@ def jumps(before: np.ndarray, used: np.ndarray, said: np.ndarray, foretold: np.n
     bool
     """
     size = np.maximum(np.abs(before), np.maximum(np.abs(used), np.abs(said)))
-    return bool((np.abs(said - used - foretold) > _NOTICED * size).any())
+    return bool((np.abs(said - used - foretold) > NOTICED * size).any())
 
 
 def slide(stepper: Stepper, point: AlphaPoint, h: float) -> AlphaPoint:

@@ -50,6 +50,8 @@ class Answer:
         Rates of the law's state in the last two tries; room.
     bend, reached : Reals
         How fast its rate changed over the last step, and how large it has been.
+    spoken : int
+        Whether Python is asked; see `spoken`.
     bent : int
         Whether there was such a step.
     changing : int
@@ -98,6 +100,7 @@ class Answer:
     kept: Reals
     bend: Reals
     reached: Reals
+    spoken: int = 0
     bent: int = 0
     changing: int = 0
     reading: int = 0

@@ -11,16 +11,18 @@ import numpy as np
 from flexctrl.design.answers import Answering
 from flexctrl.dynamics.alpha.point import AlphaPoint
 from flexctrl.dynamics.feed import Feed, Supply
+from flexctrl.dynamics.law_state import MANY
 from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.answering import recite
 from flexctrl.dynamics.march.calling import Remembered
 from flexctrl.dynamics.march.making import CAPACITY, Method
 from flexctrl.dynamics.march.marching import Marcher, Pacing, can_march
+from flexctrl.dynamics.march.spoken import Spoken
 from flexctrl.dynamics.march.stepper import MarchingStepper
 from flexctrl.dynamics.swift.settling import weightless
 from flexctrl.frozen import frozen
 from flexctrl.kernels.kernel import Compiled
-from flexctrl.kernels.native import Packed
+from flexctrl.kernels.native import Packed, Runs
 from flexctrl.model.model import Model
 
 __all__ = ["Answerer", "AnsweringStepper", "Follow", "can_answer"]
@@ -44,7 +46,7 @@ def can_answer(feed: Feed) -> bool:
     model = feed.model
     if model.switches.names or model.motion.flows.size or weightless(model).size:
         return False
-    return feed.answering is not None
+    return not feed.spoken or len(feed.beginning) < MANY
 
 
 class Answerer(Marcher):
@@ -59,13 +61,15 @@ class Answerer(Marcher):
     def listening(self, feed: Feed) -> Answerer:
         """Take up a feed's controller; return the march."""
         assert isinstance(self.model.backend, Compiled)
-        assert feed.answering is not None
         if self._known is None or not _serves(self._known[0], feed):
-            law = _answer(feed, feed.answering, self.model.backend, self.flattened.flat)
+            self.source = feed.answering or Spoken(feed)
+            law = _answer(feed, self.source, self.model.backend, self.flattened.flat)
             self._known = feed, law, Packed(law)
         self.law, self._numbers = self._known[1:]
         self._numbers.reset()
         self.law.base[:], self.law.trend[:] = feed.base, 0.0
+        if isinstance(self.source, Spoken):  # it says what is under its commands, too
+            self.law.base[self.law.writes] = 0.0
         self.law.inverse[:] = np.eye(self.law.commands).ravel()
         self.march.lend("answer", self._numbers)
         self.feed = feed
@@ -94,6 +98,14 @@ class Answerer(Marcher):
             self.law.reached[:] = supply.most if known else np.abs(supply.x)
         return self
 
+    def faults(self) -> list[KeyboardInterrupt]:
+        """Return Ctrl-C where the law was asked, once."""
+        if not isinstance(self.source, Spoken):
+            return []
+        found = self.source.fault[:]
+        self.source.fault.clear()
+        return found
+
     def supplied(self, supply: Supply) -> Supply:
         """Return the inputs and the law's state where the march stands."""
         x, rate = self._state
@@ -121,8 +133,7 @@ class Answerer(Marcher):
     def travel(self, pacing: float | Pacing, count: int) -> tuple[int, int]:
         """Take steps, not beyond what depends on time in one way."""
         law, t = self.law, self.march.t
-        assert self.feed.answering is not None
-        for k, clock in enumerate(self.feed.answering.clocks):
+        for k, clock in enumerate(self.source.clocks):
             law.origins[k], row = clock.piece(t)
             law.powers[k * law.width : (k + 1) * law.width] = [0.0] * (law.width - len(row)) + list(row[::-1])
         return super().travel(pacing, count)
@@ -157,9 +168,8 @@ class Answerer(Marcher):
         -------
         numpy.ndarray, shape (n, inputs)
         """
-        law, feed = self.law, self.feed
-        assert feed.answering is not None
-        clocks = [clock.along(times) for clock in feed.answering.clocks]
+        law = self.law
+        clocks = [clock.along(times) for clock in self.source.clocks]
         table = np.column_stack([outputs, x, np.zeros((len(times), 2 * law.states)), *clocks])
         work, found = law.work.copy(), np.tile(law.base, (len(times), 1))
         run = self._numbers.bound(recite)
@@ -171,19 +181,32 @@ class Answerer(Marcher):
             for k, i in enumerate(law.writes.tolist()):
                 found[start : start + _ROWS, i] += said[:, k]
         law.work[:] = work
+        if not np.isfinite(found).all():
+            self._blame(times, outputs, x, found)
         return found
+
+    def _blame(self, times: np.ndarray, outputs: np.ndarray, x: np.ndarray, found: np.ndarray) -> None:
+        """Raise what the controller does where it says no numbers."""
+        for k in np.flatnonzero(~np.isfinite(found).all(axis=1)).tolist():
+            found[k] = self.feed.answer(float(times[k]), outputs[k, self.feed.reads], x[k])[0]
 
 
 def _serves(known: Feed, feed: Feed) -> bool:
     """Tell whether what was made for one feed does for another: the same law on the same signals."""
-    same = known.answering is feed.answering and known.model is feed.model
+    law = known.answering is feed.answering if feed.answering is not None else known.controller is feed.controller
+    same = law and known.model is feed.model
     return same and known.reads.tolist() == feed.reads.tolist() and known.writes == feed.writes
 
 
-def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
+def _answer(feed: Feed, law: Answering | Spoken, backend: Compiled, flat: Any) -> Answer:
     n, m, s, c, k = len(feed.model.outputs), len(feed.model.inputs), law.states, len(law.clocks), law.commands
     wide, width = n + 3 * s + c, max((clock.width for clock in law.clocks), default=0)
-    gather = np.concatenate([feed.reads, n + np.arange(s), n + 3 * s + np.arange(c)])[None]
+    work, answer, slopes = np.zeros(wide), np.zeros(k + s), law.slopes.copy()
+    if isinstance(law, Spoken):
+        step, slope = law.runs(work, answer, slopes)
+    else:
+        gather = np.concatenate([feed.reads, n + np.arange(s), n + 3 * s + np.arange(c)])[None]
+        step, slope = _kernels(law, backend, gather)
     last, trend, said = np.zeros((3, m))
     gap, before, change, felt, row = np.zeros((5, k))
     return Answer(
@@ -193,11 +216,11 @@ def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
         clocks=c,
         commands=k,
         width=width,
-        step=(backend.bind(law.kernel, gather, law.values[None], np.arange(law.kernel.n_out)[None]),),
-        slope=() if law.slope is None else (backend.bind(law.slope, gather, law.values[None], law.places[None]),),
-        work=np.zeros(wide),
-        answer=np.zeros(law.kernel.n_out),
-        slopes=law.slopes.copy(),
+        step=step,
+        slope=slope,
+        work=work,
+        answer=answer,
+        slopes=slopes,
         factors=np.zeros(s * s),
         order=np.zeros(s, dtype=int),
         off=np.zeros(s),
@@ -223,9 +246,15 @@ def _answer(feed: Feed, law: Answering, backend: Compiled, flat: Any) -> Answer:
         kept=np.zeros(s),
         bend=np.zeros(s),
         reached=np.zeros(s),
+        spoken=int(isinstance(law, Spoken)),
         changing=law.places.size,
         reading=feed.reads.size,
     )
+
+
+def _kernels(law: Answering, backend: Compiled, gather: np.ndarray) -> tuple[Runs, Runs]:
+    step = (backend.bind(law.kernel, gather, law.values[None], np.arange(law.kernel.n_out)[None]),)
+    return step, () if law.slope is None else (backend.bind(law.slope, gather, law.values[None], law.places[None]),)
 
 
 @frozen(eq=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from flexctrl.dynamics.alpha.sliding import NOTICED
 from flexctrl.dynamics.law_state import CLEAR, HALVINGS, LOOSE, NEARER, YOUNG
 from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.books import reach
@@ -92,7 +93,11 @@ def asked(m: March) -> int:
 
 def say(a: Answer) -> int:
     """Ask the law at its state; tell whether what it says are numbers."""
-    clear(a.commands + a.states, a.answer)
+    if a.spoken == 1:  # who is interrupted before it says anything has said nothing
+        for i in range(a.commands + a.states):
+            a.answer[i] = math.nan
+    else:
+        clear(a.commands + a.states, a.answer)
     a.step[0](a.work, a.answer)
     total = 0.0
     for i in range(a.commands + a.states):
@@ -236,7 +241,16 @@ def settled_inputs(m: March, gap: float) -> bool:
         a.still = 0
         return False
     a.still += 1
-    return gap <= 0.5 * before or a.still >= _STILL
+    return (gap <= 0.5 * before or a.still >= _STILL) and not (a.spoken == 1 and jumps(a))
+
+
+def jumps(a: Answer) -> bool:
+    """Tell whether a law in Python says others than the inputs in force by so much that it may jump there."""
+    for k in range(a.commands):
+        i = a.writes[k]
+        if abs(a.gap[k]) > NOTICED * max(abs(a.last[i]), max(abs(a.u[i]), abs(a.said[i]))):
+            return True
+    return False
 
 
 def correct_inputs(m: March) -> None:

@@ -15,6 +15,7 @@ from flexctrl.dynamics.events.foresight import calm_steps
 from flexctrl.dynamics.march.lookout import FAR, Lookout
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.onlooking import looked_at
+from flexctrl.dynamics.march.spoken import straight_steps
 from flexctrl.dynamics.march.stepper import Memory
 from flexctrl.dynamics.records.books import Sums
 
@@ -77,16 +78,19 @@ def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
     What is looked at does not depend on the end of the run: a run that goes on looks at the same.
     """
     j, watch, begun, t = ride.journey, ride.journey.watch, Begun.of(ride), ride.marcher.march.t
+    spoken = j.plan.feed.spoken
     if j.stops.next - t < FEWEST * j.mark.size:
+        if spoken:
+            return EVENT, 0
         return watched(ride, begun, pacing) if t + j.mark.size <= ride.until + ride.tick else (EVENT, 0)
     sizes, span = watch.sizes.copy(), watch.span
     ride.marcher.march.turned = 0.0
     status, done = ride.marcher.travel(pacing, min(count, span))
-    far = ride.marcher.march.turned > FAR
-    within = ride.stepper.within(begun.point, j.mark.size)
-    calm = 0 if far else calm_steps(watch, begun.point, ride.marcher.rows[:done], ride.inputs(t, done), within)
-    watch.span = next_span(span, calm, calm < done)
+    calm = _calm(ride, begun, done)
     fitting = int(np.searchsorted(ride.marcher.rows[:done, 0], ride.until + ride.tick, "right"))
+    if spoken and (straight := straight_steps(ride, begun, min(calm, fitting))) < min(calm, fitting):
+        calm = straight
+    watch.span = next_span(span, calm, calm < done)
     if fitting < calm and j.saved is None:
         j.saved = replace(j.snapshot(), sizes=sizes, span=span)
     wanted = ride.limited(min(calm, fitting))
@@ -95,7 +99,19 @@ def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
     go_back(ride, begun)
     if wanted:
         return EVENT, ride.marcher.travel(pacing, wanted)[1]
-    return watched(ride, begun, pacing) if fitting else (EVENT, 0)
+    return watched(ride, begun, pacing) if fitting and not spoken else (EVENT, 0)
+
+
+def _calm(ride: Ride, begun: Begun, done: int) -> int:
+    """How many of the steps just taken are over before an event may happen."""
+    watch = ride.journey.watch
+    if not watch.events:
+        return done
+    if ride.marcher.march.turned > FAR:
+        return 0
+    within = ride.stepper.within(begun.point, ride.journey.mark.size)
+    inputs = ride.inputs(begun.point.state.t, done)
+    return calm_steps(watch, begun.point, ride.marcher.rows[:done], inputs, within)
 
 
 def next_span(span: int, calm: int, near: bool) -> int:

@@ -246,6 +246,8 @@ def controlled(m: March) -> int:
             return status
         if status == SINGULAR:
             return status
+        if status != DONE and m.answering == 1 and m.answer.spoken == 1:  # a law that jumps is for plain steps
+            return unmarched(m)
         error = 0.0
         if status == DONE:
             judge(m)

@@ -260,6 +260,10 @@ class Marcher(Loops):
         """Go on under inputs that are in force already; return the march."""
         return self
 
+    def faults(self) -> list[KeyboardInterrupt]:
+        """Return what was raised by who is asked from within the loops, once."""
+        return []
+
     def supplied(self, supply: Supply) -> Supply:
         """Return the inputs where the march stands, having set out under others."""
         return supply

@@ -58,7 +58,10 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
 
 def rides(journey: Journey) -> bool:
     """Tell whether steps that can be marched are."""
-    return not (journey.plan.feed.sample_time and weightless(journey.plan.model).size)
+    feed = journey.plan.feed
+    if feed.spoken and (journey.point.supply.slid or journey.horizon < math.inf):
+        return False
+    return not (feed.sample_time and weightless(journey.plan.model).size)
 
 
 def _looked_out(journey: Journey) -> bool:
@@ -97,7 +100,8 @@ class Ride:
         pace = j.plan.method.pace
         self.pace = pace.step if isinstance(pace, Fixed) else 0.0
         self.last, self.rejected, self.jumped = j.point.state, self.marcher.march.rejected, True
-        self.mute, self.wary, self.balked = False, bool(j.watch.events), False
+        self.mute, self.balked = False, False
+        self.wary = bool(j.watch.events) or j.plan.feed.spoken
         self.turn: Crossing | None = None
 
     def go(self) -> bool:
@@ -146,6 +150,7 @@ class Ride:
         if not count:
             return False
         status, done = self._travel(pacing, count)
+        self.faults += self.marcher.faults()
         if isinstance(pacing, Pacing):
             self.journey.mark.size = self.marcher.march.size
         if done:

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexctrl.dynamics.alpha.steps import Stepper
+from flexctrl.dynamics.law_state import MANY
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
 __all__ = ["many_states"]
-
-_MANY = 50
-"""States whose slope, by differences, takes longer than all else of a step."""
 
 
 def many_states(journey: Journey) -> tuple[str, ...]:
@@ -34,7 +32,7 @@ def many_states(journey: Journey) -> tuple[str, ...]:
     if not (feed.continuous and isinstance(plain, Stepper) and journey.mark.steps):
         return ()
     states = np.size(journey.point.supply.x)
-    if states < _MANY:
+    if states < MANY:
         return ()
     return (
         f"the continuous law has {states} states and was asked in Python at every step: give it a sample time, "

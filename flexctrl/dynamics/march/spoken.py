@@ -1,0 +1,167 @@
+"""Continuous laws that only Python can be asked for, from within compiled loops.
+
+Nothing is known of such a law but what it says. So steps that compiled loops have taken under it are looked at before
+they count: where what it says leaves the straight line between the ends of a step, along the way between what it reads
+there, it may jump, or a corner of it be met, and that step is left to a plain one, which knows what to do.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from flexctrl.dynamics.law_state import slope_of
+from flexctrl.dynamics.lookahead import OF_RUN
+from flexctrl.errors import ControllerError
+from flexctrl.frozen import frozen
+
+if TYPE_CHECKING:
+    from flexctrl.dynamics.feed import Feed
+    from flexctrl.dynamics.march.guarding import Begun
+    from flexctrl.dynamics.march.ride import Ride
+
+__all__ = ["Spoken", "straight_steps"]
+
+_BENT, _ROUND_OFF = 0.05, 1e-9
+"""What it may leave the line by, of the most that it has changed by within a step."""
+_FEWEST = 4
+"""Places within a step at which it is asked."""
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_CALL = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+
+
+class _Elapsed:
+    """Time, as a clock of a law."""
+
+    width = 2
+
+    def piece(self, t: float) -> tuple[float, tuple[float, float]]:
+        """Return since when it is a polynomial, and its coefficients."""
+        return 0.0, (0.0, 1.0)
+
+    def along(self, times: np.ndarray) -> np.ndarray:
+        """Return it at instants."""
+        return times
+
+
+@frozen(eq=False)
+class _Asking:
+    """A function of Python as loops call a kernel."""
+
+    ask: Callable[[], None]
+
+    def __post_init__(self) -> None:
+        call = _CALL(lambda tables, z, r: self.ask())
+        object.__setattr__(self, "call", call)  # alive as long as this is
+        object.__setattr__(self, "address", ctypes.cast(call, ctypes.c_void_p).value)
+
+    arguments = 0
+
+
+class Spoken:
+    """A continuous law as loops ask for it; as `flexctrl.design.answers.Answering` is.
+
+    Parameters
+    ----------
+    feed : Feed
+
+    Attributes
+    ----------
+    states, commands : int
+    clocks : tuple
+        What depends on time alone: time itself.
+    places, slopes : numpy.ndarray, shape (states²,)
+        All of ∂f/∂x may change.
+    fault : list of KeyboardInterrupt
+        Ctrl-C while it was asked.
+    """
+
+    clocks: ClassVar[tuple[Any, ...]] = (_Elapsed(),)
+
+    def __init__(self, feed: Feed) -> None:
+        self.feed, self.states = feed, len(feed.beginning)
+        self.commands = len(feed.writes)
+        self.places, self.slopes = np.arange(self.states**2), np.zeros(self.states**2)
+        self.fault: list[KeyboardInterrupt] = []
+
+    def runs(self, work: np.ndarray, answer: np.ndarray, slopes: np.ndarray) -> tuple[Any, Any]:
+        """Return what is called for answers and for ∂f/∂x, from what loops have written down for it to read.
+
+        Parameters
+        ----------
+        work, answer, slopes : numpy.ndarray
+            See `flexctrl.dynamics.march.answer.Answer`.
+        """
+        feed, n, s = self.feed, len(self.feed.model.outputs), self.states
+        reads, writes = feed.reads, feed.writes
+
+        def read() -> tuple[float, np.ndarray, np.ndarray]:
+            return feed.short_of_break(float(work[-1])), work.take(reads), work[n : n + s].copy()
+
+        def say() -> None:
+            u, rate = feed.answer(*read())
+            answer[: len(writes)] = [u[i] for i in writes]
+            answer[len(writes) :] = rate
+
+        def bend() -> None:
+            t, y, x = read()
+            slopes[:] = slope_of(lambda x: feed.law_rate(t, y, x), x, answer[len(writes) :]).T.ravel()
+
+        return (_Asking(self._heard(say)),), (_Asking(self._heard(bend)),)
+
+    def _heard(self, ask: Callable[[], None]) -> Callable[[], None]:
+        """As asked from loops: what it raises leaves no answer, and steps of Python's own raise it again."""
+
+        def heard() -> None:
+            try:
+                ask()
+            except ControllerError:
+                pass
+            except KeyboardInterrupt as fault:
+                self.fault.append(fault)
+
+        return heard
+
+
+def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
+    """Return over how many of the steps just taken a law goes straight on, in time and in what it reads.
+
+    Parameters
+    ----------
+    ride : Ride
+    begun : Begun
+        Where they began.
+    done : int
+
+    Returns
+    -------
+    int
+        All of them, where it can be taken for its values at their ends.
+    """
+    feed, marcher, until = ride.journey.plan.feed, ride.marcher, ride.journey.plan.until
+    t0, swings = begun.point.state.t, ride.journey.mark.swings
+    t = np.concatenate([[t0], marcher.rows[:done, 0]])
+    y = np.vstack([feed.measured(begun.point.state), marcher.rows[:done, 1:][:, feed.reads]])
+    supplies = [ride.supply, *marcher.supplies(ride.supply, done)]
+    u, x = np.array([s.u for s in supplies]), np.array([s.x for s in supplies])
+    size = np.maximum.accumulate(np.abs(np.diff(u, axis=0)), axis=0)
+    if swings:
+        size = np.maximum(size, swings[: u.shape[1]])
+    allowed = _BENT * size + _ROUND_OFF * np.abs(u).max(axis=0)
+    counts = np.maximum(_FEWEST, np.ceil(OF_RUN * np.diff(t) / until).astype(int))
+    k = np.repeat(np.arange(done), counts)
+    i = np.arange(k.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    shares = ((i + (_GOLDEN * i + 0.5) % 1.0) / counts[k])[:, None]
+    at, read, state, line = (a[k] + shares * np.diff(a, axis=0)[k] for a in (t[:, None], y, x, u))
+    said: list[list[float]] = []
+    with suppress(ControllerError):
+        for each in zip(at.ravel().tolist(), read, state, strict=True):
+            said.append(feed.answer(*each)[0])
+    heard = len(said)
+    off = np.abs(np.array(said).reshape(heard, line.shape[1]) - line[:heard]) > allowed[k[:heard]]
+    bent = np.append(np.flatnonzero(off.any(axis=1)), heard)[0]
+    return int(k[bent]) if bent < k.size else done
