@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right, insort
 from collections.abc import Callable
 from dataclasses import field, replace
 from functools import cached_property
@@ -102,6 +103,16 @@ class Feed:
     def breaks(self) -> tuple[float, ...]:
         """Instants at which a continuous command jumps."""
         return tuple(getattr(self.controller, "breaks", ())) if self.continuous else ()
+
+    @cached_property
+    def _jumps(self) -> list[float]:
+        """All instants at which the controller is known to jump: steps that are taken again feel what they felt."""
+        return sorted(self.breaks)
+
+    def meet(self, t: float) -> None:
+        """Take note of an instant at which a run has found the controller to jump."""
+        self.met[:] = [t]
+        insort(self._jumps, t)
 
     @cached_property
     def untold(self) -> bool:
@@ -305,10 +316,11 @@ class Feed:
 
     def short_of_break(self, t: float) -> float:
         """Return t, or just before where the command jumps there: a step that ends at a jump does not feel it."""
-        if not (self.breaks or self.met):
+        if not (known := self._jumps):
             return t
         near = _NEAR * abs(t) + 2.0 * ROUND_OFF  # what a trajectory takes for its break is a part of a second, too
-        return t - near if any(abs(t - b) < near for b in (*self.breaks, *self.met)) else t
+        first = bisect_right(known, t - near)
+        return t - near if first < len(known) and known[first] < t + near else t
 
     def _answer(self, t: float, y: np.ndarray, before: Supply, h: float) -> Supply:
         c = self.controller

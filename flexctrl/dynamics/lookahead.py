@@ -91,7 +91,7 @@ def look_ahead(journey: Journey) -> None:
             return
     if jumps or (end < math.inf and not chosen):
         stops.found = end
-        plan.feed.met[:] = [end]
+        plan.feed.meet(end)
         mark.left = 0
     else:
         journey.horizon = end

@@ -184,5 +184,5 @@ def _resumed(plan: Plan, stepper: Stepper[Any], start: Checkpoint, watch: Watch,
 
 def _stops(plan: Plan, saved: Checkpoint) -> Stops:
     """What is ahead of a run that goes on."""
-    plan.feed.met[:] = [saved.found]
+    plan.feed.meet(saved.found)
     return Stops(plan.feed.sample_time, plan.feed.breaks, saved.passed, saved.found)

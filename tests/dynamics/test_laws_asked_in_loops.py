@@ -191,3 +191,15 @@ def test_ctrl_c_in_a_law_keeps_the_run_and_it_goes_on(method):
     whole = fc.simulate(crane(), Law(held), **how)
     assert rest.status is fc.Status.FINISHED
     assert np.abs(rest.final.q - whole.final.q).max() < 1e-6
+
+
+@pytest.mark.parametrize("method", METHODS, ids=NAMES)
+def test_states_on_the_way_are_those_of_the_run_wherever_the_law_has_jumped_since(method):
+    def said(t, x, v):
+        return held(t, x, v) + (80.0 if 0.7 < t < 0.72 or 1.4 < t < 1.42 else 0.0)
+
+    model = crane()
+    run = fc.simulate(model, Law(said), until=2.0, every=0.01, method=fc.Unchecked(method))
+    assert run.status is fc.Status.FINISHED
+    places = np.array([run.at(t)["x"] for t in run.t])
+    assert np.abs(places - run["x"]).max() < 1e-6 * np.ptp(run["x"])

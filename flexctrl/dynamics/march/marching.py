@@ -33,6 +33,7 @@ from flexctrl.dynamics.records.frames import Later
 from flexctrl.dynamics.scales import components, farthest
 from flexctrl.dynamics.steps import Mark
 from flexctrl.dynamics.swift.stiff_lines import told_by_differences
+from flexctrl.errors import ControllerError
 from flexctrl.kernels.kernel import Compiled
 from flexctrl.kernels.native import Packed
 from flexctrl.model.flat.flattening import can_be_flat
@@ -45,6 +46,10 @@ __all__ = ["Marcher", "Pacing", "can_march"]
 
 _SPARE, _HEAVY = 2, 8_000_000
 """Marches kept for other runs; numbers of a matrix with which one is not: there is to be room for what is told."""
+_OTHERWISE = (
+    "steps of a run do not come out when they are taken again, for what is between rows: asked again, the controller "
+    "says other than before; keep nothing outside its state, or give it a sample time"
+)
 
 
 def can_march(model: Plant) -> TypeGuard[Model]:
@@ -284,6 +289,8 @@ class Marcher(Loops):
         told: list[Supply] = []
         while len(found) < count:
             done = self.travel(pacing, min(self.room, count - len(found)))[1]
+            if not done:
+                raise next(iter(self.faults()), ControllerError(_OTHERWISE))
             found += self.states()
             told += self.supplies(supply, done)
             if isinstance(pacing, Pacing):
