@@ -94,6 +94,8 @@ class Mark:
         The step [s] that the method's own accelerations were made for at a corner; 0 once it has been taken.
     taken : float
         Of steps of one length, the last [s], or the one that accelerations were made for since; 0 before the first.
+    doubts, plain : int
+        How often in a row a law in Python has left no step to compiled loops; plain steps before they try again.
     swings : tuple of float
         By how much a law has changed with time alone within a step, at most, and its states' rates; empty if not asked.
     """
@@ -107,6 +109,8 @@ class Mark:
     cap: float = 0.0
     led: float = 0.0
     taken: float = 0.0
+    doubts: int = 0
+    plain: int = 0
     swings: tuple[float, ...] = ()
 
 

@@ -26,6 +26,8 @@ __all__ = ["EVENT", "Begun", "go_back", "guarded", "next_span", "warily"]
 
 FEWEST, _WIDEST = 8, 1024
 """Steps that are looked at together."""
+_SHYEST = 4
+"""After so many tries of no use a law is left to plain steps, 15 of them, before the next."""
 EVENT = -1
 """How a march ends where an event may be near."""
 
@@ -88,11 +90,15 @@ def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
     status, done = ride.marcher.travel(pacing, min(count, span))
     calm = _calm(ride, begun, done)
     fitting = int(np.searchsorted(ride.marcher.rows[:done, 0], ride.until + ride.tick, "right"))
-    if spoken and (straight := straight_steps(ride, begun, min(calm, fitting))) < min(calm, fitting):
+    looked = min(calm, fitting)
+    if spoken and (straight := straight_steps(ride, begun, looked)) < looked:
         calm = straight
     watch.span = next_span(span, calm, calm < done)
     if fitting < calm and j.saved is None:
         j.saved = replace(j.snapshot(), sizes=sizes, span=span)
+    if spoken and (fitting or not done):
+        j.mark.doubts = 0 if calm else min(j.mark.doubts + 1, _SHYEST)
+        j.mark.plain = 2**j.mark.doubts - 1
     wanted = ride.limited(min(calm, fitting))
     if wanted == done:
         return status, done
