@@ -101,8 +101,8 @@ def test_of_an_event_all_is_kept():
 
 def test_of_progress_all_is_kept(monkeypatch):
     monkeypatch.setattr("flexctrl.dynamics.journey._SECONDS", 0.0)
-    model, law = swing(), fc.OpenLoop({"push": lambda t: 0.0})  # step by step: asked after each
-    how = {"until": 1.0, "start": model.displace([0.3]), "method": fc.GeneralizedAlpha(1e-2), "every": 0.01}
+    model, law = swing(), fc.OpenLoop({"push": lambda t: 0.0})  # 64 steps, 128, and so on: asked after each
+    how = {"until": 1.0, "start": model.displace([0.3]), "method": fc.GeneralizedAlpha(5e-4), "every": 0.01}
     check(fc.simulate(model, law, progress=lambda share: leave(share > 0.45), **how), "progress")
 
 

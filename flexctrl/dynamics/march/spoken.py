@@ -8,6 +8,7 @@ there, it may jump, or a corner of it be met, and that step is left to a plain o
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -26,8 +27,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Spoken", "straight_steps"]
 
-_BENT, _ROUND_OFF = 0.05, 1e-9
-"""What it may leave the line by, of the most that it has changed by within a step."""
+_BENT, _ROUND_OFF = 0.02, 1e-9
+"""What it may leave the line by, of what it changes by within a step or the one before."""
+_MORE, _SEEN = 4.0, 1e-3
+"""So many times as much as before it changes where something is hit; of its largest change, what counts."""
 _FEWEST = 4
 """Places within a step at which it is asked."""
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
@@ -127,6 +130,21 @@ class Spoken:
         return heard
 
 
+def _allowed(u: np.ndarray, swings: tuple[float, ...]) -> np.ndarray:
+    """By how much inputs may leave the line between the ends of each step; by less than nothing where something is hit.
+
+    There they change by far more than in both steps before; in one of these alone they may just have turned.
+    """
+    changes = np.abs(np.diff(u, axis=0))
+    first, second = (np.vstack([np.zeros_like(changes[:k]), changes])[: len(changes)] for k in (1, 2))
+    before = np.maximum(first, second)
+    most = _SEEN * np.maximum.accumulate(np.maximum(changes, swings or 0.0), axis=0)
+    hit = (changes > _MORE * before) & (changes > most)
+    hit[:1] = False
+    size = np.maximum(np.maximum(changes, first), most)
+    return np.asarray(np.where(hit, -math.inf, _BENT * size + _ROUND_OFF * np.abs(u).max(axis=0)))
+
+
 def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
     """Return over how many of the steps just taken a law goes straight on, in time and in what it reads.
 
@@ -148,10 +166,7 @@ def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
     y = np.vstack([feed.measured(begun.point.state), marcher.rows[:done, 1:][:, feed.reads]])
     supplies = [ride.supply, *marcher.supplies(ride.supply, done)]
     u, x = np.array([s.u for s in supplies]), np.array([s.x for s in supplies])
-    size = np.maximum.accumulate(np.abs(np.diff(u, axis=0)), axis=0)
-    if swings:
-        size = np.maximum(size, swings[: u.shape[1]])
-    allowed = _BENT * size + _ROUND_OFF * np.abs(u).max(axis=0)
+    allowed = _allowed(u, swings[: u.shape[1]])
     counts = np.maximum(_FEWEST, np.ceil(OF_RUN * np.diff(t) / until).astype(int))
     k = np.repeat(np.arange(done), counts)
     i = np.arange(k.size) - np.repeat(np.cumsum(counts) - counts, counts)
