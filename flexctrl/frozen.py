@@ -12,7 +12,7 @@ from dataclasses import FrozenInstanceError, dataclass, field, fields
 from operator import attrgetter
 from typing import Any, TypeVar, dataclass_transform, overload
 
-__all__ = ["frozen"]
+__all__ = ["ByFields", "frozen"]
 
 _T = TypeVar("_T")
 
@@ -37,6 +37,13 @@ def frozen(cls: type | None = None, /, *, eq: bool = True) -> Any:
         The same.
     """
     return (lambda given: _made(given, eq)) if cls is None else _made(cls, eq)
+
+
+class ByFields:
+    """What is copied and pickled by its fields alone: what it has worked out from them is worked out anew."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
 
 
 def _made(cls: Any, eq: bool) -> Any:

@@ -268,7 +268,7 @@ class Run:
     checkpoint : Checkpoint
         Where to go on from: the last instant at which nothing was yet cut to fit the end of the run.
     track : Track
-        The steps, as far as they are kept; see `at`.
+        The steps, as far as they are kept; see `at`. They do not come along to another process: all else does.
     fault : BaseException or None
         What the controller, an event or ``progress`` raised, where it ended the run: ``raise run.fault`` shows it.
     """
@@ -313,17 +313,15 @@ class Run:
         Raises
         ------
         StructureError
-            For no time or one outside the run, if it took no step, or if its steps took too much room to be kept.
+            For no time or one outside the run, if it took no step, if its steps took too much room to be kept, or if it
+            was pickled.
         """
         t, track = check_finite(t, "t", "run.at"), self.track
         if track.empty:
             ended = f"the run ended before its first step ({self.status.value}: {self.report.message})"
             raise StructureError(f"run.at: {ended}; run.final is where it stood")
         if not track.stretches:
-            raise StructureError(
-                "run.at: the steps of this run were not kept, they need more room; give record=InMemory(states=bytes), "
-                "or every=… for rows at the instants wanted"
-            )
+            raise StructureError(f"run.at: {track.missing}, or give every=… for rows at the instants wanted")
         first, last = track.starts[0], track.stretches[-1].after.state.t
         slack = 1e-12 * max(1.0, abs(last))
         if not first - slack <= t <= last + slack:

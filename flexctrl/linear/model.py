@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexctrl.errors import LinearizationError, StructureError, did_you_mean
-from flexctrl.frozen import frozen
+from flexctrl.frozen import ByFields, frozen
 from flexctrl.linear.parts import PartMatrices, projected_parts
 from flexctrl.linear.place import Place
 from flexctrl.structure.freedoms import listed
@@ -36,7 +36,7 @@ __all__ = ["LinearModel"]
 
 
 @frozen(eq=False)
-class LinearModel:
+class LinearModel(ByFields):
     """M q̈ + C q̇ + K q = B u,  y = Cq q + Cv q̇ + D u, with names.
 
     Attributes

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from flexctrl.effects.effect import Inner
-from flexctrl.frozen import frozen
+from flexctrl.frozen import ByFields, frozen
 from flexctrl.kernels.kernel import Backend
 from flexctrl.model.linkages.levers import Levers
 from flexctrl.model.linkages.linkage import Linkage
@@ -26,7 +26,7 @@ __all__ = ["Coordinates"]
 
 
 @frozen
-class Coordinates:
+class Coordinates(ByFields):
     """The degrees of freedom of a machine, and what of it each of them moves.
 
     Attributes

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from flexctrl.effects.effect import Effect
 from flexctrl.effects.large_rotation import LargeRotation
 from flexctrl.errors import StructureError, check_kind, did_you_mean
-from flexctrl.frozen import frozen
+from flexctrl.frozen import ByFields, frozen
 from flexctrl.kernels.kernel import Backend
 from flexctrl.model.assembly import assembled, mass_blocks, modal_blocks, stiffness_blocks
 from flexctrl.model.equations import Equations, LargeMotion, Small, SmallMotion
@@ -49,7 +49,7 @@ _LASTING = ("inputs", "outputs", "large", "signals", "gusts", "forces", "dust", 
 
 
 @frozen
-class Model:
+class Model(ByFields):
     """The equations of motion of a structure under some effects: Tᵀ (f(x, v, a) + loads) = 0.
 
     Made by `assemble`. ``coordinates`` names the degrees of freedom in the order of every vector and matrix.

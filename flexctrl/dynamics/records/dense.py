@@ -18,7 +18,7 @@ from flexctrl.frozen import frozen
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
-__all__ = ["Booked", "Curve", "Dense", "Hermite", "Track", "curves_of"]
+__all__ = ["Booked", "Curve", "Dense", "Hermite", "LeftBehind", "Track", "curves_of"]
 
 
 class Curve(Protocol):
@@ -181,6 +181,17 @@ class Track:
         """Whether there were no steps to keep."""
         return not self.stretches and self.used <= self.room
 
+    @property
+    def missing(self) -> str:
+        """Why there are no steps though some were taken, and what to do about it."""
+        return "the steps of this run were not kept, they need more room; give record=InMemory(states=bytes)"
+
+    def __deepcopy__(self, memo: object) -> Track:
+        return self  # of a run that has ended
+
+    def __reduce__(self) -> tuple[type[LeftBehind], tuple[bool]]:
+        return LeftBehind, (self.empty,)
+
     def keep(self, states: Sequence[State], before: Point, after: Point) -> None:
         """Keep one step or many."""
         if self.used > self.room:
@@ -249,3 +260,21 @@ class Track:
         i = min(max(1, bisect_right([state.t for state in ends], t)), len(ends) - 1)
         told = [s.before.supply, *s.supplies]
         return replace(s.before, state=ends[i - 1], supply=told[i - 1]), replace(s.after, state=ends[i], supply=told[i])
+
+
+class LeftBehind(Track):
+    """Stands in a run that was pickled for its steps: they are done again by compiled loops, which stay where they are.
+
+    Parameters
+    ----------
+    empty : bool
+        Whether there were no steps to leave.
+    """
+
+    def __init__(self, empty: bool) -> None:
+        self.room, self.used, self.starts, self.stretches = 0.0, 0.0 if empty else 1.0, [], []
+
+    @property
+    def missing(self) -> str:
+        """Why there are no steps, and what to do about it."""
+        return "a run that comes from another process or a file has its rows, not its steps; ask it where it was made"

@@ -25,6 +25,9 @@ class _Made(Sequence[State]):
     def _states(self) -> list[State]:
         return self.made()
 
+    def __reduce__(self) -> tuple[type[tuple[State, ...]], tuple[list[State]]]:
+        return tuple, (list(self),)
+
     @overload
     def __getitem__(self, at: int) -> State: ...
 

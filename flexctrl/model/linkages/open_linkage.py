@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.frozen import frozen
+from flexctrl.frozen import ByFields, frozen
 from flexctrl.mechanics.corotation import NodeMotion
 from flexctrl.mechanics.pieces import DriveMotion, hoist_motion, linear_motion, rotary_motion
 from flexctrl.mechanics.rotation import rotation_of, rotation_vector
@@ -64,7 +64,7 @@ class Loop:
 
 
 @frozen(eq=False)
-class OpenLinkage:
+class OpenLinkage(ByFields):
     """The nodes that follow, lead or are driven, in numbers of their own, and how they move with loops left open.
 
     The freedoms of a linkage are its independent ones, then as many dependent ones as loops are closed.
