@@ -9,6 +9,7 @@ _HOMES = {
     "flexctrl.design.controller": ("Controller", "as_controller"),
     "flexctrl.design.feedback": ("FilteredRate", "observer", "observer_feedback", "pd", "pi", "pid", "state_feedback"),
     "flexctrl.design.hardware": ("AntiWindup", "Delayed", "Noisy", "Quantised", "RateLimited", "Sampled", "Saturated"),
+    "flexctrl.design.holding": ("Held",),
     "flexctrl.design.optimal": ("Estimator", "IdleInputWarning", "Regulator", "bryson", "kalman", "lqg", "lqr"),
     "flexctrl.design.piecewise": ("Constant", "PiecewisePolynomial", "Sum", "Trajectory"),
     "flexctrl.design.shaper": ("Mode", "Shaper", "convolve"),

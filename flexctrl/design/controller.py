@@ -221,6 +221,10 @@ class _Completed:
     def breaks(self) -> tuple[float, ...]:
         return tuple(getattr(self.inner, "breaks", ()))
 
+    @property
+    def in_turn(self) -> int:
+        return int(getattr(self.inner, "in_turn", 1))
+
     def initial(self) -> np.ndarray:
         return np.asarray(self.inner.initial())
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from flexctrl.design.controller import Controller, LinearController
 from flexctrl.design.hardware import AntiWindup, Delayed, Noisy, Quantised, RateLimited, Sampled, Saturated
+from flexctrl.design.holding import Held
 from flexctrl.design.piecewise import Trajectory
 from flexctrl.design.tracking import Commanded, FeedForward, OpenLoop, Pairs, Signal, Together, Tracking
 from flexctrl.frozen import frozen
@@ -297,6 +298,16 @@ def _delayed(law: Delayed, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
     return (x[n : n + width, :], ca.vertcat(after, x[n + width :, :], u)) if law.samples else (u, after)
 
 
+def _in_between(law: Held, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
+    import casadi as ca
+
+    own, held, count = x[: law.states, :], x[law.states : -1, :], x[-1]
+    u, after = tracer.of(law.controller, own, y)
+    due, every = count < 0.5, tracer.number([law.every - 1.5])
+    u = ca.if_else(due, u, held)
+    return u, ca.vertcat(ca.if_else(due, after, own), u, ca.if_else(count > every, 0.0, count + 1.0))
+
+
 def _quantised(law: Quantised, tracer: Tracer, x: ca.SX, y: ca.SX) -> Told:
     (read, steps), (sent, sizes) = law.grids
     u, after = tracer.of(law.controller, x, _rounded(tracer, y, read, steps))
@@ -386,6 +397,7 @@ LAWS: dict[type, Callable[[Any, Tracer, Any, Any], Told]] = {
     AntiWindup: _held,
     RateLimited: _rate_limited,
     Delayed: _delayed,
+    Held: _in_between,
     Quantised: _quantised,
     Noisy: _noisy,
     Tracking: _tracking,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from functools import cached_property
@@ -13,7 +14,7 @@ import numpy as np
 from flexctrl.design.controller import Controller, as_controller
 from flexctrl.design.piecewise import distinct
 from flexctrl.design.shaping import check_grid
-from flexctrl.design.wrapping import Stateless, Wrapper, breaks_of, check_mapping, check_names, discretised
+from flexctrl.design.wrapping import Stateless, Wrapper, breaks_of, check_mapping, check_names, discretised, in_turn_of
 from flexctrl.errors import ControllerError
 from flexctrl.frozen import frozen
 
@@ -236,7 +237,7 @@ class Together:
     Parameters
     ----------
     *controllers : Controller
-        All continuous or all sampled alike.
+        All continuous or all sampled alike; `Held` brings a slower one to the samples of the fastest.
 
     Raises
     ------
@@ -248,9 +249,7 @@ class Together:
         parts = tuple(as_controller(c) for c in controllers)
         times = {part.sample_time for part in parts}
         if len(times) != 1:
-            raise ControllerError(
-                f"Together needs controllers of one sample time, not {sorted(times)} s: wrap them in Sampled"
-            )
+            raise ControllerError(_unlike(sorted(times)))
         self.parts = parts
         self.sample_time = times.pop()
         self.inputs = _united(part.inputs for part in parts)
@@ -268,6 +267,10 @@ class Together:
     @property
     def breaks(self) -> tuple[float, ...]:
         return _merged(*self.parts)
+
+    @property
+    def in_turn(self) -> int:
+        return math.lcm(*map(in_turn_of, self.parts))
 
     def initial(self) -> np.ndarray:
         return np.concatenate([part.initial() for part in self.parts])
@@ -303,6 +306,14 @@ class Together:
         Together
         """
         return Together(*(discretised(part, sample_time) for part in self.parts))
+
+
+def _unlike(times: list[float]) -> str:
+    """What is to be said of controllers whose sample times differ, 0 among them where one is continuous."""
+    fast, *others = (time for time in times if time)
+    said = [f"sample the continuous one, or the functions of time, too: Sampled(law, {fast})"] if not times[0] else []
+    said += [f"hold the command of a slower one: Held(law, {fast})"] if others else []
+    return f"Together needs controllers of one sample time, not {times} s; {', and '.join(said)}"
 
 
 def _indexed(signals: Mapping[str, Signal], names: tuple[str, ...], what: str) -> Pairs:

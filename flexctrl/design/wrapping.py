@@ -13,7 +13,7 @@ from flexctrl.errors import ControllerError, check_kind, did_you_mean, shortened
 from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import numbers
 
-__all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised"]
+__all__ = ["IntegratedController", "Stateless", "Wrapper", "breaks_of", "by_name", "discretised", "in_turn_of"]
 
 
 def breaks_of(controller: object) -> tuple[float, ...]:
@@ -30,6 +30,21 @@ def breaks_of(controller: object) -> tuple[float, ...]:
         Seconds, in order.
     """
     return tuple(getattr(controller, "breaks", ()))
+
+
+def in_turn_of(controller: object) -> int:
+    """Return the samples after which a controller does the same again: more than one where it counts them.
+
+    Parameters
+    ----------
+    controller : Controller
+        Anything; without ``in_turn`` it does the same at each.
+
+    Returns
+    -------
+    int
+    """
+    return int(getattr(controller, "in_turn", 1))
 
 
 class Stateless:
@@ -74,6 +89,10 @@ class Wrapper:
     @property
     def breaks(self) -> tuple[float, ...]:
         return breaks_of(self.controller)
+
+    @property
+    def in_turn(self) -> int:
+        return in_turn_of(self.controller)
 
     def initial(self) -> np.ndarray:
         return self.controller.initial()
@@ -166,7 +185,8 @@ def discretised(controller: Controller, sample_time: float) -> Controller:
         return controller
     if own:
         raise ControllerError(
-            f"the controller is already sampled every {own} s and cannot be resampled to {sample_time} s"
+            f"the controller is already sampled every {own} s and cannot be resampled to {sample_time} s; in a loop "
+            "some times as fast, Held(controller, seconds) holds its commands"
         )
     sampler: Any = getattr(controller, "sampled", None)
     return sampler(sample_time) if sampler else IntegratedController(controller, sample_time)

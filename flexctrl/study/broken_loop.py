@@ -9,6 +9,7 @@ import scipy.linalg as la
 
 from flexctrl.design.controller import Controller, LinearController, as_controller
 from flexctrl.design.hardware import Delayed, Noisy, Quantised, RateLimited, Saturated
+from flexctrl.design.holding import Held
 from flexctrl.design.tracking import Commanded, OpenLoop, Together
 from flexctrl.design.wrapping import Wrapper
 from flexctrl.errors import ControllerError, StructureError, check_kind, did_you_mean
@@ -79,6 +80,11 @@ def _law(controller: Controller) -> LinearController:
         return _together(controller)
     if isinstance(controller, Delayed):
         return _delayed(_law(controller.controller), controller.samples)
+    if isinstance(controller, Held) and controller.every > 1:
+        raise ControllerError(
+            f"a law held over {controller.every} samples changes from one to the next and has no margins; ask for "
+            "those of the faster loop, or of the slower one at its own samples with the faster one closed"
+        )
     if isinstance(controller, Commanded):
         inner = _law(controller.controller)
         kept = [i for i, name in enumerate(inner.inputs) if name in controller.inputs]

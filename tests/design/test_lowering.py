@@ -17,6 +17,7 @@ from flexctrl.design import (
     Delayed,
     FeedForward,
     FilteredRate,
+    Held,
     MinimumJerk,
     Noisy,
     OpenLoop,
@@ -58,6 +59,7 @@ def observer() -> Any:
 
 LAWS = {
     "pid": Sampled(PID, H),
+    "two rates": Together(Held(Noisy(Sampled(PID, 3 * H), {"angle": 0.01}), H), Sampled(SECOND, H)),
     "observer": as_controller(observer()),
     "tracking": Sampled(Tracking(FIRST, FOLLOW), H),
     "saturated": Saturated(Sampled(Tracking(FIRST, FOLLOW), H), {"torque": (-0.4, 0.3)}),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from flexctrl.design.wrapping import in_turn_of
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.notes.fading import radius
 from flexctrl.dynamics.notes.limits import limited
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["grows", "of_sampled_loop", "passed_over"]
 
-_MOST = 400
+_MOST, _MOST_IN_TURN = 400, 50
 _GROWN, _LOST, _FAR, _BOUNDED, _TURNED = 1.0, 3.0, 4.0, 20.0, 0.5
 """Powers of e over the run: what steps may miss, beyond which nothing is right, what is said though steps see it, and
 what of growth that steps see is held by limits that a loop about one place does not have; poles that turn together
@@ -223,12 +224,21 @@ def _loop_at(feed: Feed, state: State, x: np.ndarray, u: np.ndarray, most: int =
     model = feed.model
     if not feed.reads.size or 2 * model.n + x.size > most or model.switches.sticks(state):
         return
-    answers = _answers(feed, state, x)
-    if answers is not None:
-        yield _loop(feed, state, u, answers)
+    answers = [_answers(feed, state, own) for own in _in_turn(feed, state, x)]
+    known = [one for one in answers if one is not None]
+    if known and len(known) == len(answers):
+        yield _loop(feed, state, u, *known)
 
 
-def _loop(feed: Feed, state: State, u: np.ndarray, law: Answers) -> SampledLoop:
+def _in_turn(feed: Feed, state: State, x: np.ndarray) -> list[np.ndarray]:
+    """The states of a law from a sample on, until it does the same again; none if that takes too long."""
+    states, count = [x], in_turn_of(feed.controller)
+    while len(states) < min(count, _MOST_IN_TURN):
+        states.append(np.asarray(feed.told(state.t, states[-1], feed.measured(state))[1]))
+    return states if len(states) == count else []
+
+
+def _loop(feed: Feed, state: State, u: np.ndarray, law: Answers, *later: Answers) -> SampledLoop:
     model, still = feed.model, np.zeros(feed.model.n)
     kinds = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
     M, C, K = (-model.slope(state, state.v, still, seeds, u).toarray() for seeds in kinds)
@@ -236,7 +246,7 @@ def _loop(feed: Feed, state: State, u: np.ndarray, law: Answers) -> SampledLoop:
     T = model.motion.jacobian(state)[: model.motion.raw]
     reads, reads_rate = ((part[feed.reads] @ T).toarray() for part in (on_place, on_rate))
     push = (T.T @ model.reach(state, u)).toarray()
-    return SampledLoop(M, C, K, push, reads, reads_rate, law, feed.sample_time, M.diagonal() > model.dust)
+    return SampledLoop(M, C, K, push, reads, reads_rate, law, feed.sample_time, M.diagonal() > model.dust, later)
 
 
 def _answers(feed: Feed, state: State, x: np.ndarray) -> Answers | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +38,8 @@ class SampledLoop:
     reads, reads_rate : numpy.ndarray, shape (read, n)
         What the law reads of q and of q̇.
     law : Answers
+    later : tuple of Answers
+        Of the samples that follow, where the law counts them, until it does the same again.
     sample : float
         [s]
     heavy : numpy.ndarray of bool, shape (n,)
@@ -53,6 +55,7 @@ class SampledLoop:
     law: Answers
     sample: float
     heavy: np.ndarray
+    later: tuple[Answers, ...] = ()
 
     @cached_property
     def _between(self) -> tuple[np.ndarray, ...]:
@@ -72,7 +75,7 @@ class SampledLoop:
         numpy.ndarray of complex
         """
         A, B, C, D = self._between
-        return _firm(self._closed(*_over(A, B, self.sample), C, D), least)
+        return self._turned(least, *_over(A, B, self.sample), C, D)
 
     def stepped(self, rho: float, count: int, least: float) -> np.ndarray:
         """Return the poles of the loop as steps of generalised alpha have it.
@@ -99,7 +102,7 @@ class SampledLoop:
         for _ in range(count):
             total, force = step @ total, step @ force + pushed
         reads = np.hstack([self.reads, self.reads_rate / h, np.zeros((len(self.reads), 2 * n))])
-        return _firm(self._closed(total, force, reads, np.zeros((len(reads), m)), total @ leap), least)
+        return self._turned(least, total, force, reads, np.zeros((len(reads), m)), total @ leap)
 
     def _step(self, rho: float, h: float) -> tuple[np.ndarray, np.ndarray]:
         """One step of (q, h q̇, h² a, h² q̈), and what held inputs do over it."""
@@ -116,18 +119,26 @@ class SampledLoop:
         whole = np.vstack([place + c.beta * own, rate + c.gamma * own, own, true])
         return whole, np.vstack([c.beta * own_u, c.gamma * own_u, own_u, true_u])
 
-    def _closed(
-        self, moved: np.ndarray, force: np.ndarray, C: np.ndarray, D: np.ndarray, leap: np.ndarray | None = None
-    ) -> np.ndarray:
-        """From sample to sample: (machine, inputs in force, law); ``leap`` is what a change of inputs does at once."""
-        law, m = self.law, len(force[0])
-        u = np.hstack([law.u_y @ C, law.u_y @ D, law.u_x])
-        jump = np.zeros((m, u.shape[1]))
-        jump[:, len(moved) : len(moved) + m] = np.eye(m)
-        machine = np.hstack([moved, np.zeros((len(moved), m + law.u_x.shape[1]))]) + force @ u
-        if leap is not None:
-            machine += leap @ (u - jump)
-        return np.vstack([machine, u, np.hstack([law.x_y @ C, law.x_y @ D, law.x_x])])
+    def _turned(self, least: float, *machine: np.ndarray) -> np.ndarray:
+        """The poles of the loop; a sample's share of them where the law counts samples."""
+        if not self.later:
+            return _firm(_closed(self.law, *machine), least)
+        turn = [_closed(law, *machine) for law in (self.law, *self.later)]
+        return _firm(reduce(lambda done, one: one @ done, turn), least ** len(turn)) ** (1.0 / len(turn))
+
+
+def _closed(
+    law: Answers, moved: np.ndarray, force: np.ndarray, C: np.ndarray, D: np.ndarray, leap: np.ndarray | None = None
+) -> np.ndarray:
+    """From sample to sample: (machine, inputs in force, law); ``leap`` is what a change of inputs does at once."""
+    m = len(force[0])
+    u = np.hstack([law.u_y @ C, law.u_y @ D, law.u_x])
+    jump = np.zeros((m, u.shape[1]))
+    jump[:, len(moved) : len(moved) + m] = np.eye(m)
+    machine = np.hstack([moved, np.zeros((len(moved), m + law.u_x.shape[1]))]) + force @ u
+    if leap is not None:
+        machine += leap @ (u - jump)
+    return np.vstack([machine, u, np.hstack([law.x_y @ C, law.x_y @ D, law.x_x])])
 
 
 def _over(A: np.ndarray, B: np.ndarray, span: float) -> tuple[np.ndarray, np.ndarray]:
