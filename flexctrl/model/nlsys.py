@@ -10,6 +10,7 @@ from flexctrl.errors import MechanismError, SingularMatrixError, StructureError,
 from flexctrl.frozen import frozen
 from flexctrl.model.audit import Freedom, audit
 from flexctrl.model.equilibrium import Rest
+from flexctrl.model.flows import flowing
 from flexctrl.model.linkages.chart import Chart
 from flexctrl.model.linkages.charting import chart_of
 from flexctrl.model.model import Model
@@ -30,7 +31,8 @@ class Equations:
     ----------
     chart : Chart
     free : numpy.ndarray of int
-        Degrees of freedom that move.
+        Degrees of freedom that move and have mass: their rates are states. What is of first order (a motor's torque)
+        has its rate from the others.
     placed : numpy.ndarray of int
         Chart coordinates that are states.
     """
@@ -41,7 +43,7 @@ class Equations:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Coordinates, then the rates of the degrees of freedom."""
+        """Coordinates, then the rates of the degrees of freedom with mass."""
         names = self.chart.names
         return (*(names[i] for i in self.placed), *(f"{names[i]}_rate" for i in self.free))
 
@@ -63,9 +65,9 @@ class Equations:
             : len(model.inputs)
         ]  # control gives one NaN where there are none
         xi, v = self.coordinates(np.asarray(x, dtype=float))
-        state = self.chart.state(xi, v, t)
+        state = flowing(model, self.chart.state(xi, v, t), inputs)
         changed, swirl = self.chart.rate(xi, state)
-        still = np.zeros(model.n)
+        v, still = state.v, np.zeros(model.n)
         force = model.balance(state, v, still) + model.loads(state, inputs)
         mass = -model.slope(state, v, still, (0.0, 0.0, 1.0), inputs)
         if len(self.free) < model.n:
@@ -82,9 +84,10 @@ def to_nlsys(model: Model, at: Rest | State | None = None) -> control.NonlinearI
     """Return a model as a state space for python-control.
 
     The states are coordinates of the shape, measured from the reference (displacements, rotation vectors, turns
-    of hinges, source angles; named as the model's coordinates), then the rates of the degrees of freedom
-    (``…_rate``; spins in space axes). They agree with the states of the linear model to first order. Inputs are
-    total values, not deviations.
+    of hinges, source angles, torques of `MotorLag`, bristles of `LuGreFriction`; named as the model's coordinates),
+    then the rates of the degrees of freedom (``…_rate``; spins in space axes) but those of first order (torques,
+    bristles), which follow from the others. They agree with the states of the linear model to first order, but for
+    bristles, which stand still in that. Inputs are total values, not deviations.
 
     Parameters
     ----------
@@ -153,9 +156,10 @@ def equations_of(model: Model, at: Rest | State | None = None) -> Equations:
     held = {model.coordinate(name) for name in at.held} if isinstance(at, Rest) else set()
     chart = chart_of(model, reference)
     turning = {k for r in chart.rotations for k in r.coordinates}
-    free = np.array([i for i in range(model.n) if i not in held], dtype=int)
+    first_order = set(model.motion.flows.tolist())
+    free = np.array([i for i in range(model.n) if i not in held | first_order], dtype=int)
     placed = np.array([i for i in range(len(chart.names)) if i not in held or i in turning], dtype=int)
-    _refuse_massless(model, at, held)
+    _refuse_massless(model, at, held, first_order)
     equations = Equations(chart, free, placed)
     try:
         equations.rate(0.0, np.zeros(len(equations.states)), np.zeros(len(model.inputs)))
@@ -171,7 +175,7 @@ _REMEDY = (
 )
 
 
-def _refuse_massless(model: Model, at: Rest | State | None, held: set[int]) -> None:
+def _refuse_massless(model: Model, at: Rest | State | None, held: set[int], flows: set[int]) -> None:
     found = audit(model, at)
     loose = [names for names in found.mechanisms if not any(model.coordinate(name) in held for name in names)]
     if loose:
@@ -182,6 +186,6 @@ def _refuse_massless(model: Model, at: Rest | State | None, held: set[int]) -> N
         )
     kinds = (Freedom.STATIC, Freedom.RELAXING, Freedom.FALLING)
     light = [name for kind in kinds for name in found.named(kind)]
-    light = [name for name in light if model.coordinate(name) not in held]
+    light = [name for name in light if model.coordinate(name) not in held | flows]
     if light:
         raise StructureError(f"to_nlsys: no mass moves with {', '.join(light)}; {_REMEDY}")

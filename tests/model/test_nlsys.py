@@ -249,6 +249,54 @@ def test_what_is_held_stays_held():
     np.testing.assert_allclose(system.dynamics(0.0, [0.0, 0.1, 0.0, 0.0], [7.0])[3], -G / 2 * np.sin(0.1), rtol=1e-9)
 
 
+def servo(*effects: fc.Effect) -> fc.Model:
+    """A rotor on an elastic shaft behind a motor."""
+    rotor = fc.RigidBody("rotor", (0, 0, 0), 1.0, (0.1, 0.1, 0.1))
+    motor = fc.RotaryDrive("motor", rotor.node, axis="z", stiffness=50.0, inertia=0.01, damping=0.05)
+    plan = fc.Structure(
+        [rotor],
+        [fc.Support(rotor.node, "u v w rx ry")],
+        [motor],
+        [fc.MotorTorque("torque", motor)],
+        [fc.DriveAngle("angle", motor), fc.DriveSpeed("speed", motor), fc.Rotation("turn", rotor.node, "z")],
+    )
+    return fc.assemble(plan, [fc.LargeRotation(), fc.ShaftElasticity(), *effects])
+
+
+def test_a_lagging_torque_is_one_state():
+    """ẋ = A x + B u of rotor, motor and T τ̇ + τ = u, written down by hand; the lag's coordinate is τ over k."""
+    k, c, J, big, T = 50.0, 0.05, 0.01, 0.1, 0.02
+    system = servo(fc.MotorLag({"motor": T})).to_nlsys()
+    assert system.state_labels == ["rotor_0_rz", "motor_source", "motor_lag", "rotor_0_rz_rate", "motor_source_rate"]
+    A = np.zeros((5, 5))
+    A[0, 3] = A[1, 4] = 1.0
+    A[2, 2] = -1.0 / T
+    A[3] = np.array([-k, k, 0.0, -c, c]) / big
+    A[4] = np.array([k, -k, k, c, -c]) / J
+    B = np.array([0.0, 0.0, 1.0 / (T * k), 0.0, 0.0])
+    found = ct.linearize(system, np.zeros(5), [0.0])
+    on_torque = np.diag([1.0, 1.0, found.A[4, 2] * J / k, 1.0, 1.0])  # whatever one of the lag's coordinate is
+    np.testing.assert_allclose(on_torque @ found.A @ np.linalg.inv(on_torque), A, atol=1e-4)
+    np.testing.assert_allclose((on_torque @ found.B).ravel(), B, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        fc.MotorLag({"motor": 0.02}),
+        fc.LuGreFriction({"motor": fc.LuGre(stiffness=200.0, kinetic=1.0, static=1.5, stribeck=1.0, damping=0.3)}),
+    ],
+)
+def test_what_is_of_first_order_runs_as_simulated(effect):
+    model, t = servo(effect), np.linspace(0.0, 0.5, 21)
+    stiff = {"method": Radau, "rtol": 1e-8, "atol": 1e-10}
+    found = ct.input_output_response(
+        model.to_nlsys(), t, np.full((1, 21), 3.0), np.zeros(5), solve_ivp_kwargs=stiff
+    ).outputs
+    run = fc.simulate(model, until=0.5, inputs={"torque": 3.0}, every=0.025, tolerance=fc.Tolerance(1e-7, 1e-10))
+    assert (abs(found.T - run.y).max(axis=0) < 1e-3 * np.ptp(run.y, axis=0)).all()
+
+
 def test_freedoms_without_mass_are_refused_by_name():
     with pytest.raises(StructureError, match=r"no mass moves with slew_source;.*rigid shaft.*condenses"):
         fc.assemble(arm(inertia=0.0), FLEXIBLE).to_nlsys()
