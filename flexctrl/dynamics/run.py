@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.errors import StructureError, did_you_mean
+from flexctrl.errors import StructureError, did_you_mean, shortened
 from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_finite, check_number, written
@@ -316,6 +316,8 @@ class Run:
             For no time or one outside the run, if it took no step, if its steps took too much room to be kept, or if it
             was pickled.
         """
+        if np.ndim(t):
+            raise StructureError(f"run.at: t = {shortened(t)}; expected one time, [run.at(t) for t in …] gives several")
         t, track = check_finite(t, "t", "run.at"), self.track
         if track.empty:
             ended = f"the run ended before its first step ({self.status.value}: {self.report.message})"

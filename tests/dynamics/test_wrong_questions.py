@@ -47,6 +47,8 @@ def model() -> fc.Model:
         ({"progress": 1}, "progress = 1; expected a function"),
         ({"events": [fc.Event("top", lambda signals: np.nan)]}, "event 'top': its function gives nan"),
         ({"events": [fc.Event("top", lambda signals: signals["x"])]}, "event 'top': its function raised KeyError: 'x'"),
+        ({"events": [fc.Event("late", "t", 0.5)]}, "no signal 't'; the time is no signal: until=… ends a run at one"),
+        ({"events": [fc.Event("late", lambda y: y["t"])]}, "KeyError: 't'; the time is no signal: until=… ends a run"),
         ({"events": [fc.Event("top", lambda y: y["swing"] > 0.5)]}, "event 'top': its function gives False; expected"),
         ({"events": [fc.Event("top", lambda y: np.array(True))]}, "that goes through 0 where it happens: write lambda"),
         ({"events": [fc.Event("top", lambda y: "1")]}, "event 'top': its function gives '1'; expected a number"),
@@ -56,6 +58,13 @@ def model() -> fc.Model:
 def test_arguments_of_another_kind_are_refused(model, wrong, message):
     with pytest.raises(StructureError, match=re.escape(message)):
         fc.simulate(model, **{"until": 0.01, **wrong})
+
+
+def test_several_times_are_asked_one_by_one(model):
+    run = fc.simulate(model, until=0.02)
+    with pytest.raises(StructureError, match=r"at: t = array\(.*\); expected one time, \[run.at\(t\) for t in …\]"):
+        run.at(np.array([0.0, 0.01]))
+    assert [run.at(t).t for t in (0.0, np.float64(0.01))] == [0.0, 0.01]
 
 
 def test_a_rest_of_another_machine_is_refused(model):

@@ -14,10 +14,15 @@ from flexctrl.errors import StructureError
 from flexctrl.frozen import frozen
 from flexctrl.structure.freedoms import check_finite
 
-__all__ = ["Direction", "Event", "EventError", "Occurrence"]
+__all__ = ["CLOCK", "NO_CLOCK", "Direction", "Event", "EventError", "Occurrence"]
 
 
 _WRITTEN = 'lambda y: y["angle"] - 0.5'
+
+
+CLOCK = ("t", "time", "clock")
+NO_CLOCK = "; the time is no signal: until=… ends a run at one, and run.at(t) tells what is there"
+"""Names by which the time is asked for, and what to do instead."""
 
 
 class EventError(StructureError):
@@ -42,7 +47,7 @@ class Event:
         What to call it in ``run.events``.
     of : str or callable
         An output or input of the model, or a function of a mapping of all of them (name → value) to a number that is
-        continuous in time.
+        continuous in time. The time is none of them: ``until`` ends a run.
     at : float
         The value to be reached.
     direction : Direction
@@ -120,7 +125,10 @@ class Event:
             given = self.of(signals)
             found = math.nan if _is_answer(given) else float(given)
         except FAULTS as error:
-            raise EventError(f"event {self.name!r}: its function raised {type(error).__name__}: {error}") from error
+            hint = NO_CLOCK if isinstance(error, KeyError) and str(error).strip("'") in CLOCK else ""
+            raise EventError(
+                f"event {self.name!r}: its function raised {type(error).__name__}: {error}{hint}"
+            ) from error
         if _is_answer(given):
             raise EventError(
                 f"event {self.name!r}: its function gives {given!r}; expected a number that goes through {self.at:g} "

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from flexctrl.dynamics.events.event import Direction, Event, Occurrence
+from flexctrl.dynamics.events.event import CLOCK, NO_CLOCK, Direction, Event, Occurrence
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.records.tensions import Interval, Tensions
 from flexctrl.dynamics.steps import Point
@@ -78,7 +78,7 @@ class Watch:
         known = (*model.outputs, *model.inputs)
         for event in self.events:
             if isinstance(event.of, str) and event.of not in known:
-                hint = did_you_mean(event.of, known)
+                hint = NO_CLOCK if event.of in CLOCK else did_you_mean(event.of, known)
                 raise StructureError(f"event {event.name!r}: the model has no signal {event.of!r}{hint}")
 
     @property
