@@ -99,6 +99,28 @@ def test_ctrl_c_ends_the_report_and_not_the_chapter_alone(tmp_path, monkeypatch,
     assert not (tmp_path / "trolley.html").exists()
 
 
+@pytest.mark.parametrize("raises", [True, False])
+def test_a_report_that_is_stopped_has_the_chapters_until_then(tmp_path, monkeypatch, capsys, raises):
+    """All that had been found was lost: the folder stayed empty."""
+    (tmp_path / "trolley.toml").write_text(TROLLEY, encoding="utf-8")
+
+    def stopped(request):
+        if raises:
+            raise KeyboardInterrupt
+        return Answer("", {}, "interrupted: 3 settings", interrupted=True)
+
+    monkeypatch.setattr("flexctrl.cli.bode.answer", stopped)
+    assert main(["report", str(tmp_path / "trolley.toml"), "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert re.search(r"flexctrl: interrupted: .*trolley.html has what there was, without Bode, Root locus, .*Acc", said)
+    assert "no answer for" not in said
+    page = (tmp_path / "trolley.html").read_text(encoding="utf-8")
+    assert "degrees of freedom" in page
+    assert "stopped before it had an answer" in page
+    assert 'id="modes"' in page
+    assert 'id="rlocus"' not in page
+
+
 def test_the_health_of_a_report_tells_the_certificates_of_both_linear_models():
     scene = scene_from(tomllib.loads(TROLLEY), Place("trolley.toml"), "trolley")
     lines = health(scene, "", {}).splitlines()

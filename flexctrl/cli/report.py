@@ -40,40 +40,59 @@ _TITLES = {
 _ORDER = ("outputs", "inputs", "final")
 _AFTER = ("reference: ", "passed over: ", "cheapest within ", "stopped ", "no setting ")
 _MODES = 12
+_STOPPED = "stopped before it had an answer"
 _PACKAGES = ("numpy", "scipy", "control", "casadi", "matplotlib", "llvmlite", "slycot")
 
 
 @frozen
 class Chapter:
-    """What one command had to say."""
+    """What one command had to say, and whether it was stopped before it had an answer."""
 
     section: Section
     data: dict[str, Any]
+    stopped: bool = False
 
 
 def answer(request: Request) -> Answer:
-    """Let every command speak, and bind what they say into one page."""
+    """Let every command speak, and bind what they say into one page; of a report that is stopped, what there is."""
     scene = load_scene(request.scene)
     out = request.out or Path()
     with tempfile.TemporaryDirectory() as folder:
         titles = _TITLES if scene.law is not None else {**_TITLES, "compare": "Simulation"}
-        chapters = {n: _chapter(n, t, request, Path(folder)) for n, t in titles.items() if _applies(n, scene)}
+        asked = {n: t for n, t in titles.items() if _applies(n, scene)}
+        chapters = _chapters(asked, request, Path(folder))
+        stopped = [asked[n] for n in asked if n not in chapters or chapters[n].stopped]
+        if len(stopped) == len(asked):
+            raise KeyboardInterrupt
         versions = Section("versions", "Versions", _versions(scene), lead=LEADS["versions"])
         sections = [*(c.section for n, c in chapters.items() if n != "run"), _health(scene, chapters), versions]
         motion = _motion(scene) if any(s.moving for s in sections) else {}
         text = page(scene.name, " ".join(scene.notes), sections, motion)
     path = out / f"{scene.name}.html"
     path.write_text(text, encoding="utf-8")
-    failed = [s.title for s in sections if s.failed]
+    failed = [s.title for s in sections if s.failed and s.title not in stopped]
     data = {
         "scene": scene.name,
         "page": str(path),
         "bytes": len(text.encode()),
         "sections": [s.title for s in sections],
         "failed": failed,
+        "stopped": stopped,
     }
-    problem = f"no answer for: {', '.join(failed)} (the page says why)" if failed else ""
-    return Answer(f"{scene.name}: {path} ({len(text) // 1024} KiB), {len(sections)} sections", plain(data), problem)
+    said = [f"interrupted: {path} has what there was, without {', '.join(stopped)}"] if stopped else []
+    said += [f"no answer for: {', '.join(failed)} (the page says why)"] if failed else []
+    told = f"{scene.name}: {path} ({len(text) // 1024} KiB), {len(sections)} sections"
+    return Answer(told, plain(data), "; ".join(said), bool(stopped))
+
+
+def _chapters(titles: Mapping[str, str], request: Request, folder: Path) -> dict[str, Chapter]:
+    """Ask one command after the other, until one is stopped."""
+    found: dict[str, Chapter] = {}
+    for name, title in titles.items():
+        found[name] = _chapter(name, title, request, folder)
+        if found[name].stopped:
+            break
+    return found
 
 
 def _applies(name: str, scene: Scene) -> bool:
@@ -91,8 +110,10 @@ def _chapter(name: str, title: str, request: Request, folder: Path) -> Chapter:
         found = importlib.import_module(COMMANDS[name].module).answer(replace(request, out=own))
     except FlexctrlError as error:
         return Chapter(Section(name, title, str(error), failed=True), {})
+    except KeyboardInterrupt:
+        return Chapter(Section(name, title, _STOPPED, failed=True), {}, stopped=True)
     if found.interrupted:
-        raise KeyboardInterrupt
+        return Chapter(Section(name, title, f"{_STOPPED}: {found.problem}", failed=True), {}, stopped=True)
     pictures = () if name == "run" else tuple(sorted(own.glob("*.png"), key=_rank))
     text, more = _front(found.text) if name == "cost" else (found.text, "")
     section = Section(name, title, text, pictures, moving=name == "modes", lead=LEADS[name], more=more)
