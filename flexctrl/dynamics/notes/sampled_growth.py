@@ -246,7 +246,8 @@ def _loop(feed: Feed, state: State, u: np.ndarray, law: Answers, *later: Answers
     T = model.motion.jacobian(state)[: model.motion.raw]
     reads, reads_rate = ((part[feed.reads] @ T).toarray() for part in (on_place, on_rate))
     push = (T.T @ model.reach(state, u)).toarray()
-    return SampledLoop(M, C, K, push, reads, reads_rate, law, feed.sample_time, M.diagonal() > model.dust, later)
+    heavy, first = M.diagonal() > model.dust, (model.motion.flows, model.motion.settling)
+    return SampledLoop(M, C, K, push, reads, reads_rate, law, feed.sample_time, heavy, *first, later)
 
 
 def _answers(feed: Feed, state: State, x: np.ndarray) -> Answers | None:

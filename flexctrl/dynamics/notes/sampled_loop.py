@@ -10,6 +10,7 @@ import scipy.linalg as la
 
 from flexctrl.dynamics.alpha.point import Coefficients
 from flexctrl.dynamics.notes.heavy import without_light
+from flexctrl.dynamics.swift.easing import eased_change, eased_rate, felt_rate, unresolved
 from flexctrl.frozen import frozen
 
 __all__ = ["Answers", "SampledLoop"]
@@ -38,12 +39,14 @@ class SampledLoop:
     reads, reads_rate : numpy.ndarray, shape (read, n)
         What the law reads of q and of q̇.
     law : Answers
-    later : tuple of Answers
-        Of the samples that follow, where the law counts them, until it does the same again.
     sample : float
         [s]
     heavy : numpy.ndarray of bool, shape (n,)
         What has mass.
+    flows, settling : numpy.ndarray of int
+        Inner freedoms of first order; those of them that settle by themselves.
+    later : tuple of Answers
+        Of the samples that follow, where the law counts them, until it does the same again.
     """
 
     M: np.ndarray
@@ -55,6 +58,8 @@ class SampledLoop:
     law: Answers
     sample: float
     heavy: np.ndarray
+    flows: np.ndarray
+    settling: np.ndarray
     later: tuple[Answers, ...] = ()
 
     @cached_property
@@ -95,14 +100,40 @@ class SampledLoop:
         """
         n, m, h = len(self.M), self.B.shape[1], self.sample / count
         step, pushed = self._step(rho, h)
-        leap, heavy = np.zeros((n, m)), self.heavy
-        leap[heavy] = h**2 * np.linalg.solve(self.M[np.ix_(heavy, heavy)], self.B[heavy])
-        leap = np.vstack([np.zeros((2 * n, m)), leap, leap])
+        fresh, leap = self._renewed(Coefficients.of(rho), h)
         total, force = np.eye(4 * n), np.zeros((4 * n, m))
         for _ in range(count):
             total, force = step @ total, step @ force + pushed
         reads = np.hstack([self.reads, self.reads_rate / h, np.zeros((len(self.reads), 2 * n))])
-        return self._turned(least, total, force, reads, np.zeros((len(reads), m)), total @ leap)
+        return self._turned(least, total @ fresh, force, reads, np.zeros((len(reads), m)), total @ leap)
+
+    def _renewed(self, c: Coefficients, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """What becomes of (q, h q̇, h² a, h² q̈) as inputs jump, and what their change adds; see `alpha.outset`.
+
+        Rates of first order jump with them, and how these change begins anew; all others feel what they jump by.
+        """
+        n, m, heavy, first = len(self.M), self.B.shape[1], self.heavy, self.flows
+        place, rate, own, true = np.eye(4 * n, 4 * n + m).reshape(4, n, 4 * n + m)
+        drag = self.C[first, first][:, None]
+        jump = np.zeros((n, 4 * n + m))
+        jump[first, 4 * n :] = h * self.B[first] / drag
+        change, rate = true.copy(), rate + jump
+        change[first] = -h * self.K[first] @ rate / drag
+        for i in self._over(h):
+            z = h * self.K[i, i] / self.C[i, i]
+            jump[i] += (felt_rate(1.0, -z, 1.0, c.beta, c.gamma) - 1.0) * rate[i]
+            change[i] = eased_change(1.0, -z, 1.0, c.beta, c.gamma) * rate[i]
+            rate[i] *= eased_rate(1.0, -z, 1.0, c.beta, c.gamma)
+            own[i] = true[i]
+        force = -h * self.C @ jump
+        force[:, 4 * n :] += h**2 * self.B
+        change[heavy] += np.linalg.solve(self.M[np.ix_(heavy, heavy)], force[heavy])
+        whole = np.vstack([place, rate, own + change - true, change])
+        return whole[:, : 4 * n], whole[:, 4 * n :]
+
+    def _over(self, h: float) -> list[int]:
+        """What settles within a step."""
+        return [i for i in self.settling if unresolved(1.0, -h * self.K[i, i] / self.C[i, i], 1.0)]
 
     def _step(self, rho: float, h: float) -> tuple[np.ndarray, np.ndarray]:
         """One step of (q, h q̇, h² a, h² q̈), and what held inputs do over it."""
