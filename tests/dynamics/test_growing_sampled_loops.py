@@ -11,7 +11,8 @@ import scipy.linalg as la
 import flexctrl as fc
 from flexctrl.design import MinimumJerk, pd
 from flexctrl.dynamics.feed import feed_of
-from flexctrl.dynamics.notes.sampled_growth import _answers, _counts, _limited, _loop, _missed, _samples
+from flexctrl.dynamics.notes.law_slopes import law_slopes
+from flexctrl.dynamics.notes.sampled_growth import _counts, _limited, _loop, _missed, _samples
 
 NEAR, FAR, OMEGA, ZETA = 1.79, 1.76, 83.46, 0.0057
 SAMPLE, KP, KD = 1.49 / 83.46, 46.2, 13.5
@@ -59,7 +60,7 @@ def by_hand(delay: int, sample: float = SAMPLE) -> np.ndarray:
 def loop(delay: int, sample: float = SAMPLE):
     model = carts()
     feed = feed_of(model, law(delay, sample=sample), np.zeros(1))
-    answers = _answers(feed, model.rest, np.asarray(feed.controller.initial()))
+    answers = law_slopes(feed, model.rest, np.asarray(feed.controller.initial()))
     assert answers is not None
     return _loop(feed, model.rest, np.zeros(1), answers)
 
@@ -161,7 +162,7 @@ def test_an_arm_behind_a_gear_is_that_of_its_linear_model(inertia):
     model = fc.assemble(plan, [fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(beta=1e-3)])
     own = pd(kp=8.0, kd=0.4 if inertia else 0.0, measured="angle", rate="speed", command="torque")
     feed = feed_of(model, fc.Sampled(own, 0.02), np.zeros(1))
-    answers = _answers(feed, model.rest, np.zeros(0))
+    answers = law_slopes(feed, model.rest, np.zeros(0))
     assert answers is not None
     found = _loop(feed, model.rest, np.zeros(1), answers).poles(1.0)
     plant = fc.linearize(model).to_ss()
@@ -234,7 +235,7 @@ def test_steps_grow_as_their_poles_say_behind_motors_that_lag(lag, kd, count, rh
     """Torques begin to build up anew at each sample, whether steps see that or not."""
     model, law = lagging(lag), held(10.0, kd)
     feed = feed_of(model, law, np.zeros(1))
-    answers = _answers(feed, model.rest, np.zeros(0))
+    answers = law_slopes(feed, model.rest, np.zeros(0))
     assert answers is not None
     poles = _loop(feed, model.rest, np.zeros(1), answers).stepped(rho, count, 1.0 + 1e-6)
     assert poles.size
@@ -255,3 +256,44 @@ def test_growth_behind_a_motor_that_lags_is_seen(method):
     assert run.status is fc.Status.FINISHED
     assert any("about its start and its end the sampled loop is unstable" in note for note in run.report.notes)
     assert not any("of which steps" in note for note in run.report.notes)
+
+
+def upright() -> fc.Model:
+    """A bar of 1 kg that stands on a shaft, with a motor to balance it."""
+    bar = fc.RigidBody("bar", (0, 0, 0.5), 1.0, (0.1, 0.1, 1e-3), {"foot": (0, 0, 0)})
+    motor = fc.RotaryDrive("m", bar.point("foot"), axis="y", stiffness=4e4, ratio=1.0, inertia=0.02, damping=8.0)
+    plan = fc.Structure(
+        [bar],
+        [fc.Support(bar.point("foot"), "u v w rx rz")],
+        [motor],
+        [fc.MotorTorque("tq", motor)],
+        [fc.DriveAngle("a", motor), fc.DriveSpeed("s", motor)],
+    )
+    return fc.assemble(fc.planar(plan, "y"), [fc.Gravity(), fc.LargeRotation()])
+
+
+COUNTS = [{"a": 2 * np.pi / 256}, {"a": 2 * np.pi / 4096, "s": 0.02}, {"tq": 0.05}, {"a": 1e-5, "s": 1e-3, "tq": 1e-2}]
+
+
+@pytest.mark.parametrize("counts", COUNTS, ids=str)
+def test_laws_that_round_have_the_slopes_of_what_they_round(counts):
+    model, law = upright(), fc.Sampled(pd(40.0, 6.0, measured="a", rate="s", command="tq"), 0.01)
+    plain, rounded = (
+        law_slopes(feed_of(model, own, np.zeros(1)), model.rest, np.zeros(0))
+        for own in (law, fc.Quantised(law, counts))
+    )
+    assert plain.u_y == pytest.approx(np.array([[-40.0, -6.0]]), rel=1e-6)
+    assert rounded.u_y == pytest.approx(plain.u_y, rel=0.03)
+
+
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(0.01)], ids=repr)
+@pytest.mark.parametrize(("kd", "stands"), [(6.0, True), (-0.4, False)])
+@pytest.mark.parametrize("counts", COUNTS, ids=str)
+def test_only_loops_that_grow_are_told_of_where_laws_round(counts, kd, stands, method):
+    """Within a count a law does nothing, and the bar would fall; it stands. Driven to and fro, it swings ever more."""
+    law = fc.Quantised(fc.Sampled(pd(40.0, kd, measured="a", rate="s", command="tq"), 0.01), counts)
+    model = upright()
+    run = fc.simulate(model, law, until=8.0, start=model.displace({"bar_0_ry": 0.05}), every=0.01, method=method)
+    assert run.status is fc.Status.FINISHED
+    assert (np.ptp(run["a"][-100:]) < 0.1) == stands
+    assert any("the sampled loop is unstable" in note for note in run.report.notes) == (not stands)

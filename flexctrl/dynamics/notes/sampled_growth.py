@@ -12,6 +12,7 @@ import numpy as np
 from flexctrl.design.wrapping import in_turn_of
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.notes.fading import radius
+from flexctrl.dynamics.notes.law_slopes import law_slopes
 from flexctrl.dynamics.notes.limits import limited
 from flexctrl.dynamics.notes.moments import FEW, PARTLY, PARTS, moments, step_about
 from flexctrl.dynamics.notes.sampled_loop import Answers, SampledLoop
@@ -31,7 +32,6 @@ _GROWN, _LOST, _FAR, _BOUNDED, _TURNED = 1.0, 3.0, 4.0, 20.0, 0.5
 """Powers of e over the run: what steps may miss, beyond which nothing is right, what is said though steps see it, and
 what of growth that steps see is held by limits that a loop about one place does not have; poles that turn together
 [rad]."""
-_SMALL, _WIDER, _ALIKE = 1e-7, 8.0, 1e-2
 _HALVINGS, _ENDS = 10, 2
 _GROWING = 1.0 + 1e-9
 _UNEVEN = 0.5
@@ -224,7 +224,7 @@ def _loop_at(feed: Feed, state: State, x: np.ndarray, u: np.ndarray, most: int =
     model = feed.model
     if not feed.reads.size or 2 * model.n + x.size > most or model.switches.sticks(state):
         return
-    answers = [_answers(feed, state, own) for own in _in_turn(feed, state, x)]
+    answers = [law_slopes(feed, state, own) for own in _in_turn(feed, state, x)]
     known = [one for one in answers if one is not None]
     if known and len(known) == len(answers):
         yield _loop(feed, state, u, *known)
@@ -248,26 +248,6 @@ def _loop(feed: Feed, state: State, u: np.ndarray, law: Answers, *later: Answers
     push = (T.T @ model.reach(state, u)).toarray()
     heavy, first = M.diagonal() > model.dust, (model.motion.flows, model.motion.settling)
     return SampledLoop(M, C, K, push, reads, reads_rate, law, feed.sample_time, heavy, *first, later)
-
-
-def _answers(feed: Feed, state: State, x: np.ndarray) -> Answers | None:
-    """How a law answers, by central differences; None where it answers by jumps."""
-    y = feed.measured(state)
-
-    def said(d: np.ndarray) -> np.ndarray:
-        u, after = feed.told(state.t, x + d[y.size :], y + d[: y.size])
-        return np.concatenate([u, after])
-
-    at = np.concatenate([y, x])
-    slopes = [
-        np.array([(said(d) - said(-d)) / (2.0 * d.max()) for d in np.diag(size * np.maximum(1.0, abs(at)))]).T
-        for size in (_SMALL, _WIDER * _SMALL)
-    ]
-    near, wide = slopes
-    if not np.allclose(near, wide, rtol=_ALIKE, atol=_ALIKE * float(abs(near).max(initial=0.0))):
-        return None
-    m, k = len(feed.base), y.size
-    return Answers(near[:m, :k], near[:m, k:], near[m:, :k], near[m:, k:])
 
 
 def _samples(loop: SampledLoop, journey: Journey) -> float:
