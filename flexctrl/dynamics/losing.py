@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from flexctrl.dynamics.methods.explicit import ExplicitRungeKutta
 from flexctrl.dynamics.methods.extrapolation import Richardson
 from flexctrl.dynamics.methods.midpoint import ConservingMidpoint
-from flexctrl.dynamics.notes.straying import lost, thrown
+from flexctrl.dynamics.notes.straying import lost, spun, thrown
 from flexctrl.dynamics.steps import Controlled, Fixed, StepError
+from flexctrl.model.model import Model
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 __all__ = ["foresee", "look_back", "remedy"]
 
 _FORESEEN = 20_000
+_GONE, _SPUN = "has gone a million times the size of the machine", "turns by a thousand radians from sample to sample"
+_BEFORE = "or end the run before"
 
 
 def look_back(journey: Journey) -> None:
@@ -35,9 +38,11 @@ def look_back(journey: Journey) -> None:
     if lost(journey):
         gone = f"{where} a part has gone so far that no number tells the shape of the machine any more"
         raise StepError(worst, f"the loop is not stable: {gone}; {look}")
-    if isinstance(journey.plan.method.pace, Controlled) and (thrower := thrown(journey)) is not None:
-        gone = f"{where} a part has gone a million times the size of the machine, ever faster"
-        raise StepError(thrower, f"the loop is not stable: {gone}; {look}, or end the run before")
+    if isinstance(journey.plan.method.pace, Fixed) and not isinstance(journey.plan.model, Model):
+        return  # numbers of a linear model tell its shape however large they are
+    for found, gone in ((thrown(journey), _GONE), (spun(journey), _SPUN)):
+        if found is not None:
+            raise StepError(found, f"the loop is not stable: {where} a part {gone}, ever faster; {look}, {_BEFORE}")
 
 
 def foresee(journey: Journey) -> None:

@@ -110,16 +110,16 @@ def test_what_flies_far_under_a_stable_loop_has_not_failed(method, radius, speed
 
 
 LAWS = {
-    "away": (lambda x, v: 100.0 * (x + 1.0), 0.2, 6.0, 3.0),
-    "to and fro": (lambda x, v: 1.0 - 60.0 * v, 0.1, 5.0, 2.5),
-    "in ever wider swings": (lambda x, v: -400.0 * (x - 1.0) + 25.0 * v, 0.01, 3.0, 2.7),
+    "away": (lambda x, v: 100.0 * (x + 1.0), 0.2, 6.0),
+    "to and fro": (lambda x, v: 1.0 - 60.0 * v, 0.1, 5.0),
+    "in ever wider swings": (lambda x, v: -400.0 * (x - 1.0) + 25.0 * v, 0.01, 3.0),
 }
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("name", LAWS)
 def test_loops_that_grow_in_whatever_way_are_named(name, method):
-    force, sample, *until = LAWS[name]
+    force, sample, until = LAWS[name]
     mass = fc.RigidBody("mass", (0, 0, 0), 1.0, (0.1, 0.1, 0.1))
     structure = fc.Structure(
         [mass],
@@ -137,11 +137,9 @@ def test_loops_that_grow_in_whatever_way_are_named(name, method):
         def command(self, t, x, y):
             return np.array([force(*y)])
 
-    chosen = not isinstance(method, fc.GeneralizedAlpha)
-    end = until[0] if chosen else until[1]  # farther out, steps of one length fail, too
-    run = fc.simulate(fc.assemble(structure, [fc.LargeRotation()]), Law(), until=end, method=method, every=0.1)
-    assert run.status is (fc.Status.FAILED if chosen else fc.Status.FINISHED)
-    assert ("the loop is not stable" in run.report.message) is chosen
+    run = fc.simulate(fc.assemble(structure, [fc.LargeRotation()]), Law(), until=until, method=method, every=0.1)
+    assert run.status is fc.Status.FAILED
+    assert "the loop is not stable" in run.report.message
     assert any("as if the loop is not stable" in note for note in run.report.notes)
 
 
@@ -152,8 +150,9 @@ def test_a_loop_whose_numbers_no_longer_tell_its_machine_has_failed(method):
     model, law = crane(), fc.Sampled(pd(kp=-4000.0, kd=40.0, measured="x", rate="rate", command="force"), 0.01)
     run = fc.simulate(model, law, until=20.0, inputs={"force": 1.0}, method=method, every=0.5)
     assert run.status is fc.Status.FAILED
-    assert "no number tells the shape of the machine any more" in run.report.message
-    assert 1e8 < abs(run["x"]).max() < 1e22
+    said = "no number tells the shape of the machine any more", "a million times the size of the machine, ever faster"
+    assert any(each in run.report.message for each in said)  # whichever comes first: steps go in legs
+    assert 1e5 < abs(run["x"]).max() < 1e22
     assert np.isfinite(run.y).all()
 
 

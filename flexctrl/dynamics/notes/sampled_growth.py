@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -34,15 +35,16 @@ what of growth that steps see is held by limits that a loop about one place does
 [rad]."""
 _HALVINGS, _ENDS = 10, 2
 _GROWING = 1.0 + 1e-9
+_NUMBERS = math.log(sys.float_info.max)
 _UNEVEN = 0.5
 """Chosen steps are longer where little moves: what grows from there is seen by those."""
 _UNSTABLE = "the sampled loop is unstable"
 _SEEN = (
-    "{where} " + _UNSTABLE + ", with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, and what "
+    "{where} " + _UNSTABLE + ", with a pole at z = {pole}: it grows {whole} over the run, and what "
     "steps err by with it{held}; look at the signs, the gains and the sample time"
 )
 _SAID = (
-    _UNSTABLE + "{when}, with a pole at z = {pole}: it grows by e^{whole:.3g} over the run, of which "
+    _UNSTABLE + "{when}, with a pole at z = {pole}: it grows {whole} over the run, of which "
     "steps of {step:.2g} s see e^{seen:.2g}; look at the gains and the sample time, or take steps of {finer:.1g} s "
     "at most"
 )
@@ -74,12 +76,16 @@ class Missed(NamedTuple):
 
     def said(self, when: str = "") -> str:
         """What is to be said."""
-        told = {"whole": self.whole, "seen": max(self.seen, 0.0), "step": self.step, "finer": self.finer}
+        told = {"whole": self._power, "seen": max(self.seen, 0.0), "step": self.step, "finer": self.finer}
         return _SAID.format(pole=self._pole, when=when, **told)
 
     def told(self, where: str, held: str) -> str:
         """What is to be said of growth that steps see."""
-        return _SEEN.format(where=where, pole=self._pole, whole=self.whole, held=held)
+        return _SEEN.format(where=where, pole=self._pole, whole=self._power, held=held)
+
+    @property
+    def _power(self) -> str:
+        return f"by e^{self.whole:.3g}" if self.whole < _NUMBERS else "beyond all numbers"
 
     @property
     def _pole(self) -> str:

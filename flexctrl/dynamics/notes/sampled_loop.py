@@ -16,6 +16,7 @@ from flexctrl.frozen import frozen
 __all__ = ["Answers", "SampledLoop"]
 
 _SURE = 0.1
+_BEYOND = "it has gone beyond what numbers can tell"
 
 
 class Answers(NamedTuple):
@@ -64,6 +65,8 @@ class SampledLoop:
 
     @cached_property
     def _between(self) -> tuple[np.ndarray, ...]:
+        if not all(np.isfinite(part).all() for part in (self.M, self.C, self.K, self.B, *self.law)):
+            raise ArithmeticError(_BEYOND)
         machine = without_light(self.M, self.C, self.K, self.B, (self.reads, self.reads_rate), self.heavy, self.sample)
         return machine.in_modes()
 
@@ -181,6 +184,8 @@ def _over(A: np.ndarray, B: np.ndarray, span: float) -> tuple[np.ndarray, np.nda
 
 def _firm(loop: np.ndarray, least: float) -> np.ndarray:
     """The poles farther out that round-off does not move by much of how far outside the unit circle they are."""
+    if not np.isfinite(loop).all():
+        raise ArithmeticError(_BEYOND)
     poles = la.eigvals(loop)
     poles = poles[abs(poles) > least]
     if not poles.size:

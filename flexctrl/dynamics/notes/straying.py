@@ -13,11 +13,13 @@ from flexctrl.model.plant import Plant
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["lost", "strayed", "thrown"]
+__all__ = ["lost", "spun", "strayed", "thrown"]
 
 _FAR = 1e6
 _LOST = 1e15 / _FAR
 """So far out, two ends of a machine are one double number."""
+_SPUN = 1e3
+"""Radians from sample to sample: no machine is governed so, and no dentist's drill turns by a tenth of that."""
 _TIMES, _PUSHED = 10.0, 0.2
 """What grows as e^λt has λt > ln 10⁶ and x a/v² of 1: in samples, which end in a push, 1/4 at least. A power tⁿ has
 n and (n − 1)/n, what flies freely 1 and 0."""
@@ -62,7 +64,32 @@ def thrown(journey: Journey) -> int | None:
     -------
     int or None
     """
-    if journey.plan.feed.controller is None or not (far := (times := _times(journey)) > 1.0).any():
+    return _ever_faster(journey, _times(journey)) if journey.plan.feed.controller is not None else None
+
+
+def spun(journey: Journey) -> int | None:
+    """Return the freedom that a sampled loop has turn fastest, a thousand radians a sample at least; None if none.
+
+    What only turns goes nowhere. As `thrown`, it has its rate grow by orders, and is pushed on.
+
+    Parameters
+    ----------
+    journey : Journey
+
+    Returns
+    -------
+    int or None
+    """
+    sample = journey.plan.feed.sample_time
+    if journey.plan.feed.controller is None or not sample:
+        return None
+    turned = np.where(turning(journey.plan.model), np.abs(journey.point.state.v), 0.0) * sample
+    return _ever_faster(journey, turned / _SPUN)
+
+
+def _ever_faster(journey: Journey, times: np.ndarray) -> int | None:
+    """The freedom with the most of these, more than one, whose speed grows by orders and that is pushed on."""
+    if not (far := times > 1.0).any():
         return None
     moved, state, push = journey.books.sums.moved, journey.point.state, np.abs(journey.point.rate)
     speed = np.abs(state.v)
