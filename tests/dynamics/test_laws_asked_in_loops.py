@@ -203,3 +203,58 @@ def test_states_on_the_way_are_those_of_the_run_wherever_the_law_has_jumped_sinc
     assert run.status is fc.Status.FINISHED
     places = np.array([run.at(t)["x"] for t in run.t])
     assert np.abs(places - run["x"]).max() < 1e-6 * np.ptp(run["x"])
+
+
+def cart() -> fc.Model:
+    point = fc.PointMass("cart", (0, 0, 0), 2.0)
+    structure = fc.Structure(
+        [point],
+        [fc.Support(point.node, "v w")],
+        inputs=[fc.Force("force", point.node, "x")],
+        outputs=[fc.Position("x", point.node, "x"), fc.Velocity("v", point.node, "x")],
+    )
+    return fc.assemble(structure, [fc.LargeRotation()])
+
+
+class Filtered(Law):
+    """Force s − 6 v, and ṡ is what it says less 2 s."""
+
+    def initial(self):
+        return np.zeros(1)
+
+    def command(self, t, x, y):
+        return np.array([x[0] - 6.0 * y[1]])
+
+    def rate(self, t, x, y):
+        return np.array([self.said(t, *y) - 2.0 * x[0]])
+
+
+@pytest.mark.parametrize("method", [None, fc.GeneralizedAlpha(5e-3), fc.Unchecked(fc.AdaptiveAlpha())], ids=str)
+@pytest.mark.parametrize("width", [0.002, 0.01, 0.2])
+def test_a_pulse_of_a_state_s_rate_is_felt(width, method):
+    first, last = 2.003, 2.003 + width
+    law, y = Filtered(lambda t, x, v: 10.0 if first < t < last else 0.0), np.zeros(3)
+    run = fc.simulate(cart(), law, until=4.0, every=0.1, method=method)
+    for span, pushed in (((first, last), 10.0), ((last, 4.0), 0.0)):
+        y = solve_ivp(moved, span, y, args=(pushed,), rtol=1e-10, atol=1e-14).y[:, -1]
+    assert run["x"][-1] == pytest.approx(y[0], rel=3e-3)
+
+
+def moved(t: float, y: np.ndarray, pushed: float) -> list[float]:
+    return [y[1], 0.5 * (y[2] - 6.0 * y[1]), pushed - 2.0 * y[2]]
+
+
+def test_a_law_used_again_says_what_is_under_its_commands_in_this_run():
+    model, law = cart(), fc.OpenLoop({"force": lambda t: 5.0 if t > 0.7 else 0.0})
+    for under in (0.0, 5.0, -5.0, 5.0):
+        run = fc.simulate(model, law, until=2.0, inputs={"force": under})
+        assert run["x"][-1] == pytest.approx(0.25 * under * 4.0 + 1.25 * 1.3**2, rel=1e-3), under
+
+
+@pytest.mark.parametrize("step", [5e-3, 1e-2])
+def test_jumps_at_the_ends_of_steps_are_there(step):
+    for k in (26, 97, 130, 171, 260):
+        jump = k * 5e-3
+        law = Law(lambda t, x, v, jump=jump: 4.0 if t >= jump else 0.0)
+        run = fc.simulate(cart(), law, until=2.0, method=fc.Unchecked(fc.GeneralizedAlpha(step)))
+        assert run["x"][-1] == pytest.approx((2.0 - jump) ** 2, rel=1e-5), jump

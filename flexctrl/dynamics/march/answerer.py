@@ -98,7 +98,7 @@ class Answerer(Marcher):
             self.law.reached[:] = supply.most if known else np.abs(supply.x)
         return self
 
-    def faults(self) -> list[KeyboardInterrupt]:
+    def faults(self) -> list[BaseException]:
         """Return Ctrl-C where the law was asked, once."""
         if not isinstance(self.source, Spoken):
             return []
@@ -193,8 +193,9 @@ class Answerer(Marcher):
 
 def _serves(known: Feed, feed: Feed) -> bool:
     """Tell whether what was made for one feed does for another: the same law on the same signals."""
-    law = known.answering is feed.answering if feed.answering is not None else known.controller is feed.controller
-    same = law and known.model is feed.model
+    if feed.spoken:
+        return known is feed  # of which it has the inputs under its commands, and the jumps it has met
+    same = known.answering is feed.answering and known.model is feed.model
     return same and known.reads.tolist() == feed.reads.tolist() and known.writes == feed.writes
 
 

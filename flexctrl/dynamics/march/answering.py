@@ -12,6 +12,7 @@ from flexctrl.dynamics.alpha.sliding import NOTICED
 from flexctrl.dynamics.law_state import CLEAR, HALVINGS, LOOSE, NEARER, YOUNG
 from flexctrl.dynamics.march.answer import Answer
 from flexctrl.dynamics.march.books import reach
+from flexctrl.dynamics.march.clock import later
 from flexctrl.dynamics.march.record import DONE, EVALUATE, FAILED, FRESH, WANTS_TANGENT, March
 from flexctrl.dynamics.march.step import step
 from flexctrl.kernels.dense import full_factors, full_solve
@@ -61,7 +62,7 @@ def foresee(m: March) -> None:
     x = a.work[a.outputs :]
     for i in range(a.states):
         x[i] = x[a.states + i] + m.h * x[2 * a.states + i]
-    t = m.t + m.h
+    t = later(m.t, m.h)
     now = x[3 * a.states :]
     for k in range(a.clocks):
         s = t - a.origins[k]

@@ -265,7 +265,7 @@ class Marcher(Loops):
         """Go on under inputs that are in force already; return the march."""
         return self
 
-    def faults(self) -> list[KeyboardInterrupt]:
+    def faults(self) -> list[BaseException]:
         """Return what was raised by who is asked from within the loops, once."""
         return []
 

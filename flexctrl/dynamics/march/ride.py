@@ -76,7 +76,7 @@ class Ride:
         j = self.journey = journey
         self.stepper, self.marcher, self.supply = stepper, stepper.marcher, j.point.supply
         self.tick, self.until, self.most = 1e-12 * j.plan.until, until, most
-        self.faults: list[ControllerError | KeyboardInterrupt] = []
+        self.faults: list[BaseException] = []
         stepper.enter(j.point)
         sums = j.books.sums
         books = Opened(j.books.first, replace(sums), j.books.dissipates, j.watch.corner_sides.copy())

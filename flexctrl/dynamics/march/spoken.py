@@ -79,7 +79,7 @@ class Spoken:
         What depends on time alone: time itself.
     places, slopes : numpy.ndarray, shape (states²,)
         All of ∂f/∂x may change.
-    fault : list of KeyboardInterrupt
+    fault : list of BaseException
         Ctrl-C while it was asked.
     """
 
@@ -89,7 +89,7 @@ class Spoken:
         self.feed, self.states = feed, len(feed.beginning)
         self.commands = len(feed.writes)
         self.places, self.slopes = np.arange(self.states**2), np.zeros(self.states**2)
-        self.fault: list[KeyboardInterrupt] = []
+        self.fault: list[BaseException] = []
 
     def runs(self, work: np.ndarray, answer: np.ndarray, slopes: np.ndarray) -> tuple[Any, Any]:
         """Return what is called for answers and for ∂f/∂x, from what loops have written down for it to read.
@@ -124,14 +124,14 @@ class Spoken:
                 ask()
             except ControllerError:
                 pass
-            except KeyboardInterrupt as fault:
+            except BaseException as fault:  # Ctrl-C, and what is none of a run's business
                 self.fault.append(fault)
 
         return heard
 
 
 def _allowed(u: np.ndarray, swings: tuple[float, ...]) -> np.ndarray:
-    """By how much inputs may leave the line between the ends of each step; by less than nothing where something is hit.
+    """By how much answers may leave the line between the ends of each step; by less than nothing where one is hit.
 
     There they change by far more than in both steps before; in one of these alone they may just have turned.
     """
@@ -165,8 +165,8 @@ def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
     t = np.concatenate([[t0], marcher.rows[:done, 0]])
     y = np.vstack([feed.measured(begun.point.state), marcher.rows[:done, 1:][:, feed.reads]])
     supplies = [ride.supply, *marcher.supplies(ride.supply, done)]
-    u, x = np.array([s.u for s in supplies]), np.array([s.x for s in supplies])
-    allowed = _allowed(u, swings[: u.shape[1]])
+    u, x = np.array([[*s.u, *s.rate] for s in supplies]), np.array([s.x for s in supplies])
+    allowed = _allowed(u, swings)
     counts = np.maximum(_FEWEST, np.ceil(OF_RUN * np.diff(t) / until).astype(int))
     k = np.repeat(np.arange(done), counts)
     i = np.arange(k.size) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -175,7 +175,8 @@ def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
     said: list[list[float]] = []
     with suppress(ControllerError):
         for each in zip(at.ravel().tolist(), read, state, strict=True):
-            said.append(feed.answer(*each)[0])
+            told, rate = feed.answer(*each)
+            said.append([*told, *rate])
     heard = len(said)
     off = np.abs(np.array(said).reshape(heard, line.shape[1]) - line[:heard]) > allowed[k[:heard]]
     bent = np.append(np.flatnonzero(off.any(axis=1)), heard)[0]
