@@ -256,8 +256,8 @@ class Feed:
         """Return the inputs that a continuous controller in state x gives, and how fast that changes."""
         c = self.controller
         assert c is not None
+        rate = self.law_rate(t, y, x) if x.size else x
         try:
-            rate = state_of(c, c.rate(t, x, y), "rate", x.size) if x.size else x
             return self._total(c.command(t, x, y)), rate
         except FAULTS as error:
             raise blamed(error, t)  # noqa: B904 - its cause is set

@@ -108,14 +108,7 @@ def test_a_step_costs_a_few_answers():
 
 @pytest.mark.parametrize("method", METHODS, ids=NAMES)
 def test_a_buffer_written_as_a_law_throws_back_what_hits_it(method):
-    cart = fc.PointMass("cart", (0, 0, 0), 2.0)
-    structure = fc.Structure(
-        [cart],
-        [fc.Support(cart.node, "v w")],
-        inputs=[fc.Force("force", cart.node, "x")],
-        outputs=[fc.Position("x", cart.node, "x"), fc.Velocity("v", cart.node, "x")],
-    )
-    model = fc.assemble(structure, [fc.LargeRotation()])
+    model = cart()
     buffer = Law(lambda t, x, v: -2e4 * max(0.0, x - 1.0))
     start = model.displace({}).with_(v=np.array([0.5]))
     run = fc.simulate(model, buffer, until=4.0, every=0.05, start=start, method=method)

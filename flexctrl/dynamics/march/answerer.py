@@ -102,8 +102,8 @@ class Answerer(Marcher):
         """Return Ctrl-C where the law was asked, once."""
         if not isinstance(self.source, Spoken):
             return []
-        found = self.source.fault[:]
-        self.source.fault.clear()
+        found = self.source.faults[:]
+        self.source.faults.clear()
         return found
 
     def supplied(self, supply: Supply) -> Supply:
@@ -203,11 +203,7 @@ def _answer(feed: Feed, law: Answering | Spoken, backend: Compiled, flat: Any) -
     n, m, s, c, k = len(feed.model.outputs), len(feed.model.inputs), law.states, len(law.clocks), law.commands
     wide, width = n + 3 * s + c, max((clock.width for clock in law.clocks), default=0)
     work, answer, slopes = np.zeros(wide), np.zeros(k + s), law.slopes.copy()
-    if isinstance(law, Spoken):
-        step, slope = law.runs(work, answer, slopes)
-    else:
-        gather = np.concatenate([feed.reads, n + np.arange(s), n + 3 * s + np.arange(c)])[None]
-        step, slope = _kernels(law, backend, gather)
+    step, slope = law.runs(work, answer, slopes) if isinstance(law, Spoken) else _kernels(feed, law, backend)
     last, trend, said = np.zeros((3, m))
     gap, before, change, felt, row = np.zeros((5, k))
     return Answer(
@@ -253,7 +249,9 @@ def _answer(feed: Feed, law: Answering | Spoken, backend: Compiled, flat: Any) -
     )
 
 
-def _kernels(law: Answering, backend: Compiled, gather: np.ndarray) -> tuple[Runs, Runs]:
+def _kernels(feed: Feed, law: Answering, backend: Compiled) -> tuple[Runs, Runs]:
+    n, s = len(feed.model.outputs), law.states
+    gather = np.concatenate([feed.reads, n + np.arange(s), n + 3 * s + np.arange(len(law.clocks))])[None]
     step = (backend.bind(law.kernel, gather, law.values[None], np.arange(law.kernel.n_out)[None]),)
     return step, () if law.slope is None else (backend.bind(law.slope, gather, law.values[None], law.places[None]),)
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from flexctrl.design.piecewise import PiecewisePolynomial
 from flexctrl.dynamics.law_state import slope_of
 from flexctrl.dynamics.lookahead import OF_RUN
 from flexctrl.errors import ControllerError
@@ -34,21 +35,8 @@ _MORE, _SEEN = 4.0, 1e-3
 _FEWEST = 4
 """Places within a step at which it is asked."""
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_TIME = PiecewisePolynomial((0.0,), ((0.0, 1.0),))
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
-
-
-class _Elapsed:
-    """Time, as a clock of a law."""
-
-    width = 2
-
-    def piece(self, t: float) -> tuple[float, tuple[float, float]]:
-        """Return since when it is a polynomial, and its coefficients."""
-        return 0.0, (0.0, 1.0)
-
-    def along(self, times: np.ndarray) -> np.ndarray:
-        """Return it at instants."""
-        return times
 
 
 @frozen(eq=False)
@@ -56,13 +44,12 @@ class _Asking:
     """A function of Python as loops call a kernel."""
 
     ask: Callable[[], None]
+    arguments: ClassVar[int] = 0
 
     def __post_init__(self) -> None:
         call = _CALL(lambda tables, z, r: self.ask())
         object.__setattr__(self, "call", call)  # alive as long as this is
         object.__setattr__(self, "address", ctypes.cast(call, ctypes.c_void_p).value)
-
-    arguments = 0
 
 
 class Spoken:
@@ -79,17 +66,17 @@ class Spoken:
         What depends on time alone: time itself.
     places, slopes : numpy.ndarray, shape (states²,)
         All of ∂f/∂x may change.
-    fault : list of BaseException
+    faults : list of BaseException
         Ctrl-C while it was asked.
     """
 
-    clocks: ClassVar[tuple[Any, ...]] = (_Elapsed(),)
+    clocks: ClassVar[tuple[PiecewisePolynomial, ...]] = (_TIME,)
 
     def __init__(self, feed: Feed) -> None:
         self.feed, self.states = feed, len(feed.beginning)
         self.commands = len(feed.writes)
         self.places, self.slopes = np.arange(self.states**2), np.zeros(self.states**2)
-        self.fault: list[BaseException] = []
+        self.faults: list[BaseException] = []
 
     def runs(self, work: np.ndarray, answer: np.ndarray, slopes: np.ndarray) -> tuple[Any, Any]:
         """Return what is called for answers and for ∂f/∂x, from what loops have written down for it to read.
@@ -125,7 +112,7 @@ class Spoken:
             except ControllerError:
                 pass
             except BaseException as fault:  # Ctrl-C, and what is none of a run's business
-                self.fault.append(fault)
+                self.faults.append(fault)
 
         return heard
 
