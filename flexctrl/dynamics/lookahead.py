@@ -20,7 +20,7 @@ from flexctrl.errors import ControllerError
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["FEWEST", "OF_RUN", "look_ahead"]
+__all__ = ["FEWEST", "OF_RUN", "look_ahead", "without_rhythm"]
 
 FEWEST, OF_RUN = 32, 4096
 """Instants in a step, and in as much as the whole run."""
@@ -164,9 +164,9 @@ def _swings_ahead(journey: Journey, span: float, course: _Course) -> np.ndarray:
 
 def _asked(journey: Journey, span: float, count: int) -> _Course:
     t, mark = journey.point.state.t, journey.mark
-    k = np.arange(count)
     beyond = span < journey.stops.next - t  # what jumps right at the end is seen, too
-    shares = np.concatenate([[0.0], (k + (_GOLDEN * k + 0.5) % 1.0) / count, [1.0 + (_TOUCH if beyond else -_TOUCH)]])
+    inner = without_rhythm(np.arange(count), count)
+    shares = np.concatenate([[0.0], inner, [1.0 + (_TOUCH if beyond else -_TOUCH)]])
     times = t + span * np.sort(shares)
     values = np.array(list(_said(journey, times.tolist())))
     swing = np.ptp(values, axis=0)
@@ -174,6 +174,23 @@ def _asked(journey: Journey, span: float, count: int) -> _Course:
     before = np.array(mark.swings) if mark.swings else np.zeros(swing.size)
     mark.swings = tuple(np.maximum(swing, before).tolist())
     return _Course(times, values, np.where(np.array(mark.swings) > 0.0, mark.swings, math.inf))
+
+
+def without_rhythm(i: np.ndarray, count: int | np.ndarray) -> np.ndarray:
+    """Return shares of a span, one in each of so many parts of it, at instants that come again with no period.
+
+    Parameters
+    ----------
+    i : numpy.ndarray of int
+        The parts.
+    count : int or numpy.ndarray of int
+        How many there are.
+
+    Returns
+    -------
+    numpy.ndarray
+    """
+    return np.asarray((i + (_GOLDEN * i + 0.5) % 1.0) / count)
 
 
 def _said(journey: Journey, times: list[float]) -> Iterator[list[float]]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from flexctrl.design.piecewise import PiecewisePolynomial
 from flexctrl.dynamics.law_state import slope_of
-from flexctrl.dynamics.lookahead import OF_RUN
+from flexctrl.dynamics.lookahead import OF_RUN, without_rhythm
 from flexctrl.errors import ControllerError
 from flexctrl.frozen import frozen
 
@@ -34,7 +34,6 @@ _MORE, _SEEN = 4.0, 1e-3
 """So many times as much as before it changes where something is hit; of its largest change, what counts."""
 _FEWEST = 4
 """Places within a step at which it is asked."""
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _TIME = PiecewisePolynomial((0.0,), ((0.0, 1.0),))
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -157,7 +156,7 @@ def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
     counts = np.maximum(_FEWEST, np.ceil(OF_RUN * np.diff(t) / until).astype(int))
     k = np.repeat(np.arange(done), counts)
     i = np.arange(k.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    shares = ((i + (_GOLDEN * i + 0.5) % 1.0) / counts[k])[:, None]
+    shares = without_rhythm(i, counts[k])[:, None]
     at, read, state, line = (a[k] + shares * np.diff(a, axis=0)[k] for a in (t[:, None], y, x, u))
     said: list[list[float]] = []
     with suppress(ControllerError):
