@@ -249,6 +249,7 @@ LAWS: dict[str, Call] = {
     "Quantised": (fc.Quantised, {"controller": SAMPLED, "steps": {"swing": 0.1}}),
     "RateLimited": (fc.RateLimited, {"controller": SAMPLED, "limits": {"push": 1.0}, "before": {"push": 0.0}}),
     "Sampled": (fc.Sampled, {"controller": LAW, "sample_time": 0.1}),
+    "Held": (d.Held, {"controller": SAMPLED, "sample_time": 0.005}),
     "Saturated": (fc.Saturated, {"controller": LAW, "limits": {"push": 1.0}}),
     "bryson": (d.bryson, {"plant": PLANT, "outputs": {"swing": 1.0, "spin": 1.0}, "inputs": {"push": 1.0}}),
     "kalman": (d.kalman, {"plant": PLANT, "process": Q, "measurement": np.eye(2)}),
