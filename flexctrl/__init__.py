@@ -136,9 +136,14 @@ def __getattr__(name: str) -> Any:
         return value
     if not name.startswith("_") and importlib.util.find_spec(f"flexctrl.{name}"):
         return importlib.import_module(f"flexctrl.{name}")
+    raise AttributeError(f"module 'flexctrl' has no attribute {name!r}{_hint(name)}")
+
+
+def _hint(name: str) -> str:
+    if name in importlib.import_module("flexctrl.design").__all__:
+        return f"; it is flexctrl.design.{name}"
     close = difflib.get_close_matches(name, __all__, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
-    raise AttributeError(f"module 'flexctrl' has no attribute {name!r}{hint}")
+    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def __dir__() -> list[str]:

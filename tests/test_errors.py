@@ -37,6 +37,10 @@ def test_values_are_shown_on_one_short_line():
 def test_a_public_name_with_a_slip_is_offered():
     with pytest.raises(AttributeError, match="no attribute 'Beem'; did you mean 'Beam'"):
         _ = fc.Beem
+    with pytest.raises(AttributeError, match="no attribute 'lqrr'; did you mean 'lqr'"):
+        _ = fc.design.lqrr
+    with pytest.raises(AttributeError, match=r"no attribute 'Table'; it is flexctrl\.design\.Table"):
+        _ = fc.Table
 
 
 @pytest.mark.parametrize("study", [fc.ledger, fc.work_precision, fc.ladder])
