@@ -18,7 +18,8 @@ def answer(request: Request) -> Answer:
     write_json(request.out, "ladder.json", data)
     if request.out is not None:
         study.plot().savefig(request.out / "ladder.png", dpi=150)
-    return Answer(f"{scene.name}: from rigid to refined\n\n{study}", data)
+    problem = "" if study.complete else "interrupted: not all rungs were run, or as often as they should be"
+    return Answer(f"{scene.name}: from rigid to refined\n\n{study}", data, problem, not study.complete)
 
 
 def _data(study: Ladder) -> dict[str, object]:
@@ -36,7 +37,8 @@ def _data(study: Ladder) -> dict[str, object]:
     ]
     reference = {"setting": str(study.reference.setting), "agreement": study.reference.agreement}
     climb = [rung.name for rung in study.climb]
-    return plain({"scene": study.name, "rungs": rungs, "gains": study.gains, "climb": climb, "reference": reference})
+    found = {"scene": study.name, "rungs": rungs, "gains": study.gains, "climb": climb, "reference": reference}
+    return plain({**found, "complete": study.complete})
 
 
 __all__ = ["answer"]

@@ -23,7 +23,8 @@ def answer(request: Request) -> Answer:
     write_json(request.out, "ledger.json", data)
     if request.out is not None:
         found.plot().savefig(request.out / "ledger.png", dpi=150)
-    return Answer(f"{scene.name}: what each effect changes and costs\n\n{found}", data)
+    text = f"{scene.name}: what each effect changes and costs\n\n{found}"
+    return Answer(text, data, f"interrupted: {found.stopped}" if found.stopped else "", not found.complete)
 
 
 def _data(found: Ledger) -> dict[str, object]:
@@ -55,6 +56,8 @@ def _data(found: Ledger) -> dict[str, object]:
                 "judged_steps": found.accuracy.steps,
                 "judged_error": found.accuracy.known,
             },
+            "complete": found.complete,
+            "untried": found.untried,
             "notes": found.notes,
         }
     )

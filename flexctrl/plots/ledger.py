@@ -32,14 +32,16 @@ def ledger_figure(ledger: Ledger) -> Figure:
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=[3, 2])
     change_bars(left, ledger)
     cost_bars(right, ledger)
-    held = 100.0 * ledger.minimal_change.outputs_worst
-    figure.suptitle(
-        f"{ledger.name}: {len(ledger.minimal_set)} of {len(ledger.entries)} effects keep the outputs within "
-        f"{held:.2g} %, {ledger.pace}",
-        fontsize=11,
-        color=INK,
-    )
+    figure.suptitle(f"{ledger.name}: {_found(ledger)}", fontsize=11, color=INK)
     return figure
+
+
+def _found(ledger: Ledger) -> str:
+    all_of_them = len(ledger.entries) + len(ledger.untried)
+    if not ledger.complete:
+        return f"stopped, {len(ledger.entries)} of {all_of_them} effects were tried"
+    held = 100.0 * ledger.minimal_change.outputs_worst
+    return f"{len(ledger.minimal_set)} of {all_of_them} effects keep the outputs within {held:.2g} %, {ledger.pace}"
 
 
 def change_bars(ax: Axes, ledger: Ledger) -> Axes:

@@ -245,6 +245,8 @@ class Scene:
             return self
         full = self.with_(effects=[e for e in self.effects if e is not choice])
         drawn_up = ledger(full, choice.tolerance)
+        if not drawn_up.complete:
+            raise KeyboardInterrupt  # who stops the choice waits for no run
         found = drawn_up.scene
         assert isinstance(found, Scene)
         way = replace(self._simulation, method=found._simulation.method)

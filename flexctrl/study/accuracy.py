@@ -18,6 +18,7 @@ from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.study.answers import outputs_apart
 from flexctrl.study.subject import Subject
+from flexctrl.study.unstopped import unstopped
 
 __all__ = ["SHARE", "Accuracy", "Held", "accurate", "finer_plan", "refined", "worst"]
 
@@ -170,11 +171,9 @@ def refined(
 def _finished(scene: Subject, model: Model) -> Run | None:
     """A scene's run, if it comes to its end."""
     try:
-        run = scene.run(model)
+        run = unstopped(scene.run(model))
     except FlexctrlError:
         return None
-    if run.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt
     return run if run.status is Status.FINISHED else None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -35,6 +35,8 @@ def ledger(
     stiffer keep their freedoms. Where the equations are linear they are integrated exactly, with the fewest modes that
     keep the answer. The minimal set is timed against the full one: where it is slower, the full one is handed out.
     Differences of times that are less than times of one and the same run scatter by decide nothing.
+
+    Ctrl-C after the full scene has been run gives a ledger of what has been tried until then, which keeps all.
 
     Parameters
     ----------
@@ -72,13 +74,26 @@ class _Auditor:
         self.full = self.bench.full
 
     def drawn_up(self) -> Ledger:
-        trials = {o.name: self._alone(o) for o in self.items}
-        choice, speedup = self._choice()
-        bases = [self.bench.without(self._before(o)) for o in self.items]
-        self._measure([choice.trial, *_tried([*bases, *trials.values()]), choice.trial])
+        trials: dict[str, Trial | Refused] = {}
+        try:
+            for omission in self.items:
+                self._reference(omission)
+                trials[omission.name] = self._alone(omission)
+            choice, speedup = self._choice()
+            references = [self._reference(o) for o in self.items]
+            self._measure([choice.trial, *_tried([*references, *trials.values()]), choice.trial])
+            self.progress(1.0)
+            return self._ledger(trials, choice, speedup)
+        except KeyboardInterrupt:
+            if not trials:
+                raise  # there is nothing to keep
+            return self._ledger(trials, Choice([], self.full, self.full), 1.0, complete=False)
+
+    def _ledger(
+        self, trials: Mapping[str, Trial | Refused], choice: Choice, speedup: float, complete: bool = True
+    ) -> Ledger:
         minimal = choice.trial
-        entries = tuple(self._entry(o, trials[o.name], choice) for o in self.items)
-        self.progress(1.0)
+        entries = tuple(self._entry(o, trials[o.name], choice) for o in self.items if o.name in trials)
         return Ledger(
             self.full.scene.name,
             self.bench.within,
@@ -92,6 +107,8 @@ class _Auditor:
             self._noise,
             self.bench.accuracy,
             minimal.scene,
+            tuple(o.name for o in self.items if o.name not in trials),
+            complete,
         )
 
     def _choice(self) -> tuple[Choice, float]:
@@ -106,12 +123,16 @@ class _Auditor:
     def _before(self, omission: Omission) -> list[Omission]:
         return [o for o in self.items if o.name in omission.first]
 
+    def _reference(self, omission: Omission) -> Trial | Refused:
+        """The scene with one thing, and without what cannot be without it."""
+        return self.bench.without(self._before(omission))
+
     def _alone(self, omission: Omission) -> Trial | Refused:
         """The scene without one thing, and without what cannot be without it."""
         return self.bench.without([*self._before(omission), omission])
 
     def _entry(self, omission: Omission, trial: Trial | Refused, choice: Choice) -> Entry:
-        name, base = omission.name, self.bench.without(self._before(omission))
+        name, base = omission.name, self._reference(omission)
         keep = name not in choice.names and omission.is_in(choice.trial.scene)
         for one in (trial, base):
             if isinstance(one, Refused):

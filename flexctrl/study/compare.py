@@ -21,6 +21,7 @@ from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import check_seconds, written
 from flexctrl.study.rounding import beyond, of_signal
+from flexctrl.study.unstopped import unstopped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -352,8 +353,8 @@ def compare(
     if not isinstance(subject, Model):
         if isinstance(subject, type) or not hasattr(subject, "twin"):
             raise StructureError(f"compare: {shortened(subject)} is neither a Scene nor a Model (from assemble)")
-        flexible = subject.run(subject.model, first)
-        return Comparison.between(flexible, _unless_stopped(flexible, lambda: subject.run(subject.twin, second)))
+        flexible = unstopped(subject.run(subject.model, first))
+        return Comparison.between(flexible, subject.run(subject.twin, second))
     check_seconds(until, "until", "compare")
     twin = rigid(subject)
     assert isinstance(twin, Model)
@@ -370,15 +371,8 @@ def compare(
             progress=tell,
         )
 
-    flexible = run(subject, start, first)
-    return Comparison.between(flexible, _unless_stopped(flexible, lambda: run(twin, _twin_start(twin, start), second)))
-
-
-def _unless_stopped(flexible: Run, run: Callable[[], Run]) -> Run:
-    """The second run; after Ctrl-C in the first the user waits for no second one."""
-    if flexible.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt
-    return run()
+    flexible = unstopped(run(subject, start, first))
+    return Comparison.between(flexible, run(twin, _twin_start(twin, start), second))
 
 
 def _twin_start(twin: Model, start: State | Rest | None) -> Rest | None:

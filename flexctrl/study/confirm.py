@@ -19,6 +19,7 @@ from flexctrl.model.state import State
 from flexctrl.study.critical_mode import CriticalMode, critical_mode
 from flexctrl.study.gain_family import Crossing, gain_family
 from flexctrl.study.spillover import Spillover
+from flexctrl.study.unstopped import unstopped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -181,7 +182,7 @@ def _grown(certificate: Spillover, model: Model, at: State, gain: float, steps: 
         method=Unchecked(GeneralizedAlpha(period / steps, rho=1.0)),
         every=period / _POINTS,
     )
-    if run.status is not Status.FINISHED:
+    if unstopped(run).status is not Status.FINISHED:
         raise StructureError(f"confirm: the run at {gain:.4g} × ended early: {run.report.message}")
     times, amplitudes = _amplitudes(run, model.measure(at), _seen(linear, mode), mode)
     measured = float(np.polyfit(times, np.log(amplitudes), 1)[0])

@@ -28,6 +28,7 @@ __all__ = ["Ladder", "Rung", "ladder", "rungs"]
 
 _REPEATS = 3
 _WORTH = 2.0
+_STOPPED = "stopped before it was run"
 _FINER = 4
 _COARSER = 4.0
 _NIMBLE = (Fidelity.RIGID, Fidelity.RIGID_WITH_SHAFTS, Fidelity.COMPONENT_MODES)
@@ -73,11 +74,14 @@ class Ladder:
         From the least physics to the most; what changes nothing of the scene is left out.
     reference : Reference
         What errors are measured against.
+    complete : bool
+        False if it was stopped: rungs that had not been run say so, and times are of fewer runs.
     """
 
     name: str
     rungs: tuple[Rung, ...]
     reference: Reference
+    complete: bool = True
 
     def __getitem__(self, name: str) -> Rung:
         for rung in self.rungs:
@@ -135,6 +139,7 @@ class Ladder:
             "error: largest of an output, over its largest magnitude; time: of a run, over that of a fixed calculation"
         )
         lines.append(f"worth standing on: {', '.join(rung.name for rung in self.climb) or 'none'}")
+        lines += [] if self.complete else ["stopped before all had been run as often as they should be"]
         return "\n".join([*lines, f"reference: {self.reference.setting}; known to {self.reference.uncertainty:.1e}"])
 
 
@@ -198,7 +203,7 @@ def ladder(
     All are the same scene with other effects. One that cannot be, as the linear one with Coulomb friction, backlash or
     no equilibrium, is told as such and takes nothing from the others. Errors are against a certified reference, finer
     than the refined rung. Times are the shortest of several runs, taken in turn, over that of a fixed calculation made
-    in between.
+    in between. Ctrl-C after the reference has been found gives a ladder of the rungs run until then.
 
     Parameters
     ----------
@@ -225,12 +230,23 @@ def ladder(
     chosen, tell = tuple(rungs) or _rungs(base), progress or (lambda done: None)
     reference = certified(base, [setting for _, setting in chosen], tolerance)
     tried = [_Tried(name, setting, base) for name, setting in chosen]
-    for i in range(_REPEATS):
-        for k, one in enumerate(tried):
-            tell((1.0 + i * len(tried) + k) / (1.0 + _REPEATS * len(tried)))
-            one.again()
-    tell(1.0)
-    return Ladder(base.name, tuple(one.rung(reference) for one in tried), reference)
+    complete = _all_run(tried, tell)
+    return Ladder(base.name, tuple(one.rung(reference) for one in tried), reference, complete)
+
+
+def _all_run(tried: Sequence[_Tried], tell: Callable[[float], None]) -> bool:
+    """Run all in turn, several times; tell whether that was not stopped."""
+    try:
+        for i in range(_REPEATS):
+            for k, one in enumerate(tried):
+                tell((1.0 + i * len(tried) + k) / (1.0 + _REPEATS * len(tried)))
+                one.again()
+        tell(1.0)
+    except KeyboardInterrupt:
+        if not any(np.isfinite(one.time) for one in tried):
+            raise  # there is nothing to keep
+        return False
+    return True
 
 
 _rungs = rungs
@@ -265,7 +281,7 @@ class _Tried:
 
     def rung(self, reference: Reference) -> Rung:
         """What was found."""
-        if self.failure or self.run is None:
-            return Rung(self.name, self.setting, np.inf, np.inf, 0, 0, self.failure)
+        if self.failure or self.run is None or not np.isfinite(self.time):
+            return Rung(self.name, self.setting, np.inf, np.inf, 0, 0, self.failure or _STOPPED)
         error, report = error_of(reference.run, self.run), self.run.report
         return Rung(self.name, self.setting, error, self.time, report.dofs, report.steps)

@@ -115,6 +115,10 @@ class Ledger:
         How well the outputs of the full run are known.
     scene : Scene
         The scene with the minimal set.
+    untried : tuple of str
+        Effects that had not been left out when it was stopped; they are kept.
+    complete : bool
+        False if it was stopped: nothing is left out then.
     """
 
     name: str
@@ -129,6 +133,8 @@ class Ledger:
     noise: float
     accuracy: Accuracy
     scene: Subject = field(repr=False)
+    untried: tuple[str, ...] = ()
+    complete: bool = True
 
     @property
     def pace(self) -> str:
@@ -169,7 +175,15 @@ class Ledger:
     @property
     def notes(self) -> tuple[str, ...]:
         """What stands against the numbers."""
-        return tuple(note for note in (self.accuracy.note or self._doubt, self._instability) if note)
+        return tuple(note for note in (self.accuracy.note or self._doubt, self._instability, self.stopped) if note)
+
+    @property
+    def stopped(self) -> str:
+        """What is not known if it was stopped; empty if it was not."""
+        if self.complete:
+            return ""
+        untried = f"{', '.join(self.untried)} not tried, and " if self.untried else ""
+        return f"stopped: {untried}what may be left out together is not known, so all is kept"
 
     @property
     def _doubt(self) -> str:
@@ -198,7 +212,7 @@ class Ledger:
     @property
     def minimal_set(self) -> tuple[str, ...]:
         """Names of the effects that the minimal scene has."""
-        return tuple(e.name for e in self.entries if e.keep)
+        return (*(e.name for e in self.entries if e.keep), *self.untried)
 
     def __getitem__(self, name: str) -> Entry:
         for entry in self.entries:
@@ -234,7 +248,7 @@ class Ledger:
             f"left out: {self._left_out}",
             f"{self.changes} (asked: {self.within}), {self.pace}, {size}{self._way}",
         ]
-        if all(e.keep for e in self.entries):
+        if self.complete and all(e.keep for e in self.entries):
             lines.append("the full set: no smaller one keeps the answer and is as fast")
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 

@@ -20,6 +20,7 @@ from flexctrl.linear.statespace import modal_first_order
 from flexctrl.model.linearize import linearize
 from flexctrl.study.amplitudes import Amplitude, Case, ConstantLoad
 from flexctrl.study.giving_way import gives_way, loaded
+from flexctrl.study.unstopped import unstopped
 
 __all__ = [
     "CurveDifference",
@@ -288,7 +289,7 @@ def _run(
         method=method or Unchecked(GeneralizedAlpha(until / (2 * _POINTS))),
         every=until / _POINTS,
     )
-    if run.status is not Status.FINISHED:
+    if unstopped(run).status is not Status.FINISHED:
         return Trial(amplitude, np.inf, np.inf, np.inf)
     nonlinear = run.y[:, place] - case.outputs[place]
     if isinstance(quantity, CurveDifference):

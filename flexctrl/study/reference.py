@@ -16,6 +16,7 @@ from flexctrl.frozen import frozen
 from flexctrl.study.answers import Curves, outputs_apart
 from flexctrl.study.settings import Fidelity, Setting
 from flexctrl.study.subject import Subject
+from flexctrl.study.unstopped import unstopped
 
 __all__ = ["Reference", "Traced", "certified", "error_of", "finest_of", "finished", "trace"]
 
@@ -239,9 +240,7 @@ def finished(scene: Subject) -> Run:
     FlexctrlError
         If it ends early.
     """
-    run = scene.run()
-    if run.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt
+    run = unstopped(scene.run())
     if run.status is not Status.FINISHED:
         raise FlexctrlError(f"the run ended early: {run.report.message}")
     return run

@@ -21,6 +21,7 @@ from flexctrl.study.exactly import exactly, fewer_modes
 from flexctrl.study.ledger import Size
 from flexctrl.study.omissions import Omission
 from flexctrl.study.subject import Subject
+from flexctrl.study.unstopped import unstopped
 
 __all__ = ["LONG", "Bench", "Refused", "Trial"]
 
@@ -271,8 +272,6 @@ class Bench:
 
 def _ran(scene: Subject, model: Model) -> Trial:
     run, taken = timed(scene, model)
-    if run.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt
     if run.status is not Status.FINISHED:
         raise FlexctrlError(f"the run ended early: {run.report.message}")
     return Trial(scene, run, [taken], model, run)
@@ -281,5 +280,5 @@ def _ran(scene: Subject, model: Model) -> Trial:
 def timed(scene: Subject, model: Model) -> tuple[Run, float]:
     """Return a run and its processor time [s], which other processes hardly disturb."""
     began = thread_time()
-    run = scene.run(model)
+    run = unstopped(scene.run(model))
     return run, max(thread_time() - began, 1e-9)

@@ -327,12 +327,15 @@ def test_a_run_has_the_effects_that_the_answer_needs(monkeypatch):
     """Those of the smallest set; a model that is given is run as it is, and a study is of all that are named."""
     scene = deflected()
     small = scene.with_(effects=[fc.LargeRotation()])
-    drawn = SimpleNamespace(scene=small, summary="left out: much", notes=())
+    drawn = SimpleNamespace(scene=small, summary="left out: much", notes=(), complete=True)
     monkeypatch.setattr(scene_module, "ledger", lambda full, tolerance: drawn)
     chosen = scene.with_(effects=[*scene.effects, fc.Automatic(0.01)])
     assert chosen.run().report.dofs == small.model.n == 0 < scene.model.n
     assert chosen.run(chosen.model).report.dofs == scene.model.n
     assert chosen.run(chosen.twin).report.dofs == 0
+    drawn.complete = False
+    with pytest.raises(KeyboardInterrupt):
+        scene.with_(effects=[*scene.effects, fc.Automatic(0.01)]).run()
     assert prepared(chosen, 0.01, "ledger").effects == scene.effects
 
 
