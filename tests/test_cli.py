@@ -224,7 +224,7 @@ def test_compare_holds_both_and_their_difference(told):
 def test_out_holds_pictures_and_data(call, scene, tmp_path, command, files):
     out = tmp_path / "deep" / "out"
     code, text, err = call(command, scene, "--out", out)
-    assert (code, err) == (0, "")
+    assert (code, [line for line in err.splitlines() if " % done" not in line]) == (0, [])  # slow machines show progress
     assert text.strip()
     assert {p.name for p in out.iterdir()} >= files
     for picture in out.glob("*.png"):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from flexctrl.cli.answer import grid
-from flexctrl.dynamics.run import worst_output
+from flexctrl.dynamics.run import worst_signal
 from flexctrl.errors import FlexctrlError
 from flexctrl.linear.certificate import Certificate
 from flexctrl.scene import Scene
@@ -47,7 +47,9 @@ def _integrator(data: Mapping[str, Any]) -> str:
     if data["error"] != data["drift"]:
         lines.append(f"off by {data['error']:.2g} of the motion, by a coarser run")
     if data["output_errors"]:
-        lines.append(worst_output(data["output_errors"]))
+        lines.append(worst_signal("outputs", data["output_errors"]))
+    if data["command_errors"]:
+        lines.append(worst_signal("commands", data["command_errors"]))
     return "\n".join([*lines, grid(("energy", "J"), rows)])
 
 

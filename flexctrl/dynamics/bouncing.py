@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexctrl.dynamics.methods.checked import Beside
+from flexctrl.dynamics.notes.apart import Apart
 from flexctrl.dynamics.notes.outputs import fast, seen, ways
-from flexctrl.dynamics.notes.rates import Apart
 from flexctrl.dynamics.others import Beginning, made, noted
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.steps import Integrator

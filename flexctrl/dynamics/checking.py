@@ -11,12 +11,14 @@ from flexctrl.dynamics.agreed import agreed
 from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.methods.checked import Beside, Checked
 from flexctrl.dynamics.notes.answers import jumps
+from flexctrl.dynamics.notes.apart import LOST
 from flexctrl.dynamics.notes.beside import PARTED, TOLD, elsewhere, rattles, told_beside
+from flexctrl.dynamics.notes.commanded import commanded
 from flexctrl.dynamics.notes.fading import radius
 from flexctrl.dynamics.notes.lengths import as_many, usual
 from flexctrl.dynamics.notes.orders import least_order, orders_seen
 from flexctrl.dynamics.notes.peaks import peaked
-from flexctrl.dynamics.notes.rates import LOST, may_be_lost, rated
+from flexctrl.dynamics.notes.rates import may_be_lost, rated
 from flexctrl.dynamics.others import UNCHECKED, Beginning, Other, made, noted, standing
 from flexctrl.dynamics.run import Run, Status
 from flexctrl.dynamics.steps import Controlled, Fixed
@@ -71,7 +73,8 @@ def laid_beside(run: Run, journey: Journey, method: Checked, beginning: Beginnin
         nearby = method.finer(tolerance, usual(journey), 0.5) if steady else method.coarser(tolerance, _NEARER)
         told, nearer = made(told, journey, nearby, beginning)
         others = (*others, nearer) if nearer else others
-    return rated(told, [(other.run, other.beside.longer) for other in others], journey)
+    known = [(other.run, other.beside.longer) for other in others]
+    return commanded(rated(told, known, journey), known, journey)
 
 
 def _may_be_lost(run: Run, journey: Journey, method: Checked, others: tuple[Other, ...]) -> bool:

@@ -14,11 +14,11 @@ from flexctrl.dynamics.journey import Journey
 from flexctrl.dynamics.linear_motion.exact import ExactStepper
 from flexctrl.dynamics.march.stepper import plain_of
 from flexctrl.dynamics.methods.checked import Beside, Checked
+from flexctrl.dynamics.notes.apart import Apart
 from flexctrl.dynamics.notes.beside import agreeing, told_beside
 from flexctrl.dynamics.notes.lengths import usual
 from flexctrl.dynamics.notes.outputs import ways
 from flexctrl.dynamics.notes.percent import percent
-from flexctrl.dynamics.notes.rates import Apart
 from flexctrl.dynamics.others import UNCHECKED, Beginning, made, noted
 from flexctrl.dynamics.run import Run, Status, Tolerance
 from flexctrl.dynamics.scales import farthest, output_yardsticks

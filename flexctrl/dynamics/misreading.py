@@ -15,9 +15,9 @@ from flexctrl.design.wrapping import Wrapper
 from flexctrl.dynamics.checking import news
 from flexctrl.dynamics.methods.checked import Beside
 from flexctrl.dynamics.notes.answers import Manner
+from flexctrl.dynamics.notes.apart import Apart
 from flexctrl.dynamics.notes.beside import agreeing
 from flexctrl.dynamics.notes.outputs import fast, seen, told_from, ways
-from flexctrl.dynamics.notes.rates import Apart
 from flexctrl.dynamics.others import Beginning, made, noted
 from flexctrl.dynamics.run import Run
 from flexctrl.frozen import frozen

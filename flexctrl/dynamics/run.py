@@ -156,6 +156,9 @@ class Report:
         outputs are told of by a finer run under continuous laws that are not linear; empty for others. Places that
         move, and rates that are, no more than absolute tolerances are left out, and tensions that are no more than
         what the last digits of places make.
+    command_errors : mapping of str to float
+        The same of what a law that reads outputs commands, by other runs laid beside; empty where there are none. A
+        command that jumps, as that of a relay, is off by all of the jump while it is late.
     message : str
         Why the run ended early; empty if it did not.
     notes : tuple of str
@@ -182,9 +185,12 @@ class Report:
     output_errors: Mapping[str, float]
     message: str
     notes: tuple[str, ...]
+    command_errors: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "output_errors", {name: float(off) for name, off in self.output_errors.items()})
+        for errors in ("output_errors", "command_errors"):
+            told = {name: float(off) for name, off in getattr(self, errors).items()}
+            object.__setattr__(self, errors, told)
 
     def __str__(self) -> str:
         e = self.energy
@@ -199,18 +205,21 @@ class Report:
             *([f"loops of rigid parts closed to {self.closure_error:.2g}"] if self.closure_error else []),
             *([f"errors of steps add up to {self.drift:.2g} of the motion of {self.drifted}"] if self.drift else []),
             *([f"off by {self.error:.2g} of the motion, by another run"] if self.error != self.drift else []),
-            *([worst_output(self.output_errors)] if self.output_errors else []),
+            *([worst_signal("outputs", self.output_errors)] if self.output_errors else []),
+            *([worst_signal("commands", self.command_errors)] if self.command_errors else []),
             *([self.message] if self.message else []),
             *self.notes,
         ]
         return "\n".join(lines)
 
 
-def worst_output(errors: Mapping[str, float]) -> str:
-    """Return which output is off by the largest share of what it goes through, in words.
+def worst_signal(kind: str, errors: Mapping[str, float]) -> str:
+    """Return which signal is off by the largest share of what it goes through, in words.
 
     Parameters
     ----------
+    kind : str
+        What they are, in the plural.
     errors : mapping of str to float
         As a report has them; one at least.
 
@@ -218,8 +227,8 @@ def worst_output(errors: Mapping[str, float]) -> str:
     -------
     str
     """
-    name = max(errors, key=lambda output: errors[output])
-    return f"of the outputs {name} is off by the largest share of what it goes through, up to {errors[name]:.2g}"
+    name = max(errors, key=lambda signal: errors[signal])
+    return f"of the {kind} {name} is off by the largest share of what it goes through, up to {errors[name]:.2g}"
 
 
 @frozen
@@ -366,4 +375,4 @@ class Run:
             np.savetxt(path, np.column_stack([self.t, self.y, self.u]), delimiter=",", header=header, comments="")
 
 
-__all__ = ["EnergyBalance", "Moment", "Report", "Run", "Status", "Tolerance", "worst_output"]
+__all__ = ["EnergyBalance", "Moment", "Report", "Run", "Status", "Tolerance", "worst_signal"]

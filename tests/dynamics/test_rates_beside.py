@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
-from flexctrl.dynamics.notes.rates import Apart, is_named
+from flexctrl.dynamics.notes.apart import Apart, off_by
+from flexctrl.dynamics.notes.rates import is_named
 
 FINE = fc.Unchecked(fc.GeneralizedAlpha(2e-5))
 
@@ -71,23 +72,19 @@ def test_what_is_far_off_is_noted_and_what_finer_steps_mend_is_not():
 
 @pytest.mark.parametrize("order", [0.0, 1.0, 2.0])
 def test_two_coarser_runs_tell_the_order(order):
-    from flexctrl.dynamics.notes.rates import _off
-
     near, far = (Apart(r, 1.0, np.array([1e-3 * max(r**order - 1.0, 1.0 - 1.0 / r)])) for r in (3.0, 6.0))
     # of an order that is not the method's the mean of what it leaves and all of the gap
     expected = np.sqrt(1e-3 * near.most[0]) if order == 1.0 else 1e-3 if order else near.most[0]
-    assert _off([far, near], np.ones(1), 2.0, steady=False)[0] == pytest.approx(expected, rel=1e-6)
+    assert off_by([far, near], np.ones(1), 2.0, steady=False)[0] == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_single_coarser_run_may_be_right_where_this_one_is_wrong():
-    from flexctrl.dynamics.notes.rates import _off
-
-    assert _off([Apart(3.0, 1.0, np.array([0.3]))], np.array([3.0]), 2.0, steady=False)[0] == pytest.approx(0.3)
-    assert _off([Apart(2.0, 1.0, np.array([0.3]))], np.array([3.0]), 2.0, steady=True)[0] == pytest.approx(0.1)
+    assert off_by([Apart(3.0, 1.0, np.array([0.3]))], np.array([3.0]), 2.0, steady=False)[0] == pytest.approx(0.3)
+    assert off_by([Apart(2.0, 1.0, np.array([0.3]))], np.array([3.0]), 2.0, steady=True)[0] == pytest.approx(0.1)
     finer = Apart(0.5, 1.0, np.array([0.3]))
-    assert _off([finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.4)
+    assert off_by([finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(0.4)
     mean = np.sqrt(0.4 * 0.9)  # as the finer one may be near by chance
-    assert _off([Apart(3.0, 1.0, np.array([0.9])), finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(mean)
+    assert off_by([Apart(3.0, 1.0, np.array([0.9])), finer], np.ones(1), 2.0, steady=False)[0] == pytest.approx(mean)
 
 
 def test_rows_at_other_times_are_laid_beside_what_is_between():
@@ -113,10 +110,8 @@ def test_rows_that_are_no_numbers_tell_nothing():
 
 def test_what_has_lost_its_phase_goes_by_no_power():
     """Of a gap all may be the run's own where it is a third of the output's range, or a farther run's is a fifth."""
-    from flexctrl.dynamics.notes.rates import _off
-
     gap = np.array([0.3])
-    assert _off([Apart(2.0, 1.0, gap)], np.ones(1), 2.0, steady=True)[0] == pytest.approx(0.3)
+    assert off_by([Apart(2.0, 1.0, gap)], np.ones(1), 2.0, steady=True)[0] == pytest.approx(0.3)
     for size, grown, left in ((0.03, 35.0 / 8.0, 0.03 / 8.0), (0.06, 35.0 / 8.0, 0.06), (0.3, 1.5, 0.3)):
         pair = [Apart(3.0, 1.0, np.array([size])), Apart(6.0, 1.0, np.array([size * grown]))]
-        assert _off(pair, np.ones(1), 2.0, steady=False)[0] == pytest.approx(left)
+        assert off_by(pair, np.ones(1), 2.0, steady=False)[0] == pytest.approx(left)

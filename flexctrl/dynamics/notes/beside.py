@@ -13,6 +13,7 @@ from flexctrl.dynamics.notes.answers import Manner
 from flexctrl.dynamics.notes.gap import Gap
 from flexctrl.dynamics.notes.heard import heard
 from flexctrl.dynamics.notes.lengths import as_many, in_words, usual
+from flexctrl.dynamics.notes.orders import MARGIN
 from flexctrl.dynamics.notes.outputs import by_rows
 from flexctrl.dynamics.notes.peaks import unresolved
 from flexctrl.dynamics.notes.percent import percent
@@ -222,9 +223,9 @@ def told_beside(
 
     Where nothing else keeps them short, steps of the coarser run are longer by a factor r and its errors by rᵖ. Samples
     and impacts do keep steps short: a share φ of steps that could be longer makes n/m = 1 − φ (1 − 1/r) of the n steps,
-    and is taken to have made that share of the errors. Of what the runs are apart, 1/(rᵖ − 1) φ is left. Where another
-    one, farther off, has parted and this one has not, it may be near by accident: what is told is the geometric mean of
-    what the two would leave, if that is more.
+    and is taken to have made that share of the errors. Of what the runs are apart, 1/(rᵖ − 1) φ is left, and told with
+    a factor of safety. Where another one, farther off, has parted and this one has not, it may be near by accident:
+    what is told is the geometric mean of what the two would leave, if that is more.
 
     Parameters
     ----------
@@ -256,7 +257,7 @@ def told_beside(
         return run
     fewer, report = coarse.report.steps / max(run.report.steps, 1), run.report
     free = (1.0 - fewer) / (1.0 - 1.0 / longer)
-    left = min(max(free, _LEAST), 1.0) * abs(longer**order - 1.0)
+    left = min(max(free, _LEAST), 1.0) * abs(longer**order - 1.0) / MARGIN
     told, parted = gap.most / left, gap.most > PARTED
     origin = journey.origin
     summed = max(told, origin.error) < report.drift and (free < _LEAST or parted)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["least_order", "orders_seen"]
+__all__ = ["MARGIN", "least_order", "orders_seen"]
+
+MARGIN = 1.25
+"""What a gap leaves is told with a factor of safety, that of Roache (1994) for orders that have been looked at."""
 
 _HALVINGS = 40
 

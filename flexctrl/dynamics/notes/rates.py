@@ -3,44 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
-from functools import reduce
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexctrl.dynamics.notes.apart import Apart, off_by, telling
 from flexctrl.dynamics.notes.beside import agreeing
-from flexctrl.dynamics.notes.gap import interpolated
-from flexctrl.dynamics.notes.orders import least_order, orders_seen
+from flexctrl.dynamics.notes.orders import MARGIN
 from flexctrl.dynamics.notes.outputs import fast, told_from, ways
 from flexctrl.dynamics.notes.percent import percent
-from flexctrl.dynamics.notes.striking import at_events, in_both, struck
 from flexctrl.dynamics.run import Run
 from flexctrl.dynamics.scales import yardsticks
 from flexctrl.dynamics.steps import Fixed
-from flexctrl.frozen import frozen
 from flexctrl.model.model import Model
 from flexctrl.structure.outputs import AngularVelocity, Velocity
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["LOST", "Apart", "are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
+__all__ = ["are_asked", "is_named", "may_be_lost", "rated", "said_of_rates"]
 
-_POINTS, _NEAR = 4, 1e-9
-_STEEP, _MOST, _JUMP, _SHARED = 0.1, 8, 0.01, 0.3
+_POINTS, _JUMP = 4, 0.01
 _NOTED, _BESIDE, _NAMED = 0.1, 2.0, 3
 _ROUND = np.pi
 """How far goes what does not only swing, in radians or sizes of the machine."""
 _LITTLE, _DUST, _FAINT = 1e-3, 1e-6, 1e-2
 """What is told, of its largest value; of what is noted a larger share. What is told is fainter than what is noted."""
-_ALIKE = 0.97
-"""A coarser run in more of the steps is the same run: samples may round steps of any length to one."""
-_LEAST = 0.5
-"""Of a gap to a finer run no more than twice as much is this one's, where samples keep both short."""
-LOST, _SURE = 0.1, 0.25
-"""From which share of an output's range a gap is no longer one of small lags (all of it from twice that), and by how
-much the order seen may be lower."""
 _SAID = "by another run, {name} may be off by {far} of its range at an instant: see whether {finer} agrees"
 _STRUCK = (
     "{name} may jump by {far} of its range at events: rows at their very instants, or as near as these may be "
@@ -51,84 +40,6 @@ _LINEAR = (
     "default"
 )
 _ABOUT = " {name} rings by", " largest {name} is", " peaks of {name} may"
-
-
-@frozen
-class Apart:
-    """How far the outputs of another run are from those of a run.
-
-    Attributes
-    ----------
-    longer : float
-        By how much its steps are longer; below 1 it is a finer one.
-    free : float
-        The share of steps that are.
-    most : numpy.ndarray, shape (outputs,)
-        In rows, in units of the outputs.
-    struck : numpy.ndarray, shape (outputs,)
-        In rows at the very instants of events, where forces may jump, or of the other side of one.
-    """
-
-    longer: float
-    free: float
-    most: np.ndarray
-    struck: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-    @classmethod
-    def of(cls, run: Run, other: Run, longer: float) -> Apart:
-        """Return it of two runs, where both have rows.
-
-        Between its rows the first is somewhere between what it is there and a smooth curve through them. Rows of a run
-        that has failed need be no numbers: they tell nothing.
-        """
-        fewer, near = other.report.steps / max(run.report.steps, 1), _NEAR * run.final.t
-        free, (most, jumped) = (1.0 - fewer) / (1.0 - 1.0 / longer), np.zeros((2, run.y.shape[1]))
-        if len(run.t) >= _POINTS:
-            within = (other.t >= run.t[0] - near) & (other.t <= run.t[-1] + near) & np.isfinite(other.y).all(axis=1)
-            low, high = _between(run, other.t[within], near)
-            y = other.y[within]
-            most = np.maximum(np.maximum(low - y, y - high), 0.0).max(axis=0, initial=0.0)
-            if run.track.stretches and other.track.stretches and len(other.t):
-                jumped = struck(run, other)
-                most = most if run.track.feed.sample_time else np.maximum(most, _where_steep(run, other, near))
-        return cls(longer, min(max(free, _LEAST), 1.0), most, jumped)
-
-    def left(self, order: np.ndarray) -> np.ndarray:
-        """What of a gap is the first run's own, if errors go by powers of the steps."""
-        least = _LEAST if self.longer < 1.0 else 1.0
-        return self.most / np.maximum(self.free * np.abs(self.longer**order - 1.0), least)
-
-
-def _where_steep(run: Run, other: Run, near: float) -> np.ndarray:
-    """How far outputs of another run are from a run's own where these change most from row to row, there and between,
-    and in the rows that are farthest from it.
-
-    What a run does between two rows may be anything, as far as rows tell: all that another one is off by may lie
-    between them. It does not where both have many rows at the same times, as samples make them.
-    """
-    way = np.ptp(run.y, axis=0)
-    steep = (np.abs(np.diff(run.y, axis=0)) / np.where(way > 0.0, way, np.inf)).max(axis=1)
-    most = np.argsort(-steep)[:_MOST]
-    shared = np.abs(other.t[np.clip(np.searchsorted(other.t, run.t - near), 0, len(other.t) - 1)] - run.t) <= near
-    rows = np.unique(np.concatenate([most, most + 1, _where_far(run, other, way)]))
-    rows = rows[~shared[rows] & ~np.isin(rows, at_events(run))] if shared.mean() < _SHARED else rows[:0]
-    between = 0.5 * (run.t[most] + run.t[most + 1])[steep[most] > _STEEP]
-    own = [(run.t[k], run.y[k]) for k in rows if in_both(run, other, run.t[k])]
-    own += [(t, run.track.moment(t)[1]) for t in between if in_both(run, other, t)]
-    apart = (np.abs(other.track.moment(t)[1] - y) for t, y in own)
-    return reduce(np.fmax, apart, np.zeros(run.y.shape[1]))
-
-
-def _where_far(run: Run, other: Run, way: np.ndarray) -> np.ndarray:
-    """The rows in which outputs are farthest from smooth curves through another run's, of those that are so most."""
-    rows = np.flatnonzero((run.t > other.t[0]) & (run.t < other.t[-1]))
-    if len(other.t) < _POINTS:
-        return rows[:0]
-    apart = np.abs(interpolated(other.t, other.y, run.t[rows]) - run.y[rows]) / np.where(way > 0.0, way, np.inf)
-    apart[~np.isfinite(apart)] = 0.0
-    far = np.argsort(-apart, axis=0)[:2]
-    order = np.argsort(-np.take_along_axis(apart, far, axis=0), axis=None)
-    return rows[far.ravel()[order[: 2 * _MOST]]]
 
 
 def are_asked(run: Run, journey: Journey) -> bool:
@@ -191,12 +102,12 @@ def rated(run: Run, others: Sequence[tuple[Run, float]], journey: Journey) -> Ru
     Run
     """
     way = _judged(run, journey, _DUST)
-    apart = _apart(run, others) if way else []
+    apart = [Apart.of(run, other, longer) for other, longer in telling(run, others)] if way else []
     if not apart:
         return run
     steady = isinstance(journey.plan.method.pace, Fixed)
-    off, known = _off(apart, ways(journey, run.y), run.report.order, steady), run.report.output_errors
-    found = {run.outputs[i]: min(float(off[i] / way[i]), 1.0) for i in way}
+    off, known = off_by(apart, ways(journey, run.y), run.report.order, steady), run.report.output_errors
+    found = {run.outputs[i]: min(MARGIN * float(off[i] / way[i]), 1.0) for i in way}
     late = _late(run, journey, way)
     shares = {name: max(share, known.get(name, 0.0), late.get(name, 0.0)) for name, share in found.items()}
     notes = (*run.report.notes, *_jumps(run, way, shares, min(apart, key=lambda a: a.longer).struck))
@@ -244,55 +155,6 @@ def _judged(run: Run, journey: Journey, little: float) -> dict[int, float]:
     way, most = ways(journey, run.y), np.abs(run.y).max(axis=0)
     counts = most > told_from(journey, _FAINT) if little < _LITTLE else way > told_from(journey)
     return {i: float(way[i]) for i in fast(model) if counts[i] and np.inf > way[i] > little * most[i]}
-
-
-def _apart(run: Run, others: Sequence[tuple[Run, float]]) -> list[Apart]:
-    """How far others are from a run: those that ended as late, if any did, in other steps than its own."""
-    ended = [each for each in others if each[0].final.t >= run.final.t * (1.0 - _NEAR)] or others
-    unlike = [each for each in ended if each[1] < 1.0 or each[0].report.steps < _ALIKE * run.report.steps]
-    return [Apart.of(run, other, longer) for other, longer in unlike if len(other.t)]
-
-
-def _off(apart: list[Apart], ways: np.ndarray, order: float, steady: bool) -> np.ndarray:
-    """By how much each output may be off: by a finer run if there is one, else by the nearest coarser one.
-
-    What rings in a coarser run may have lost its phase there: gaps that are a fifth of all that there is go by no power
-    of the steps, if no farther run shows that they do; nor does a farther one whose gap is that large.
-    Where the order seen is less than the method's, part of what is off goes by none, and is in all runs alike: no less
-    is told than the geometric mean of what the order leaves and all of the gap.
-    A finer one may be near by chance, where each impact adds its own: no less is told than the geometric mean of what
-    it tells and what coarser ones do.
-    """
-    near, *farther = sorted(apart, key=lambda a: a.longer)
-    single = not farther or near.longer == farther[-1].longer
-    known = near.longer < 1.0 or (steady and single)
-    least = np.full(near.most.shape, order if known else least_order(near.longer, order))
-    if near.longer < 1.0:
-        own, coarser = near.left(least), [a for a in farther if a.longer > 1.0]
-        return np.maximum(own, np.sqrt(own * _off(coarser, ways, order, steady))) if coarser else own
-    seen = (
-        least if single else orders_seen(near.most, farther[-1].most, (near.longer, farther[-1].longer), (least, order))
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        if not single and (farther[-1].most > 2.0 * LOST * ways)[ways > 0.0].any():
-            seen = least  # nor does one that has lost its phase show any power
-        off = near.left(seen)
-        lost = np.where(ways > 0.0, np.clip(near.most / ways / LOST - 1.0, 0.0, 1.0), 0.0)
-    sure = ~np.full(off.shape, single) & (seen > order - _SURE)
-    mean = np.sqrt(off * near.most) if not known else off
-    return np.where(sure, off, np.maximum(off + lost * (near.most - off), mean))
-
-
-def _between(run: Run, t: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the most that outputs of a run may be at some times."""
-    after = np.clip(np.searchsorted(run.t, t), 1, len(run.t) - 1)
-    curve = interpolated(run.t, run.y, t)
-    low, high = np.minimum(curve, run.y[after]), np.maximum(curve, run.y[after])
-    low, high = np.minimum(low, run.y[after - 1]), np.maximum(high, run.y[after - 1])
-    for row in (after - 1, after):
-        there = np.abs(run.t[row] - t)[:, None] <= near
-        low, high = np.where(there, run.y[row], low), np.where(there, run.y[row], high)
-    return low, high
 
 
 def said_of_rates(run: Run, journey: Journey) -> Run:
