@@ -16,6 +16,7 @@ from flexctrl.dynamics.feed import Supply
 from flexctrl.dynamics.march.marching import Pacing
 from flexctrl.dynamics.march.stepper import MarchingStepper, Memory
 from flexctrl.dynamics.records.books import Sums
+from flexctrl.dynamics.records.frames import Later
 from flexctrl.dynamics.steps import Mark, Point
 from flexctrl.frozen import frozen
 from flexctrl.model.state import State
@@ -135,14 +136,14 @@ class Again(NamedTuple):
 
     Attributes
     ----------
-    states : list of State
+    states : Later
     supplies : list of Supply
         After each step.
     stands : State
         Where the next leg starts: beyond the corner, where the last step ended just before one.
     """
 
-    states: list[State]
+    states: Later
     supplies: list[Supply]
     stands: State
 
@@ -258,6 +259,17 @@ class Span:
 
     ride: Legs
     number: int
+
+    @property
+    def even(self) -> float:
+        """How long each step is [s]; 0 where they are unlike."""
+        pacing = self.ride.legs[self.number].pacing
+        return 0.0 if isinstance(pacing, Pacing) else pacing
+
+    @property
+    def supply(self) -> Supply:
+        """What they set out under."""
+        return self.ride.legs[self.number].supply
 
     @property
     def states(self) -> Sequence[State]:

@@ -283,19 +283,19 @@ class Marcher(Loops):
             self.about_to(pacing.size if isinstance(pacing, Pacing) else pacing)
             self.jump(supply.u)
 
-    def travelled(self, supply: Supply, pacing: float | Pacing, count: int) -> tuple[list[State], list[Supply]]:
+    def travelled(self, supply: Supply, pacing: float | Pacing, count: int) -> tuple[Later, list[Supply]]:
         """Take as many steps; return the states and the inputs after them."""
-        found: list[State] = []
+        found: list[Later] = []
         told: list[Supply] = []
-        while len(found) < count:
-            done = self.travel(pacing, min(self.room, count - len(found)))[1]
+        while len(told) < count:
+            done = self.travel(pacing, min(self.room, count - len(told)))[1]
             if not done:
                 raise next(iter(self.faults()), ControllerError(_OTHERWISE))
-            found += self.states()
+            found.append(self.states())
             told += self.supplies(supply, done)
             if isinstance(pacing, Pacing):
                 pacing = pacing._replace(size=self.march.size)
-        return found, told
+        return Later.joined(found), told
 
     def keep(self, all_states: bool, due: float = math.inf, spacing: float = math.inf) -> None:
         """Keep the states after all steps, or only when they are due."""

@@ -143,5 +143,5 @@ def _commands(run: Run, journey: Journey) -> tuple[np.ndarray, np.ndarray]:
     if (rows >= 0).all() and (middles - run.t[rows] < (0.5 + _LITTLE) * feed.sample_time).all():
         held = run.u[rows]
     else:
-        held = np.array([track.state(t)[1] for t in middles.tolist()]).reshape(-1, run.u.shape[1])
+        held = np.array([track.held(t) for t in middles.tolist()]).reshape(-1, run.u.shape[1])
     return np.rint(middles / feed.sample_time - 0.5).astype(int), held

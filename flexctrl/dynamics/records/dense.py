@@ -12,6 +12,7 @@ import numpy as np
 
 from flexctrl.dynamics.feed import Feed, Supply
 from flexctrl.dynamics.methods.local import Local
+from flexctrl.dynamics.records.frames import times
 from flexctrl.dynamics.records.tensions import Interval, Tensions
 from flexctrl.dynamics.steps import Point, Stepper
 from flexctrl.frozen import frozen
@@ -105,7 +106,16 @@ def curves_of(model: Plant, stepper: Stepper[Any]) -> Callable[[Point, Point], C
 
 
 class Stretched(Protocol):
-    """Steps between two points; ``states`` and ``supplies`` are those after each of them."""
+    """Steps between two points; ``states`` and ``supplies`` are those after each of them.
+
+    ``supply`` is what they set out under, ``even`` how long each is [s], or 0 where they are unlike.
+    """
+
+    @property
+    def even(self) -> float: ...
+
+    @property
+    def supply(self) -> Supply: ...
 
     @property
     def states(self) -> Sequence[State]: ...
@@ -146,6 +156,11 @@ class Stretch:
     states: Sequence[State]
     before: Point
     after: Point
+    even: ClassVar[float] = 0.0
+
+    @property
+    def supply(self) -> Supply:
+        return self.before.supply
 
     @property
     def supplies(self) -> Sequence[Supply]:
@@ -247,19 +262,27 @@ class Track:
 
     def step(self, t: float) -> float:
         """Return how long the step at a time is [s]."""
+        if even := self._part(t).even:
+            return even
         before, after = self._ends(t)
         return float(after.state.t - before.state.t)
 
-    def _ends(self, t: float) -> tuple[Point, Point]:
-        return self._step(self.stretches[max(0, bisect_right(self.starts, t) - 1)].part(t), t)
+    def held(self, t: float) -> np.ndarray:
+        """Return the inputs at a time, where none change within steps."""
+        return self._part(t).supply.u
 
-    def _step(self, s: Stretched, t: float) -> tuple[Point, Point]:
+    def _part(self, t: float) -> Stretched:
+        return self.stretches[max(0, bisect_right(self.starts, t) - 1)].part(t)
+
+    def _ends(self, t: float) -> tuple[Point, Point]:
+        s = self._part(t)
         if len(s.states) == 1:
             return s.before, s.after
-        ends = [s.before.state, *s.states]
-        i = min(max(1, bisect_right([state.t for state in ends], t)), len(ends) - 1)
-        told = [s.before.supply, *s.supplies]
-        return replace(s.before, state=ends[i - 1], supply=told[i - 1]), replace(s.after, state=ends[i], supply=told[i])
+        i = min(bisect_right(times(s.states), t), len(s.states) - 1)
+        after = replace(s.after, state=s.states[i], supply=s.supplies[i])
+        if i == 0:
+            return s.before, after
+        return replace(s.before, state=s.states[i - 1], supply=s.supplies[i - 1]), after
 
 
 class LeftBehind(Track):

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexctrl.model.state import State
 
-__all__ = ["Frames", "Later"]
+__all__ = ["Frames", "Later", "times"]
 
 
 class _Made(Sequence[State]):
@@ -55,8 +55,29 @@ class Later(_Made):
     def __init__(self, table: np.ndarray, make: Callable[[np.ndarray], list[State]]) -> None:
         self.table, self.make = table, make
 
+    @classmethod
+    def joined(cls, parts: Sequence[Later]) -> Later:
+        """Return them as one: the states of one machine whose contacts do the same in all of them."""
+        return parts[0] if len(parts) == 1 else cls(np.concatenate([part.table for part in parts]), parts[0].make)
+
     def __len__(self) -> int:
         return len(self.table)
+
+    @overload
+    def __getitem__(self, at: int) -> State: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> list[State]: ...
+
+    def __getitem__(self, at: int | slice) -> State | list[State]:
+        if isinstance(at, slice) or "_states" in vars(self):
+            return super().__getitem__(at)
+        return self.make(self.table[at][None])[0]  # one of many alone
+
+    @property
+    def times(self) -> np.ndarray:
+        """Of all of them [s]."""
+        return self.table[:, -1]
 
     @property
     def last(self) -> float:
@@ -101,3 +122,8 @@ class Frames(_Made):
     def made(self) -> list[State]:
         """Put the parts together."""
         return [state for part in self.parts for state in part]
+
+
+def times(states: Sequence[State]) -> Sequence[float]:
+    """Return the times of states, which need not be made for that [s]."""
+    return states.times.tolist() if isinstance(states, Later) else [state.t for state in states]
