@@ -157,7 +157,8 @@ def test_runs_beside_do_not_follow_damped_impacts_as_closely(stiffness, damping_
 
 
 def test_fewer_steps_follow_them_where_more_is_allowed():
-    assert finer(1e-7) == pytest.approx(10.0)
-    assert finer(1e-4) == finer(1.01e-4) == 1.0
-    assert finer(2.7e-3) == pytest.approx(1.0 / 3.0)
-    assert finer(1.0) == 0.2
+    assert finer(1e-7, 3.0) == pytest.approx(10.0)
+    assert finer(1e-4, 3.0) == finer(1.01e-4, 3.0) == 1.0
+    assert finer(2.7e-3, 3.0) == pytest.approx(1.0 / 3.0)
+    assert finer(1.0, 3.0) == 0.2
+    assert finer(1e-12, 8.0) == pytest.approx(10.0)

@@ -8,6 +8,7 @@ it is; without damping it comes back late, and all that follows is so much later
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from flexctrl.dynamics.scales import farthest
 from flexctrl.model.plant import Plant
 from flexctrl.model.state import State
 
-__all__ = ["LASTING", "NO_IMPACT", "SMALL", "STEPS", "finer", "followed", "lasts"]
+__all__ = ["LASTING", "NO_IMPACT", "SMALL", "STEPS", "Wanted", "finer", "followed", "lasts"]
 
 SMALL = 1e-4
 STEPS = 12.0
@@ -26,18 +27,35 @@ NO_IMPACT = 0, 0.0
 _USUAL, _FEWEST = 1e-4, 0.2
 
 
-def finer(share: float) -> float:
+class Wanted(NamedTuple):
+    """What is to be seen of an impact.
+
+    Attributes
+    ----------
+    tolerance : Tolerance
+    moved : numpy.ndarray, shape (n,)
+        How far each degree of freedom has been.
+    steepness : float
+        Power of the step with which the method's error grows.
+    """
+
+    tolerance: Tolerance
+    moved: np.ndarray
+    steepness: float
+
+
+def finer(share: float, steepness: float) -> float:
     """Return how many times more steps follow an impact, where errors are to be less than a share of the way.
 
-    Of second order, as steps chosen by errors are: those go with the cube root of the tolerance. Under a far larger
-    tolerance fewer do, or runs that are laid beside others to tell their errors would be off alike.
+    As many as other steps, which are chosen by errors: of second order these go with the cube root of the tolerance.
+    Under a far larger tolerance fewer do, or runs that are laid beside others to tell their errors would be off alike.
     """
-    times = math.pow(_USUAL / share, 1.0 / 3.0)
+    times = math.pow(_USUAL / share, 1.0 / steepness)
     return max(1.0 if share < 2.0 * _USUAL else _FEWEST, times)
 
 
 def lasts(
-    model: Plant, before: State, beyond: State, u: np.ndarray, how: tuple[Tolerance, np.ndarray, float]
+    model: Plant, before: State, beyond: State, u: np.ndarray, wanted: Wanted, turnover: float
 ) -> tuple[int, float]:
     """Return how many steps follow an impact at a corner, and how long: 1/(12 ω); none where nothing hits.
 
@@ -50,8 +68,9 @@ def lasts(
     before, beyond : State
         On both sides of the corner.
     u : numpy.ndarray
-    how : tuple of Tolerance, numpy.ndarray and float
-        What is allowed, how far each degree of freedom has been, the largest energy turned over [J].
+    wanted : Wanted
+    turnover : float
+        The largest energy turned over [J].
 
     Returns
     -------
@@ -59,17 +78,16 @@ def lasts(
     float
         [s]
     """
-    turnover = how[2]
     still, v = np.zeros(model.n), beyond.v
     pushes = [model.slope(state, v, still, (1.0, 0.0, 0.0), u) @ v for state in (beyond, before)]
     momentum = -(model.slope(beyond, v, still, (0.0, 0.0, 1.0), u) @ v)
     stiffness, mass = -float(v @ (pushes[0] - pushes[1])), float(v @ momentum)
     if not (stiffness > 0.0 and mass > 2.0 * SMALL * turnover):
         return NO_IMPACT
-    return followed(model, stiffness / mass, how[:2])
+    return followed(model, stiffness / mass, wanted)
 
 
-def followed(model: Plant, square: float, how: tuple[Tolerance, np.ndarray]) -> tuple[int, float]:
+def followed(model: Plant, square: float, wanted: Wanted) -> tuple[int, float]:
     """Return how many steps follow an impact, and how long.
 
     Parameters
@@ -77,8 +95,7 @@ def followed(model: Plant, square: float, how: tuple[Tolerance, np.ndarray]) -> 
     model : Plant
     square : float
         The ω² that it brings [1/s²].
-    how : tuple of Tolerance and numpy.ndarray
-        What is allowed, how far each degree of freedom has been.
+    wanted : Wanted
 
     Returns
     -------
@@ -86,7 +103,6 @@ def followed(model: Plant, square: float, how: tuple[Tolerance, np.ndarray]) -> 
     float
         [s]
     """
-    tolerance, moved = how
-    far = float(farthest(model, moved).max())
-    times = finer(tolerance.relative + tolerance.absolute / max(far, tolerance.absolute))
+    tolerance, far = wanted.tolerance, float(farthest(model, wanted.moved).max())
+    times = finer(tolerance.relative + tolerance.absolute / max(far, tolerance.absolute), wanted.steepness)
     return int(LASTING * times), math.sqrt(1.0 / square) / (STEPS * times)

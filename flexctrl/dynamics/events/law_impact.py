@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexctrl.dynamics.events.impact import NO_IMPACT, SMALL, STEPS, followed
+from flexctrl.dynamics.events.impact import NO_IMPACT, SMALL, STEPS, Wanted, followed
 from flexctrl.dynamics.scales import yardsticks
-from flexctrl.dynamics.steps import Point
+from flexctrl.dynamics.steps import Controlled, Point
 
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
@@ -58,7 +58,10 @@ def hits(journey: Journey, after: Point, h: float) -> tuple[int, float]:
     soft = _answer(journey, before, v, -1.0)
     if stiff <= _MORE * max(soft, 0.0):
         return NO_IMPACT
-    return followed(journey.plan.model, (stiff - soft) / twice, (journey.plan.tolerance, books.sums.moved))
+    plan = journey.plan
+    assert isinstance(plan.method.pace, Controlled)
+    wanted = Wanted(plan.tolerance, books.sums.moved, plan.method.pace.steepness)
+    return followed(plan.model, (stiff - soft) / twice, wanted)
 
 
 def _answer(journey: Journey, point: Point, v: np.ndarray, side: float) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexctrl.dynamics.events.impact import lasts
+from flexctrl.dynamics.events.impact import Wanted, lasts
 from flexctrl.dynamics.events.landing import Missed
 from flexctrl.dynamics.events.nearing import LEAST, NUDGES
 from flexctrl.dynamics.events.watch import Crossing
@@ -96,8 +96,8 @@ def lengthen(journey: Journey, h: float) -> None:
 
 def _follow(journey: Journey, before: State, after: State, u: np.ndarray) -> None:
     """Follow an impact by short steps, where steps are chosen and would not see it."""
-    if not isinstance(journey.plan.method.pace, Controlled):
+    plan, sums = journey.plan, journey.books.sums
+    if not isinstance(plan.method.pace, Controlled):
         return
-    sums = journey.books.sums
-    how = journey.plan.tolerance, sums.moved, sums.turnover
-    journey.mark.follow, journey.mark.cap = lasts(journey.plan.model, before, after, u, how)
+    wanted = Wanted(plan.tolerance, sums.moved, plan.method.pace.steepness)
+    journey.mark.follow, journey.mark.cap = lasts(plan.model, before, after, u, wanted, sums.turnover)

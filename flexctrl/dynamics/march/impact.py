@@ -56,6 +56,6 @@ def follow_impact(m: March, stiffer: float) -> None:
     m.follow = 0
     m.cap = 0.0
     if stiffer > 0.0 and mass > 2.0 * SMALL * m.turnover:
-        times = finer(m.relative + m.absolute / max(m.reached, m.absolute))
+        times = finer(m.relative + m.absolute / max(m.reached, m.absolute), 3.0)
         m.follow = int(LASTING * times)
         m.cap = math.sqrt(mass / stiffer) / (STEPS * times)
