@@ -11,7 +11,9 @@ import flexctrl as fc
 G, LENGTH = 9.81, 10.0
 
 
-def caught(stiffness: float, mass: float, until: float, method: object = None) -> fc.Run:
+def caught(
+    stiffness: float, mass: float, until: float, method: object = None, tolerance: fc.Tolerance | None = None
+) -> fc.Run:
     """A mass that falls by half a metre into its rope, again and again."""
     rope = fc.Rope("rope", (0, 0, LENGTH), (0, 0, 0.5), EA=stiffness * LENGTH, length=LENGTH)
     load = fc.PointMass("load", rope.end, mass)
@@ -20,7 +22,7 @@ def caught(stiffness: float, mass: float, until: float, method: object = None) -
     model = fc.assemble(
         fc.Structure([rope, load], joints, outputs=outputs), [fc.Gravity(), fc.LargeRotation(), fc.RopeStretch()]
     )
-    return fc.simulate(model, until=until, method=method)
+    return fc.simulate(model, until=until, method=method, tolerance=tolerance or fc.Tolerance())
 
 
 def bounced(t: float, stiffness: float, mass: float) -> float:
@@ -52,6 +54,14 @@ def test_a_load_comes_back_from_a_rope_however_stiff(stiffness, mass):
     exact = [bounced(t, stiffness, mass) for t in run.t]
     assert np.abs(run["z"] - exact).max() < 4e-3
     assert run.report.steps < 400
+
+
+def test_a_method_of_high_order_needs_few_more_steps_for_far_less():
+    """By the eighth root of the tolerance, as all of its steps do."""
+    method = fc.Unchecked(fc.ExplicitRungeKutta())
+    loose, tight = (caught(4e5, 350.0, 2.0, method, fc.Tolerance(r, 1e-3 * r)) for r in (1e-4, 1e-9))
+    assert tight.report.steps < 6 * loose.report.steps
+    assert np.abs(tight["z"] - [bounced(t, 4e5, 350.0) for t in tight.t]).max() < 1e-8
 
 
 def test_fixed_steps_without_damping_keep_the_energy_of_an_impact_they_do_not_resolve():
