@@ -305,17 +305,34 @@ class Balance:
         return holds(self.among_free(K), self.terms(state, K))
 
     def unstable(self, state: State) -> int:
-        """Return in how many directions the free coordinates leave the state by themselves."""
+        """Return in how many directions, at least, the free coordinates leave the state by themselves."""
         K = self.slope(state)
         return negative_pivots(self.among_free(K), self.terms(state, K))
 
     def terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
+        """Return the sizes of what entries of K are sums of, stresses included, of the free coordinates."""
+        return self.entries(state, K) + self.among_free(self._stresses(state))
+
+    def entries(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
         """Return the sizes of what the entries of a stiffness K are sums of, of the free coordinates."""
-        terms = slope_terms(self.model, state, self.u, K) + self._stresses(state)
-        if self._plain:
+        terms = slope_terms(self.model, state, self.u, K)
+        if self._plain or not self.model.large or self.model.motion.plain:  # those of K as it is
             return self.among_free(terms)
         change = abs(self._change(state))
         return self.among_free((change.T @ terms @ change).tocsr())
+
+    def strain(self, state: State, motions: np.ndarray) -> np.ndarray:
+        """Return ΦᵀKΦ of motions Φ of the free coordinates, without the rounding of K's entries; shape (k, k)."""
+        whole = self.basis(state) @ motions
+        found = self.model.strain(state, self.u, whole)
+        if self._plain:
+            return found
+        return found - whole.T @ (self._bearing(state, self.whole_force(state)) @ whole)
+
+    @property
+    def told_by_pieces(self) -> bool:
+        """Whether `strain` has no rounding but that of the places: no levers' either."""
+        return self.model.large and self.model.motion.plain and self._plain
 
     def _stresses(self, state: State) -> sp.csr_matrix:
         """What K has of stresses that are but the last digits of places, as terms that may be rounded."""

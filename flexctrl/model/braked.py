@@ -26,7 +26,6 @@ from flexctrl.model.holding import own_coordinate, raw_place
 from flexctrl.model.linkages.chart import inverse_tangents
 from flexctrl.model.model import Model
 from flexctrl.model.places import Places, places_of, standing
-from flexctrl.model.rounding import slope_terms
 from flexctrl.model.state import State
 from flexctrl.model.units import geared, units
 from flexctrl.structure.freedoms import check_finite
@@ -121,13 +120,6 @@ class Braked(Balance):
         assert isinstance(found, Braked)
         wanted = (1.0 - done) * stands(self.model, self.cells, start) + done * self.wanted
         return self._again(replace(found, wanted=wanted))  # type: ignore[return-value]
-
-    def terms(self, state: State, K: sp.csr_matrix) -> sp.csr_matrix:
-        """Return the sizes of what the entries of a stiffness K are sums of, of the free coordinates."""
-        if not self.model.large or self.model.motion.plain:
-            return self.among_free(slope_terms(self.model, state, self.u, K))
-        change = abs(self._change(state))
-        return self.among_free((change.T @ slope_terms(self.model, state, self.u, K) @ change).tocsr())
 
     def _change(self, state: State) -> sp.csr_matrix:
         """Steps of the coordinates from steps in which what is held stands in for those that give way: B."""

@@ -75,9 +75,9 @@ class Rest:
     def unstable(self) -> int:
         """Independent directions in which the machine would leave the equilibrium by itself.
 
-        Negative pivots of the tangent stiffness of the free coordinates, as long as the loads have a potential: zero
+        Those of negative tangent stiffness of the free coordinates, as long as the loads have a potential: zero
         is statically stable, or free to move without force. Loads without one (`FollowerForce`, `FollowerTorque`,
-        `Torque` about a fixed axis) make the stiffness unsymmetric, and its pivots tell nothing: there the motions
+        `Torque` about a fixed axis) make the stiffness unsymmetric, and its signs tell nothing: there the motions
         that grow are counted by their poles, whether they diverge or flutter. Worked out when asked for.
 
         Raises

@@ -12,6 +12,7 @@ from flexctrl.linear.model import LinearModel
 from flexctrl.linear.pattern import asymmetry, symmetric
 from flexctrl.linear.undamped import ROUND_OFF
 from flexctrl.model.balance import Balance
+from flexctrl.model.downhill import downhill
 from flexctrl.model.eased import told
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
@@ -24,7 +25,7 @@ __all__ = ["leaving", "without_energy"]
 def leaving(balance: Balance, state: State) -> int:
     """Return in how many directions the free coordinates leave an equilibrium by themselves.
 
-    Loads with a potential: the negative pivots of the stiffness. Others make it unsymmetric, and no count of pivots
+    Loads with a potential: those of negative stiffness. Others make it unsymmetric, and no count of pivots
     tells flutter from divergence or either from rest: there the growing motions of M q̈ + C q̇ + K q = 0.
 
     Parameters
@@ -49,7 +50,7 @@ def leaving(balance: Balance, state: State) -> int:
         M, C, K = (balance.seen(state, A).tocsc() for A in (M, C, K))
         if K.shape[0] and asymmetry(K, symmetric(K)[0]) > ROUND_OFF:
             return growing(_unseen(balance, M, C, K))
-    return balance.unstable(state)
+    return downhill(balance, state)
 
 
 def without_energy(model: Model, u: np.ndarray) -> tuple[str, ...]:

@@ -15,6 +15,29 @@ ROUNDING = 4.0 * float(np.finfo(float).eps)
 """Share of the terms of an entry that is its rounding."""
 
 
+def unit_scaled(A: sp.spmatrix, terms: sp.spmatrix | None) -> tuple[sp.dia_matrix, sp.csr_matrix, np.ndarray]:
+    """Return the symmetric part of a matrix with a diagonal of about ones, and how unsure it is.
+
+    Parameters
+    ----------
+    A : scipy.sparse matrix, shape (n, n)
+    terms : scipy.sparse matrix, shape (n, n), or None
+        Sizes of what the entries are sums of; None: their own.
+
+    Returns
+    -------
+    scale, scaled : sparse matrices, shape (n, n)
+        S and S A S.
+    unsure : numpy.ndarray, shape (n,)
+        Sums of the rounding of each row.
+    """
+    sizes = abs(A) if terms is None else terms
+    size = np.sqrt(np.abs(sizes.diagonal()))
+    scale = sp.diags(1.0 / np.where(size > 0.0, size, 1.0))
+    rows = np.asarray((scale @ (0.5 * (sizes + sizes.T)) @ scale).sum(axis=1)).ravel()
+    return scale, sp.csr_matrix(scale @ (0.5 * (A + A.T)) @ scale), ROUNDING * rows
+
+
 def pivots(A: sp.spmatrix, terms: sp.spmatrix | None, side: float) -> np.ndarray:
     """Return the pivots of the symmetric part of a matrix, scaled to a diagonal of about ones.
 
@@ -38,12 +61,9 @@ def pivots(A: sp.spmatrix, terms: sp.spmatrix | None, side: float) -> np.ndarray
 
     if not A.shape[0] or not np.isfinite(A.data).all():
         return np.full(A.shape[0], np.nan)
-    sizes = abs(A) if terms is None else terms
-    size = np.sqrt(np.abs(sizes.diagonal()))
-    scale = sp.diags(1.0 / np.where(size > 0.0, size, 1.0))
-    unsure = sp.diags(np.asarray((scale @ (0.5 * (sizes + sizes.T)) @ scale).sum(axis=1)).ravel())
+    _, even, unsure = unit_scaled(A, terms)
     nothing = 0.1 * ZERO_PIVOT if side > 0.0 else 0.0
-    scaled = scale @ (0.5 * (A + A.T)) @ scale + side * ROUNDING * unsure + nothing * sp.identity(A.shape[0])
+    scaled = even + sp.diags(side * unsure + nothing)
     try:
         lu = splu(
             sp.csc_matrix(scaled), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -71,6 +91,23 @@ def negative_pivots(A: sp.spmatrix, terms: sp.spmatrix | None = None) -> int:
         values = np.linalg.eigvalsh((0.5 * (A + A.T)).toarray())
         return int((values < -1e-12 * np.abs(values).max()).sum())
     return int((found < -ZERO_PIVOT).sum())
+
+
+def perhaps_negative(A: sp.spmatrix, terms: sp.spmatrix | None = None) -> int:
+    """Return in how many independent directions the quadratic form of a matrix may be negative, if only by rounding.
+
+    Parameters
+    ----------
+    A : scipy.sparse matrix, shape (n, n)
+    terms : scipy.sparse matrix, shape (n, n), optional
+        Sizes of what the entries are sums of; default: their own.
+
+    Returns
+    -------
+    int
+        All of them if the matrix cannot be factorised without exchanging rows.
+    """
+    return int(np.count_nonzero(~(pivots(A, terms, -1.0) >= ZERO_PIVOT)))
 
 
 def turned(A: sp.spmatrix) -> int:
