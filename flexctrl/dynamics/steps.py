@@ -150,7 +150,8 @@ def failed_step(error: Exception, worst: int, t: float) -> StepError:
 
 def singular_tangent(error: SingularMatrixError, t: float, h: float) -> StepError:
     """Return the failure of an implicit step to a time whose tangent is singular [s]."""
-    return StepError(error.where, f"the tangent is singular at t = {t:.6g} s with a step of {h:.3g} s")
+    remedy = "look at the loads and commands there, and whether the tolerance is one that numbers can meet"
+    return StepError(error.where, f"the tangent is singular at t = {t:.6g} s with a step of {h:.3g} s; {remedy}")
 
 
 def unsolved(name: str, worst: int, left: float, t: float, h: float) -> StepError:

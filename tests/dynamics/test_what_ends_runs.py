@@ -173,3 +173,13 @@ def test_a_run_without_steps_has_nothing_between_them():
         kept = fc.simulate(swing(), until=1.0, record=fc.InMemory(states=room))
         with pytest.raises(StructureError, match="steps of this run were not kept"):
             kept.at(0.0)
+
+
+def test_a_beam_pressed_beyond_all_bounds_is_told_where_to_look():
+    beam = fc.Beam(
+        "b", (0, 0, 0), (1, 0, 0), fc.Section(EA=1e6, EI_y=10, EI_z=10, GJ=10, rhoA=1, rhoJ=1e-3), elements=8
+    )
+    structure = fc.Structure([beam], [fc.Support(beam.start)], inputs=[fc.Force("press", beam.end, "-x")])
+    model = fc.assemble(structure, [fc.Flexible(), fc.LargeRotation(), fc.Gravity()])
+    run = fc.simulate(model, until=1.0, inputs={"press": 1e9})
+    assert re.search("the tangent is singular at t = .*; look at the loads and commands", run.report.message)
