@@ -27,7 +27,7 @@ from flexctrl.structure.freedoms import check_path, check_seconds, written
 
 __all__ = ["Autosave", "Checkpoint", "check_same", "load_checkpoint", "machine_of"]
 
-_FORMAT = 20
+_FORMAT = 21
 _HOUSE = "flexctrl."
 _UNREADABLE = (KeyError, ValueError, TypeError, AttributeError, ImportError, EOFError, BadZipFile, zlib.error)
 

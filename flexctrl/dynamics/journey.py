@@ -330,7 +330,6 @@ class Journey:
         if not self.balked and ride(self, until, most):
             return
         begun = self.snapshot()
-        self.mark.plain = max(0, self.mark.plain - 1)
         try:
             if isinstance(self.plan.method.pace, Fixed):
                 fixed(self, stop, until)

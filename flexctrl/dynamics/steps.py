@@ -95,7 +95,8 @@ class Mark:
     taken : float
         Of steps of one length, the last [s], or the one that accelerations were made for since; 0 before the first.
     doubts, plain : int
-        How often in a row a law in Python has left no step to compiled loops; plain steps before they try again.
+        How often in a row a law in Python has left no step to compiled loops; how many steps there are to be in all
+        before they try again.
     swings : tuple of float
         By how much a law has changed with time alone within a step, at most, and its states' rates; empty if not asked.
     """

@@ -93,12 +93,13 @@ def warily(ride: Ride, pacing: float | Pacing, count: int) -> tuple[int, int]:
     looked = min(calm, fitting)
     if spoken and (straight := straight_steps(ride, begun, looked)) < looked:
         calm = straight
-    watch.span = next_span(span, calm, calm < done)
     if fitting < calm and j.saved is None:
         j.saved = replace(j.snapshot(), sizes=sizes, span=span)
-    if spoken and (fitting or not done):
-        j.mark.doubts = 0 if calm else min(j.mark.doubts + 1, _SHYEST)
-        j.mark.plain = 2**j.mark.doubts - 1
+    if fitting or not done:  # else it is looked at again by a run that goes on
+        watch.span = next_span(span, calm, calm < done)
+        if spoken:
+            j.mark.doubts = 0 if calm else min(j.mark.doubts + 1, _SHYEST)
+            j.mark.plain = j.mark.steps + 2**j.mark.doubts - 1
     wanted = ride.limited(min(calm, fitting))
     if wanted == done:
         return status, done

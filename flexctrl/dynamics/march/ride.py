@@ -59,7 +59,8 @@ def ride(journey: Journey, until: float, most: int | None = None) -> bool:
 def rides(journey: Journey) -> bool:
     """Tell whether steps that can be marched are."""
     feed = journey.plan.feed
-    if feed.spoken and (journey.point.supply.slid or journey.horizon < math.inf or journey.mark.plain):
+    left_alone = journey.mark.steps < journey.mark.plain
+    if feed.spoken and (journey.point.supply.slid or journey.horizon < math.inf or left_alone):
         return False
     return not (feed.sample_time and weightless(journey.plan.model).size)
 
