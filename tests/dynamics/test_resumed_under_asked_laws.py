@@ -81,6 +81,13 @@ def test_they_go_on_with_the_same_bits(link, law, method):
     check_cuts(cart(link), laws(3.0)[law], METHODS[method], 1.4, cuts)
 
 
+@pytest.mark.parametrize("states", [0, 1])
+def test_how_long_a_part_is_has_no_say_in_which_steps_a_law_goes_straight_on(states):
+    """It was asked at more places in each step of a shorter part, and other steps were left to plain ones."""
+    law = Own(states, lambda t: abs(np.sin((7.0 + 2.0 * states) * t)))
+    check_cuts(cart("spring"), law, METHODS["fixed"], 2.4, np.array([0.72, 1.008]))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(12))
 def test_they_go_on_with_the_same_bits_from_anywhere(seed):

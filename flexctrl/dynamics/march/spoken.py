@@ -11,7 +11,7 @@ import ctypes
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -32,8 +32,8 @@ _BENT, _ROUND_OFF = 0.02, 1e-9
 """What it may leave the line by, of what it changes by within a step or the one before."""
 _MORE, _SEEN = 4.0, 1e-3
 """So many times as much as before it changes where something is hit; of its largest change, what counts."""
-_FEWEST = 4
-"""Places within a step at which it is asked."""
+_FEWEST, _CLEARLY = 4, 2.0
+"""Places within a step at which it is asked; how much further it must be off where it is asked at more."""
 _TIME = PiecewisePolynomial((0.0,), ((0.0, 1.0),))
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -128,7 +128,34 @@ def _allowed(u: np.ndarray, swings: tuple[float, ...]) -> np.ndarray:
     hit = (changes > _MORE * before) & (changes > most)
     hit[:1] = False
     size = np.maximum(np.maximum(changes, first), most)
-    return np.asarray(np.where(hit, -math.inf, _BENT * size + _ROUND_OFF * np.abs(u).max(axis=0)))
+    round_off = _ROUND_OFF * np.maximum.accumulate(np.abs(u), axis=0)[1:]  # of no steps to come: a run may end there
+    return np.asarray(np.where(hit, -math.inf, _BENT * size + round_off))
+
+
+class _Course(NamedTuple):
+    """Ends of steps under a law: time, what it reads, its state, its answers; by how much these may leave the line."""
+
+    t: np.ndarray
+    read: np.ndarray
+    state: np.ndarray
+    line: np.ndarray
+    allowed: np.ndarray
+
+    def straight(self, feed: Feed, counts: np.ndarray, clearly: float = 1.0) -> int:
+        """Over how many steps it goes straight on, asked at so many places in each."""
+        k = np.repeat(np.arange(len(counts)), counts)
+        i = np.arange(k.size) - np.repeat(np.cumsum(counts) - counts, counts)
+        shares = without_rhythm(i, counts[k])[:, None]
+        at, read, state, line = (a[k] + shares * np.diff(a, axis=0)[k] for a in (self.t[:, None], *self[1:4]))
+        said: list[list[float]] = []
+        with suppress(ControllerError):
+            for each in zip(at.ravel().tolist(), read, state, strict=True):
+                told, rate = feed.answer(*each)
+                said.append([*told, *rate])
+        heard = len(said)
+        off = np.abs(np.array(said).reshape(heard, line.shape[1]) - line[:heard])
+        bent = np.append(np.flatnonzero((off > clearly * self.allowed[k[:heard]]).any(axis=1)), heard)[0]
+        return int(k[bent]) if bent < k.size else len(counts)
 
 
 def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
@@ -152,18 +179,8 @@ def straight_steps(ride: Ride, begun: Begun, done: int) -> int:
     y = np.vstack([feed.measured(begun.point.state), marcher.rows[:done, 1:][:, feed.reads]])
     supplies = [ride.supply, *marcher.supplies(ride.supply, done)]
     u, x = np.array([[*s.u, *s.rate] for s in supplies]), np.array([s.x for s in supplies])
-    allowed = _allowed(u, swings)
-    counts = np.maximum(_FEWEST, np.ceil(OF_RUN * np.diff(t) / until).astype(int))
-    k = np.repeat(np.arange(done), counts)
-    i = np.arange(k.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    shares = without_rhythm(i, counts[k])[:, None]
-    at, read, state, line = (a[k] + shares * np.diff(a, axis=0)[k] for a in (t[:, None], y, x, u))
-    said: list[list[float]] = []
-    with suppress(ControllerError):
-        for each in zip(at.ravel().tolist(), read, state, strict=True):
-            told, rate = feed.answer(*each)
-            said.append([*told, *rate])
-    heard = len(said)
-    off = np.abs(np.array(said).reshape(heard, line.shape[1]) - line[:heard]) > allowed[k[:heard]]
-    bent = np.append(np.flatnonzero(off.any(axis=1)), heard)[0]
-    return int(k[bent]) if bent < k.size else done
+    course = _Course(t, y, x, u, _allowed(u, swings))
+    straight = course.straight(feed, np.full(done, _FEWEST))
+    closely = np.ceil(OF_RUN * np.diff(t[: straight + 1]) / until).astype(int)
+    # how long the run is has no say but where more places show a pulse that few have passed over
+    return course.straight(feed, np.where(closely > _FEWEST, closely, 0), _CLEARLY)
