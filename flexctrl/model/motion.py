@@ -26,9 +26,9 @@ DENSE_UP_TO = 60
 """Degrees of freedom up to which matrices are worked as plain arrays."""
 
 _DEAD = 200.0
-_FULL = 0.1
-_UNEXPLAINED = 5.0
 _BRANCHES = 1e-9
+_OPEN = 1e-9
+_UNSURE = 1e-3
 
 APART = 1e-5
 """How far what is only watched may be open: round-off is far less; a girder across two rails skews by 4 mrad."""
@@ -239,36 +239,43 @@ class Motion(Coordinates):
         spread[:, self.linked_cells] = slopes @ self._dense_lead
         return tuple(spread)
 
-    def dead_point(self, state: State) -> bool:
-        """Tell whether a loop of rigid parts is near a position from which its coordinates cannot move it.
+    def dead_point(self, before: State, after: State) -> bool:
+        """Tell whether a step has come to a position from which its coordinates cannot move a loop of rigid parts.
 
         Near it small steps of the coordinates move other parts far. Where a loop may branch but moves on evenly
         (a parallelogram all in line) it is dead only in the very position.
         """
-        if not self.linkage.loops:
-            return False
-        onto, within = self.linkage.slopes_at(self._pose(state.x, state.R))
-        if reciprocal_condition(within) < _BRANCHES:
+        return bool(self.linkage.loops) and (self._stuck(after) or self._sent_back(before, after))
+
+    def _stuck(self, state: State) -> bool:
+        pose = self._pose(state.x, state.R)
+        onto, within = self.linkage.slopes_at(pose)
+        if reciprocal_condition(within) < _BRANCHES or not np.abs(self.linkage.gaps(pose)).max() <= _OPEN:
             return True
         moved, reach = np.abs(np.linalg.solve(within, onto)).max(axis=0), np.abs(onto).max(axis=0)
         return bool((moved > _DEAD * reach).any())
 
-    def turned_back(self, before: State, pull: np.ndarray, after: State, pulled: np.ndarray) -> bool:
-        """Tell whether parts of a loop have turned back over a step though nothing pulled them so.
+    def _sent_back(self, before: State, after: State) -> bool:
+        """Tell whether a loop is in another branch after a step than either end of it foretells.
 
-        At a dead point the own freedoms turn back while the loop moves on into its other branch. A step across it that
-        stays in the branch sends what moves fastest back the way it came: its rate changes sign at full size, which
-        its accelerations ``pull`` and ``pulled`` at both ends do not explain.
+        At a dead point the own freedoms turn back while the loop moves on into its other branch: the slopes of its
+        openings with the dependent freedoms become singular there, at a rate that both ends tell. A step across it
+        that stays in the branch sends back what moves fastest, which the own freedoms do not see.
         """
-        if not self.linkage.loops:
+        h = after.t - before.t
+        (first, change), (last, changed) = (self._turning(s) for s in (before, after))
+        passed, ahead, behind = np.linalg.solve(first, last), h * change, -h * changed
+        one = np.eye(len(first))
+        if max(np.abs(far).sum(axis=1).max() for far in (passed - one, ahead, behind)) < 1.0:
             return False
-        h, span = after.t - before.t, slice(0, self.source_base)
-        first, last = (self.rates(s, s.v)[span] for s in (before, after))
-        change, most = np.abs(last - first), np.maximum(np.abs(first), np.abs(last))
-        gains = (self.accelerations(s, s.v, a)[span] for s, a in ((before, pull), (after, pulled)))
-        explained = _UNEXPLAINED * h * np.maximum(*(np.abs(gain) for gain in gains))
-        back = (first * last < 0.0) & (most > _FULL * most.max(initial=0.0))
-        return bool((back & (change > most) & (change > explained)).any())
+        counts = [_reversals(seen) for seen in (passed, one + ahead, one + behind)]
+        return max(sure for sure, _ in counts) > min(most for _, most in counts)
+
+    def _turning(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """How fast loops open with their dependent freedoms, W, and W⁻¹Ẇ."""
+        pose, raw = self._pose(state.x, state.R), self.rates(state, state.v)
+        W, change = self.linkage.turning_at(pose, raw[: self.source_base].reshape(-1, 6)[self.nodes])
+        return W, np.linalg.solve(W, change)
 
     def closure_error(self, state: State) -> float:
         """Return how far conditions on rigid parts are open, watched ones too [rad, or shares of what they span]."""
@@ -296,6 +303,12 @@ class Motion(Coordinates):
             return 0.0, 0
         gaps = np.abs(self.linkage.play(self._pose(state.x, state.R)))
         return float(gaps.max()), int(gaps.argmax())
+
+
+def _reversals(A: np.ndarray) -> tuple[int, int]:
+    """Return how many ways a change of slopes turns round for sure, and at most: eigenvalues that have passed zero."""
+    left = np.linalg.eigvals(A).real
+    return int(np.count_nonzero(left < -_UNSURE)), int(np.count_nonzero(left < _UNSURE))
 
 
 def _select(numbers: np.ndarray, n: int) -> sp.csr_matrix:

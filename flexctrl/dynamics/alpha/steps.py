@@ -235,8 +235,7 @@ class Stepper:
         c, (worst, used, correction) = self.coefficients, last
         self.counts.worst = worst
         state = self.model.advance(point.state, step, v, later(point.state.t, h))
-        motion = self.model.motion
-        if motion.dead_point(state) or motion.turned_back(point.state, point.rate, state, rate):
+        if self.model.motion.dead_point(point.state, state):
             raise StepError(
                 worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part of it bend"
             )

@@ -85,11 +85,7 @@ class _Flat:
         """Return the identity."""
         return sp.identity(self.n, format="csr")
 
-    def dead_point(self, state: State) -> bool:
-        """There are no loops."""
-        return False
-
-    def turned_back(self, before: State, pull: np.ndarray, after: State, pulled: np.ndarray) -> bool:
+    def dead_point(self, before: State, after: State) -> bool:
         """There are no loops."""
         return False
 

@@ -1,7 +1,7 @@
 """Loops of rigid parts in compiled loops: steps at which one may be about to lock or to branch are left to plain ones.
 
 The steps themselves close the loops: that is in the kernels of the linkage. What is looked at after each is whether
-they did, and the tests of `Motion.dead_point` and `Motion.turned_back` in a stricter form.
+they did, and the tests of `Motion.dead_point` in a stricter form.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexctrl.kernels.kernel import Kernel
-from flexctrl.kernels.native import Reals, Runs, Wholes, seldom
+from flexctrl.kernels.native import Reals, Runs, seldom
 from flexctrl.model.flat.flat import clear, drive
 from flexctrl.model.flat.flattened import Flattened
 from flexctrl.model.flat.workspace import Flat
@@ -23,8 +23,7 @@ __all__ = ["Closing", "closing_of", "in_doubt", "settled"]
 _OPEN = 1e-12
 _LEVER = 100.0
 _PIVOT = 1e-3
-_FULL = 0.05
-_UNEXPLAINED = 2.0
+_ENDLESS = 1e300
 
 
 @dataclass
@@ -33,21 +32,22 @@ class Closing:
 
     Attributes
     ----------
-    looks, loops, spare, free, rates : int
+    looks, loops, spare, free : int
         All conditions; those that close loops; those only watched; freedoms of the linkage that do not follow from
-        others; raw rates.
+        others.
     look : Runs
-        The kernel of the gaps of the loops, and how fast they open with the freedoms, by columns.
+        The kernel of the gaps of the loops, how fast they open with the freedoms, and how that changes with those
+        that follow, by columns.
     found, work : Reals
         What it finds; room for the elimination.
     watch : Runs
         The kernel of the gaps of what is only watched.
     gaps : Reals
         What it finds.
-    cells : Wholes
-        The raw rates in the workspace.
-    speeds : Reals
-        Their values at the start of the step.
+    before : Reals
+        How fast the loops opened with the freedoms that follow, at the start of the step, by columns.
+    turning : float
+        How fast that changed there, in itself [1/s].
     most, play : float
         How far a loop may be open, and what is only watched [rad, or shares of what it spans].
     open : float
@@ -60,17 +60,16 @@ class Closing:
     loops: int
     spare: int
     free: int
-    rates: int
     look: Runs
     found: Reals
     work: Reals
     watch: Runs
     gaps: Reals
-    cells: Wholes
-    speeds: Reals
+    before: Reals
     most: float
     play: float
     open: float = 0.0
+    turning: float = 0.0
 
 
 def closing_of(F: Flattened) -> Closing:
@@ -79,48 +78,61 @@ def closing_of(F: Flattened) -> Closing:
     loops = len(base.loops) if F.model.large and not base.idle else 0
     spare, free = len(base.spare) if F.model.large else 0, base.free if loops else 0
     nodes = NODE_SLOT * motion.nodes[:, None]
-    pose = (nodes + np.arange(12)).ravel()[None]
-    cells = (nodes + 12 + np.arange(6)).ravel() if loops else np.zeros(0, dtype=int)
-    found, gaps = np.zeros(loops * (1 + free + loops)), np.zeros(spare)
+    pose, moving = (nodes + np.arange(12)).ravel()[None], (nodes + 12 + np.arange(6)).ravel()[None]
+    found, gaps = np.zeros(loops * (1 + free + 2 * loops)), np.zeros(spare)
 
-    def bound(kernel: Kernel, size: int) -> Runs:
-        return (F.model.backend.bind(kernel, pose, np.zeros((1, 0)), np.arange(size)[None]),)
+    def bound(kernel: Kernel, gather: np.ndarray, size: int) -> Runs:
+        return (F.model.backend.bind(kernel, gather, np.zeros((1, 0)), np.arange(size)[None]),)
 
-    look = bound(base.gauge, found.size) if loops else ()
-    watch = bound(base.playing, spare) if spare else ()
-    work, speeds = np.zeros(loops * (free + loops)), np.zeros(cells.size)
-    return Closing(
-        loops + spare, loops, spare, free, cells.size, look, found, work, watch, gaps, cells, speeds, _OPEN, APART
-    )
+    look = bound(base.gauge, np.hstack([pose, moving]), found.size) if loops else ()
+    watch = bound(base.playing, pose, spare) if spare else ()
+    work, before = np.zeros(loops * (free + 3 * loops)), np.zeros(loops * loops)
+    return Closing(loops + spare, loops, spare, free, look, found, work, watch, gaps, before, _OPEN, APART)
 
 
 @seldom
 def settled(c: Closing, f: Flat) -> None:
-    """Take up the rates of a state that has been entered."""
+    """Take up a state that has been entered."""
+    looked(c, f)
+    taken_up(c)
+    c.turning = _ENDLESS if locking(c) else farthest_off(c, c.free + c.loops, 0.0)
+
+
+@seldom
+def looked(c: Closing, f: Flat) -> None:
+    """Look at the loops."""
     drive(f)
-    for i in range(c.rates):
-        c.speeds[i] = f.z[c.cells[i]]
+    clear(c.loops * (1 + c.free + 2 * c.loops), c.found)
+    c.look[0](f.z, c.found)
+
+
+@seldom
+def taken_up(c: Closing) -> None:
+    """Keep how fast the loops open with the freedoms that follow."""
+    start = c.loops * (1 + c.free)
+    for i in range(c.loops * c.loops):
+        c.before[i] = c.found[start + i]
 
 
 @seldom
 def in_doubt(c: Closing, f: Flat, h: float) -> bool:
-    """Tell whether a loop may be at a dead point after the step under way, or something is open; take up its rates."""
+    """Tell whether a loop may be at a dead point after the step under way, or something is open; take it up."""
     if c.spare > 0 and comes_apart(c, f):
         return True
     if c.loops == 0:
         return False
-    clear(c.loops * (1 + c.free + c.loops), c.found)
-    c.look[0](f.z, c.found)
+    looked(c, f)
     for i in range(c.loops):
         if not abs(c.found[i]) <= c.most:
             return True
         c.open = max(c.open, abs(c.found[i]))
     if locking(c):
         return True
-    drive(f)
-    doubt = sent_back(c, f, h)
-    for i in range(c.rates):
-        c.speeds[i] = f.z[c.cells[i]]
+    came = farthest_off(c, c.free + 2 * c.loops, 1.0)
+    turning = farthest_off(c, c.free + c.loops, 0.0)
+    doubt = not max(came, h * max(turning, c.turning)) < 1.0
+    c.turning = turning
+    taken_up(c)
     return doubt
 
 
@@ -140,8 +152,8 @@ def comes_apart(c: Closing, f: Flat) -> bool:
 def locking(c: Closing) -> bool:
     """Tell whether dependent freedoms move far with the others: work that out, by elimination."""
     n = c.loops
-    width = c.free + n
-    for j in range(width):
+    width = c.free + 3 * n
+    for j in range(c.free + n):
         most = 0.0
         for i in range(n):
             most = max(most, abs(c.found[n + n * j + i]))
@@ -150,6 +162,9 @@ def locking(c: Closing) -> bool:
         scale = 1.0 / most if j >= c.free else 1.0
         for i in range(n):
             c.work[width * i + j] = scale * c.found[n + n * j + i]
+            if j >= c.free:
+                c.work[width * i + j + n] = scale * c.found[n + n * (j + n) + i]
+                c.work[width * i + j + 2 * n] = scale * c.before[n * (j - c.free) + i]
     for k in range(n):
         if not eliminated(c, k):
             return True
@@ -160,7 +175,7 @@ def locking(c: Closing) -> bool:
 def eliminated(c: Closing, k: int) -> bool:
     """Eliminate the dependent freedom k from the rows after it; tell whether its pivot is no small one."""
     n = c.loops
-    width = c.free + n
+    width = c.free + 3 * n
     best = k
     for i in range(k + 1, n):
         if abs(c.work[width * i + c.free + k]) > abs(c.work[width * best + c.free + k]):
@@ -172,8 +187,8 @@ def eliminated(c: Closing, k: int) -> bool:
         c.work[width * k + j] = c.work[width * best + j]
         c.work[width * best + j] = kept
     for i in range(n):
-        if i != k:
-            share = c.work[width * i + c.free + k] / c.work[width * k + c.free + k]
+        share = c.work[width * i + c.free + k] / c.work[width * k + c.free + k]
+        if i != k and share != 0.0:
             for j in range(width):
                 c.work[width * i + j] -= share * c.work[width * k + j]
     return True
@@ -183,7 +198,7 @@ def eliminated(c: Closing, k: int) -> bool:
 def far(c: Closing) -> bool:
     """Tell whether some freedom moves the dependent ones much further than the loop by itself."""
     n = c.loops
-    width = c.free + n
+    width = c.free + 3 * n
     for j in range(c.free):
         own = 0.0
         moved = 0.0
@@ -196,15 +211,15 @@ def far(c: Closing) -> bool:
 
 
 @seldom
-def sent_back(c: Closing, f: Flat, h: float) -> bool:
-    """Tell whether parts that move at full speed have turned back over the step, more than they were pulled."""
-    fastest = 0.0
-    for i in range(c.rates):
-        fastest = max(fastest, max(abs(c.speeds[i]), abs(f.z[c.cells[i]])))
-    for i in range(c.rates):
-        first = c.speeds[i]
-        last = f.z[c.cells[i]]
-        fast = max(abs(first), abs(last)) > _FULL * fastest
-        if first * last < 0.0 and fast and abs(last - first) > _UNEXPLAINED * h * abs(f.z[c.cells[i] + 6]):
-            return True
-    return False
+def farthest_off(c: Closing, start: int, own: float) -> float:
+    """Return how far some slopes are from so many times those of the loops, in the measure of these."""
+    n = c.loops
+    width = c.free + 3 * n
+    most = 0.0
+    for i in range(n):
+        size = 0.0
+        for j in range(n):
+            found = c.work[width * i + start + j] / c.work[width * i + c.free + i]
+            size += abs(found - own) if i == j else abs(found)
+        most = max(most, size)
+    return most

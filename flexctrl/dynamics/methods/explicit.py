@@ -204,7 +204,7 @@ class _Stepper:
     def _end(self, point: _Point, end: np.ndarray, K: np.ndarray, t: float) -> _Point:
         xi, v, x = self._split(end)
         state = self.model.switches.at_rest(self.local.place(point.state, xi, v, t))
-        if self.model.motion.dead_point(state):
+        if self.model.motion.dead_point(point.state, state):
             raise StepError(0, f"a loop of rigid parts is at a dead point at t = {t:.6g} s; let a part of it bend")
         supply = self.feed.within(state, x) if self.feed.continuous else point.supply
         rate = self._split(K[-1])[1]

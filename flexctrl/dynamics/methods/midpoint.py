@@ -293,7 +293,7 @@ class _Stepper:
         now, mean = point.state, step / h
         state = self.model.advance(now, step, 2.0 * mean - now.v, later(now.t, h))
         motors = self.motors.between(now, state, h)
-        if self.model.motion.dead_point(state):
+        if self.model.motion.dead_point(now, state):
             raise StepError(
                 self.counts.worst, f"a loop of rigid parts is at a dead point at t = {state.t:.6g} s; let a part bend"
             )

@@ -191,11 +191,27 @@ class Linkage(OpenLinkage):
 
     @cached_property
     def gauge(self) -> Kernel:
-        """`gaps` and `grip` as a kernel of one item."""
+        """`gaps`, `grip` and `turning` as a kernel of one item: (pose, raw rates of the nodes) → all three."""
         import casadi as ca
 
+        d = ca.SX.sym("d", 6, self.count)
         slopes = ca.vec(ca.densify(ca.horzcat(*self._loop_slopes(self._pose))))
-        return _kernel("loops", [self._pose], ca.vertcat(self._gaps(self._pose, self.loops), slopes))
+        found = ca.vertcat(self._gaps(self._pose, self.loops), slopes, self._turning(d))
+        return _kernel("loops", [self._pose, d], found)
+
+    @cached_property
+    def turning(self) -> Callable[..., np.ndarray]:
+        """(pose, raw rates of the nodes) → how the dependent freedoms' share of `grip` changes, by columns."""
+        import casadi as ca
+
+        d = ca.SX.sym("d", 6, self.count)
+        return _callable("turning", [self._pose, d], self._turning(d))
+
+    def _turning(self, d: ca.SX) -> ca.SX:
+        import casadi as ca
+
+        within = ca.vec(ca.densify(self._loop_slopes(self._pose)[1]))
+        return ca.densify(ca.jtimes(within, ca.vec(self._pose), self._moved(d) - ca.vec(self._pose)))
 
     def _moved(self, d: ca.SX) -> ca.SX:
         """Return the pose after a small raw motion of the nodes, shape (6, count), to first order."""
@@ -227,6 +243,12 @@ class Linkage(OpenLinkage):
         slopes = self.grip(pose).reshape(-1, len(self.loops)).T
         within = slopes[:, self.free :]
         return slopes[:, : self.free], within / np.abs(within).max(axis=0)
+
+    def turning_at(self, pose: np.ndarray, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return how fast loops open with the dependent freedoms, and how that changes as nodes move."""
+        own = len(self.loops)
+        within = self.grip(pose)[self.free * own :]
+        return within.reshape(own, own).T, self.turning(pose, motion).reshape(own, own).T
 
     def matrix_at(self, pose: np.ndarray) -> np.ndarray:
         """Return T at a pose."""
