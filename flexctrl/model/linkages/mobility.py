@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from flexctrl.effects.effect import Inner
 from flexctrl.errors import StructureError
@@ -15,8 +14,9 @@ from flexctrl.mechanics.rotation import cross
 from flexctrl.model.linkages.levers import long_or_short
 from flexctrl.model.linkages.linkage import Linkage
 from flexctrl.model.linkages.open_linkage import Link, Loop, renumbered, span_of
+from flexctrl.model.linkages.rounds import going_round
 from flexctrl.model.linkages.twists import Twists
-from flexctrl.model.motion import Motion
+from flexctrl.model.motion import DENSE_UP_TO, Motion
 from flexctrl.model.state import Dry, State
 from flexctrl.model.units import TURNS
 from flexctrl.structure.freedoms import FREEDOMS, IDENTIFIERS, TRAVEL, Vector
@@ -226,6 +226,10 @@ def _loops(structure: Structure, motion: Motion, ties: Ties) -> _Loops:
     kept = np.abs(rows).max(axis=1, initial=0.0) + np.abs(turned).max(axis=1, initial=0.0) > 0.0
     chosen = _independent(rows.T, _INDEPENDENT)
     dependent = _independent(rows[chosen] * _lasting(ties, motion.n), _INDEPENDENT)
+    if dependent and not motion.linkage.tracks:
+        independent = tuple(ties.closures[i] for i in chosen)
+        felt = (np.abs(rows) + np.abs(turned) > 0.0)[chosen]
+        dependent = going_round(motion, lambda s: _openings(motion, s, independent) * unit, unit, felt, dependent)
     spare = [i for i in range(len(rows)) if kept[i] and i not in chosen]
     opens = _opens(motion, ties.closures, rows, chosen)
     labels = [_label(structure, c) for c in ties.closures]
@@ -272,13 +276,21 @@ def _opens(motion: Motion, closures: tuple[Closure | Fit, ...], rows: np.ndarray
 
 def _openings(motion: Motion, state: State, closures: tuple[Closure | Fit, ...]) -> np.ndarray:
     """Return how fast each loop opens with each degree of freedom, in radians or shares of the machine."""
-    T, span = motion.jacobian(state), span_of(motion.rest.x)
+    rates, span = _rates(motion, state, closures), span_of(motion.rest.x)
     turns = [c.freedom >= 3 if isinstance(c, Closure) else c.axis is not None for c in closures]
-    return np.array([_opening(T, state, c) for c in closures]) / np.where(turns, 1.0, span)[:, None]
+    return np.array([_opening(rates, state, c) for c in closures]) / np.where(turns, 1.0, span)[:, None]
 
 
-def _opening(T: sp.csr_matrix, state: State, c: Closure | Fit) -> np.ndarray:
-    node, other = (T[6 * n : 6 * n + 6].toarray() if n >= 0 else np.zeros((6, T.shape[1])) for n in _sides(c))
+def _rates(motion: Motion, state: State, closures: tuple[Closure | Fit, ...]) -> dict[int, np.ndarray]:
+    """Return how fast the nodes of conditions move with each degree of freedom, shape (6, n); the ground does not."""
+    nodes = sorted({n for c in closures for n in _sides(c) if n >= 0})
+    rows = (6 * np.array(nodes, dtype=int)[:, None] + np.arange(6)).ravel()
+    T = motion.dense_jacobian(state)[rows] if motion.n <= DENSE_UP_TO else motion.jacobian(state)[rows].toarray()
+    return {-1: np.zeros((6, motion.n)), **dict(zip(nodes, T.reshape(len(nodes), 6, motion.n), strict=True))}
+
+
+def _opening(rates: dict[int, np.ndarray], state: State, c: Closure | Fit) -> np.ndarray:
+    node, other = (rates[n] for n in _sides(c))
     if isinstance(c, Closure):
         return node[c.freedom] - other[c.freedom]
     across = state.R[c.master] @ c.across
