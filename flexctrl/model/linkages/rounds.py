@@ -14,6 +14,8 @@ from flexctrl.model.linkages.open_linkage import span_of
 from flexctrl.model.motion import Motion
 from flexctrl.model.state import State
 
+__all__ = ["going_round"]
+
 _STEP, _LONGEST = 0.25, 40.0
 _STILL = 0.01
 """Share of the fastest freedom's rate below which a freedom is no good coordinate."""
