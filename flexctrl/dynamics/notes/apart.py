@@ -55,7 +55,8 @@ class Apart:
         Between its rows the first is somewhere between what it is there and a smooth curve through them. Rows of a run
         that has failed need be no numbers: they tell nothing.
         """
-        near, most = NEAR * run.final.t, _outside((run.t, run.y), (other.t, other.y), NEAR * run.final.t)
+        near = NEAR * run.final.t
+        most = _outside((run.t, run.y), (other.t, other.y), near)
         jumped = np.zeros_like(most)
         if len(run.t) >= _POINTS and run.track.stretches and other.track.stretches and len(other.t):
             jumped = struck(run, other)
