@@ -25,14 +25,15 @@ benchmarks/effects
 ```
 
 In every comparison both codes take turns in one run, on one thread; the least CPU time of several tries counts. Ratios
-are told; where there are seconds, they are those of a host with other work to do. Sections may be of runs of their own.
+are told; where there are seconds, they are those of a host with other work to do. All sections are of one run.
 
 Exudyn has its fastest settings: `sys.exudynFast`, generalised alpha with spectral radius 0.9, `EigenSparse`,
 modified Newton with rtol 1e-5 and atol 1e-7, no files, internal sensors; its `ANCFCable` is its quickest element here
 (no torsion; its beams with torsion take several times as long). Building the model is left out
 for both, everything that `simulate` and `SolveDynamic` do is in, but for the coarser runs that tell how far ours are
 off (`Unchecked`). These are made where much moves far, as in the full swing after a second, and take half the time of a
-run, or 1.2 times where there is something to be told.
+run, or 1.2 times where there is something to be told; several times as long where a law in Python samples a machine
+that rings, with forces among its outputs.
 """
 _CRANE = """\
 ## The paper's crane, 50 ms

@@ -268,7 +268,7 @@ def test_an_hour_of_closed_loop_stays_within_300_megabytes(kind, tmp_path, monke
     What it takes once, as allocators do, is no growth: that goes on.
     """
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    status, *numbers, peak = printed("closed_loop", tmp_path, kind, 100.0)
+    status, *numbers, peak = printed("closed_loop", tmp_path, kind, 300.0)
     assert status == "FINISHED"
     times, taken = np.array(numbers, dtype=float).reshape(3, 2).T
     growth = min(np.diff(taken) / np.diff(times))
