@@ -3,7 +3,9 @@
 A shaft adds k R² to the stiffness of what it drives. At 1e18 N m/rad the last digit of a double is 128 N m/rad, and of
 what bends beside it K and the forces hold nothing. Where it bears a torque T, the machine is in the same place behind a
 shaft k' whose motor is turned on by T/k' − T/k: what is driven cannot tell one from the other. With k' R² at 2²³ times
-the least stiffness that it drives, digits are left to both, and the torque is told by a twist that is seen.
+the least stiffness that it drives, digits are left to both, and the torque is told by a twist that is seen. What has
+next to no stiffness, as a lift on an upright rail, counts as held by a share of the forces at work: these move it by
+about 2⁻¹⁷ of the machine's size then.
 
 A motor that is free finds that place by itself. One that is held is turned on by hand until the torque stays as it is:
 each round leaves the share of 2⁻²³ of what was wrong, or more where stiffness grows on the way.
@@ -25,7 +27,7 @@ from flexctrl.model.state import State
 
 __all__ = ["Eased", "eased", "shares_left", "told"]
 
-_DROWNED, _FIRM = 2.0**-28, 2.0**23
+_DROWNED, _FIRM, _SWUNG = 2.0**-28, 2.0**23, 2.0**-6
 _ALIKE, _BESIDE = 1e-12, 2.0**-10
 _SOFT, _DUST, _LAST_DIGITS = 2.0**-100, 2.0**-90, 2.0**-44
 
@@ -184,13 +186,18 @@ def _beyond_dust(borne: np.ndarray, unit: np.ndarray) -> np.ndarray:
 
 
 def _own(bare: Balance, state: State, borne: np.ndarray) -> np.ndarray:
-    """How stiff free coordinates are without shafts; if not at all, what that is made of, or as the softest shaft."""
+    """How stiff free coordinates are without shafts; if not at all, what that is made of, or as the softest shaft.
+
+    They count as no softer than a share of what would swing their masses as the forces at work swing the machine.
+    """
     K, shafts = bare.slope(state), borne.sum(axis=0)
     own, terms = np.abs(bare.among_free(K).diagonal()), bare.terms(state, K).diagonal()
     seen = (own > DIGITS * terms) & (own > _DUST * shafts)
     hidden = (terms > _DUST * shafts) & ~(seen & (shafts > 0.0)).any()
     softest = np.where(borne > 0.0, borne, np.inf).min(axis=0)
-    return np.asarray(np.where(seen, own, np.minimum(softest, np.where(hidden, terms, np.inf))))
+    swung = _SWUNG * bare.pull(state) * bare.inertia[bare.free]
+    found = np.where(seen, own, np.minimum(softest, np.where(hidden, terms, np.inf)))
+    return np.asarray(np.maximum(found, swung))
 
 
 def _with(balance: Balance, shares: Mapping[int, float]) -> Eased:
