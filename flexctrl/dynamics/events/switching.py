@@ -59,7 +59,7 @@ def withheld(journey: Journey, at: Point, switch: int) -> Point:
 
 def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
     """Start anew just beyond a corner, where forces and what they dissipate may have jumped."""
-    at, watch, sign = at.firm, journey.watch, 1.0 if corner.rising else -1.0
+    end, at, watch, sign = at, at.firm, journey.watch, 1.0 if corner.rising else -1.0
     span = max(LEAST * journey.mark.size, corner.t - at.state.t)
     state, v = at.state, at.state.v
     for _ in range(NUDGES):
@@ -68,6 +68,7 @@ def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
             state = moved
             break
         span *= 4.0
+    _meet(journey, end, state, corner.t)
     supply = journey.plan.feed.restart(state, at.supply)
     _follow(journey, at.state, state, supply.u)
     journey.point = replace(at, state=state, supply=supply)
@@ -75,6 +76,13 @@ def beyond(journey: Journey, at: Point, corner: Crossing) -> Point:
     lead(journey, step)
     journey.books.turn(journey.point, step)
     return journey.point
+
+
+def _meet(journey: Journey, end: Point, state: State, t: float) -> None:
+    """Note the corners that the way beyond one has led over: they are met with it."""
+    for corner in journey.watch.passed(state, t):
+        journey.watch.cross(corner)
+        journey.happens(corner, end.state, end.supply.u)
 
 
 def lead(journey: Journey, h: float) -> None:

@@ -96,6 +96,12 @@ class Watch:
         """The sides that corners are on."""
         return self.sides[len(self.sides) - len(self.corner_names) :]
 
+    def passed(self, state: State, t: float) -> list[Crossing]:
+        """Return which corners a state is beyond, and did not stand on before, other than those that end a run."""
+        values, sides = self.corners(state, state), self.corner_sides
+        there = (sides * values < 0.0) & (np.abs(values) > self.dust)
+        return [self.corner(int(k), t, bool(values[k] > 0.0)) for k in np.flatnonzero(there) if not self.ends[k]]
+
     def calm(self, state: State, before: State) -> bool:
         """Tell whether a state is on the same side of all corners."""
         values = self.corners(state, before)
@@ -216,13 +222,12 @@ class Watch:
         self.sides[crossing.gauge] = 0.0
 
     def settle_laws(self, after: Point) -> None:
-        """Note the sides of switches and corners after a step."""
-        if not (self.names or self.corner_names):
-            return
-        count = len(self.events)
-        laws = replace(self, events=(), sides=self.sides[count:], sizes=self.sizes[count:])
-        laws.settle(after)
-        self.sides[count:] = laws.sides
+        """Note that switches hold, and the sides of corners that have left zero: none has been passed unnoted."""
+        first = len(self.events) + len(self.names)
+        values = self.corners(after.firm.state, after.firm.state)
+        left = (self.sides[first:] == 0.0) & (np.abs(values) > self.dust)
+        self.sides[first:][left] = np.sign(values[left])
+        self.switched()
 
     def settle(self, after: Point) -> None:
         """Note the sides after a step."""

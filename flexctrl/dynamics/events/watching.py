@@ -49,7 +49,9 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
     closest = {c.gauge: c for c in sorted(found, key=lambda c: -abs(c.t - landing.t))}.values()
     there = [c for c in closest if c.gauge != landing.gauge and _is_there(journey, c, before, after, slid)]
     _note_before(journey, before, after, {c.gauge for c in there}, TOGETHER * (slid.state.t - before.state.t))
-    watch.settle(after)
+    if after is not before:  # what has been nudged over a corner is told of by the next step
+        watch.settle(after)
+    watch.switched()
     together = sorted((*there, landing), key=lambda c: c.gauge)
     for c in together:
         watch.cross(c)
@@ -118,13 +120,20 @@ def _switched(journey: Journey, at: Point, landing: Crossing, switch: int, brief
     fresh = withheld(journey, at, switch) if brief else anew(journey, at, switch)
     slid, slides = (journey.plan.model.switches.phases(p.state) != STUCK for p in (at, fresh))
     told = [switch, *(int(k) for k in np.flatnonzero(slid != slides) if k != switch)]
-    if brief and journey.mark.stuck > 1:  # nothing has happened: it has broken loose and stuck where the step begins
-        del journey.events[-len(told) :]
-        return fresh
     for k in told:
         at_once = replace(landing, gauge=len(journey.watch.events) + k, rising=bool(slides[k]))
-        journey.happens(at_once, at.state, at.supply.u)
+        if not (brief and journey.mark.stuck > 1 and _taken_back(journey, k, landing.t)):
+            journey.happens(at_once, at.state, at.supply.u)
     return fresh
+
+
+def _taken_back(journey: Journey, switch: int, t: float) -> bool:
+    """Take back that a contact has broken loose where it now sticks: nothing has happened; tell whether it had."""
+    told = next((e for e in reversed(journey.events) if e.name == journey.watch.names[switch]), None)
+    loose = told is not None and told.t == t and told.rising
+    if loose:
+        journey.events.remove(told)
+    return loose
 
 
 def _note(journey: Journey, met: Sequence[Crossing], curve: Curve, ends: tuple[Point, Point]) -> None:

@@ -191,15 +191,18 @@ class Ride:
         return j.rows.on_steps(j.plan.method.pace, j.plan.feed.sample_time, self.marcher.march.t)
 
     def _met(self) -> Crossing:
-        """Tell of the corner beyond which the march goes on."""
+        """Tell of the corner beyond which the march goes on, and of those met with it."""
         watch, m = self.journey.watch, self.marcher.march
-        corner = watch.corner(m.corners.which, m.corners.when, bool(m.corners.sides[m.corners.which] > 0.0))
-        watch.cross(corner)
+        c = m.corners
+        turned = np.flatnonzero(c.sides != watch.corner_sides).tolist()
+        met = {k: watch.corner(k, c.when, bool(c.sides[k] > 0.0)) for k in turned}
         self.last = self.stepper.leave(self.supply).state  # as a ride that begins here does
         if self.weaver is not None:
             self.weaver.set_out(self.last)
-        self.journey.tell(watch.named(corner, self.marcher.rows[m.done - 1, 1:], self.supply.u))
-        return corner
+        for corner in met.values():
+            watch.cross(corner)
+            self.journey.tell(watch.named(corner, self.marcher.rows[m.done - 1, 1:], self.supply.u))
+        return met[c.which]
 
     def _lowered(self, stop: float) -> bool:
         """Tell whether the controller can be asked by the loops themselves from here on."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from flexctrl.dynamics.events.nearing import LEAST, NUDGES
 from flexctrl.dynamics.march.books import accept, reach
 from flexctrl.dynamics.march.closing import in_doubt
-from flexctrl.dynamics.march.corners import comes_through, value
+from flexctrl.dynamics.march.corners import Corners, comes_through, value, within
 from flexctrl.dynamics.march.holding import lets_go
 from flexctrl.dynamics.march.impact import follow_impact, stiffness
 from flexctrl.dynamics.march.joining import start_anew
@@ -44,7 +44,7 @@ def turn_corner(m: March, size: float) -> int:
     m.corners.when += m.t + end
     accept(m)
     m.h = size
-    m.corners.sides[m.corners.which] = -m.corners.sides[m.corners.which]
+    flip(m.corners, m.corners.which)
     controlled = m.paced == 1 and chosen(m)
     if controlled:
         m.size = size
@@ -52,11 +52,27 @@ def turn_corner(m: March, size: float) -> int:
     before = stiffness(m, -_SHARE * size) if controlled else 0.0
     if not nudged(m):
         return TURN
+    turn_with_it(m)
     if controlled:
         follow_impact(m, stiffness(m, _SHARE * size) - before)
         m.h = min(size, m.cap) if m.follow > 0 else size
         m.led = m.h
     return TURNED if start_anew(m) == DONE else TURN
+
+
+@seldom
+def turn_with_it(m: March) -> None:
+    """Change sides at the corners that the way beyond one has led over: they are met with it."""
+    c = m.corners
+    for k in range(c.lines + c.turns + c.rails):
+        if c.last[k] == 0 and not within(c, k, value(c, m.flat, k)):
+            flip(c, k)
+
+
+@seldom
+def flip(c: Corners, k: int) -> None:
+    """Note that a corner is passed."""
+    c.sides[k] = -c.sides[k]
 
 
 @seldom
