@@ -55,7 +55,7 @@ _MORE = 1.2
 _CUT = 0.6
 """Where a run in twice the step takes more of the steps, it makes some errors alike."""
 _AGAIN = 4
-"""So many corners: what follows the last hangs on all before."""
+"""Corners at so many instants: what follows the last hangs on all before."""
 _GROWN = "small differences grow, or steps are too long"
 _ELSEWHERE = (
     "{where} goes elsewhere in a run {how} ({far:.2g} of the motion away, from t = {t:.3g} s): {grown}, and what is "
@@ -171,7 +171,7 @@ def rattles(journey: Journey) -> bool:
     bool
     """
     names = {*journey.watch.corner_names}
-    return sum(event.name in names for event in journey.events) >= _AGAIN
+    return len({event.t for event in journey.events if event.name in names}) >= _AGAIN
 
 
 def _cornered(journey: Journey, names: set[str]) -> bool:
