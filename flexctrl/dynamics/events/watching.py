@@ -130,10 +130,10 @@ def _switched(journey: Journey, at: Point, landing: Crossing, switch: int, brief
 def _taken_back(journey: Journey, switch: int, t: float) -> bool:
     """Take back that a contact has broken loose where it now sticks: nothing has happened; tell whether it had."""
     told = next((e for e in reversed(journey.events) if e.name == journey.watch.names[switch]), None)
-    loose = told is not None and told.t == t and told.rising
-    if loose:
-        journey.events.remove(told)
-    return loose
+    if told is None or told.t != t or not told.rising:
+        return False
+    journey.events.remove(told)
+    return True
 
 
 def _note(journey: Journey, met: Sequence[Crossing], curve: Curve, ends: tuple[Point, Point]) -> None:
