@@ -37,6 +37,8 @@ _TOLD, _DUST = 1e-3, 1e-9
 _LOOKED_AT = 0.02, 0.2, 0.5, 0.9
 _MOMENTS = (np.arange(16) + 0.5) / 16.0
 """Of what meets corners, as a rope is slack for a while, and steps are long then."""
+_PART = 10.0
+"""Of a swing that steps see, at least a tenth is in what its output goes through."""
 _FADED, _MORE, _AIM = 0.1, 3.0, 0.05
 """What is noted of what an output goes through, where that is more than three times what is told; and what is not."""
 _SAID = (
@@ -112,6 +114,7 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
     for output in asked:
         values = run[output.name]
         way, most = float(np.ptp(values)), float(np.abs(values).max())
+        slack = isinstance(output, Tension) and not values.all()
         swings = [(swing, shock) for shock in found for swing in shock.swings(output)]
         share, note, counts = 0.0, "", False
         much = max(_LITTLE * way, _STEADY * most)
@@ -120,11 +123,11 @@ def _judged(run: Run, journey: Journey, model: Model, asked: list[Fast]) -> Iter
             if not swing.size > max(_TELLING * way, dust):
                 continue
             lasts = _lasting(shock.decay(swing), journey.point.state.t - shock.state.t)
-            step = _step(run, journey, shock, swing, lasts)
+            step = _step(run, journey, shock, swing, lasts, slack)
             beside = known.get(output.name, np.inf)
             ringing = _Ringing(output.name, shock.since, lasts, step, way, told, beside)
             off, said = _told(journey.plan.method, swing, ringing)
-            share = max(share, min(off / way, 1.0) if way else 1.0)
+            share = max(share, min(off / way, 1.0) if way else float(off > 0.0))
             note, counts = note or (said if swing.size > much else ""), counts or swing.gain > 1.0 or off == swing.size
         yield _Judged(output.name, share, note, bool(note) or counts)
 
@@ -134,12 +137,12 @@ def _lasting(decay: float, left: float) -> float:
     return left if left * decay < 1.0 else 1.0 / decay
 
 
-def _step(run: Run, journey: Journey, shock: Shock, swing: Swing, lasts: float) -> float:
-    """How long steps are while something rings, on average [s]; 0 where it does not ring at all."""
+def _step(run: Run, journey: Journey, shock: Shock, swing: Swing, lasts: float, slack: bool) -> float:
+    """How long steps are while something rings, on average [s]; 0 where it does not ring at all, as a slack rope."""
     since, track, corners = shock.state.t, run.track, {*journey.watch.corner_names}
     end = min(since + lasts, journey.point.state.t)
     known = bool(track.stretches) and track.starts[0] <= since < end
-    if known and any(event.name in corners and since < event.t < end for event in journey.events):
+    if known and (slack or any(event.name in corners and since < event.t < end for event in journey.events)):
         moments = since + (end - since) * _MOMENTS
         steps = [track.step(t) for t in moments.tolist() if shock.stands(swing, *track.state(t))]
         return float(np.mean(steps)) if steps else 0.0
@@ -179,7 +182,7 @@ def _told(method: Integrator, swing: Swing, of: _Ringing) -> tuple[float, str]:
     said = {"name": of.name, "swing": swing.size, "since": of.since}
     if turned > (_SEEN_BY_MANY if math.isnan(radius(method)) else _SEEN):
         return swing.size, _SAID.format(**said, turned=turned, finer=_RESOLVED / swing.frequency)
-    if swing.handed_on:
+    if swing.handed_on or swing.size > _PART * of.way:  # steps that see it show it, if it is there
         return 0.0, ""
     if isinstance(method, Richardson):
         lag = 0.75 * angle * turned**2 / 12.0
