@@ -8,7 +8,7 @@ follows: with steps δq = B δy, where δy has G δq / G_p in place of δq_p, th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 
@@ -30,7 +30,7 @@ from flexctrl.model.state import State
 from flexctrl.model.units import geared, units
 from flexctrl.structure.freedoms import check_finite
 
-__all__ = ["balance_of", "bearing", "borne", "rest_held"]
+__all__ = ["balance_of", "bearing", "borne", "places_held", "rest_held"]
 
 _INDEPENDENT, _CLOSE, _LEANING = 1e-9, 1e-9, 1e-3
 
@@ -215,6 +215,27 @@ def balance_of(rest: Rest) -> Balance:
     cells = [raw_place(model, name) for name, _ in rest.brakes]
     wanted = dict(zip(cells, stands(model, np.array(cells), state).tolist(), strict=True))
     return _balance(bearing(rest), rest.inputs, own, wanted, state)
+
+
+def places_held(rest: Rest, names: Sequence[str]) -> dict[str, float]:
+    """Return where freedoms are in an equilibrium, from where they are drawn.
+
+    Parameters
+    ----------
+    rest : Rest
+    names : sequence of str
+        Of coordinates, and of what follows from others.
+
+    Returns
+    -------
+    dict of str to float
+    """
+    model, state = rest.model, rest.state
+    own = {name: model.coordinate(name) for name in names if name in model.coordinates}
+    at = standing(model, state, sorted(own.values()))
+    cells = {name: raw_place(model, name) for name in names if name not in own}
+    there = stands(model, np.array(list(cells.values()), dtype=int), state)
+    return {name: at[i] for name, i in own.items()} | dict(zip(cells, there.tolist(), strict=True))
 
 
 def stands(model: Model, cells: np.ndarray, state: State) -> np.ndarray:

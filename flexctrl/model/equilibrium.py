@@ -71,6 +71,18 @@ class Rest:
         force = Balance(bearing(self), self.inputs).whole_force(self.state.loose)
         return {name: -float(force[i]) for name, i in numbers.items()} | dict(self.brakes)
 
+    def let_go(self) -> Rest:
+        """Return this equilibrium with what is held borne by inputs instead, as runs and loops about it need it.
+
+        Returns
+        -------
+        Rest
+            Its ``inputs`` have the holding forces in them. What no input acts on by itself is held still.
+        """
+        from flexctrl.model.letting_go import let_go
+
+        return let_go(self)
+
     @cached_property
     def unstable(self) -> int:
         """Independent directions in which the machine would leave the equilibrium by itself.

@@ -155,7 +155,8 @@ def _first_shift(balance: Balance, start: State, force: np.ndarray) -> float:
     load, called = float(np.abs(force / balance.lever[balance.free]).max()), balance.called_forth(start)
     pushed = load > _DUST * called
     heaviest = balance.heaviest if pushed else float(balance.felt.max())
-    return 10.0 * max(load if pushed else called, 1e-300) / (heaviest * balance.size)
+    least = max(_ASTRAY * balance.scale(start), 1e-300)  # a trolley under a load that is lifted, which nothing pushes
+    return 10.0 * max(load if pushed else called, least) / (heaviest * balance.size)
 
 
 def _softly(balance: Balance, start: State, shift: float, tolerance: float) -> Found:

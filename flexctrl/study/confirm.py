@@ -137,7 +137,8 @@ def confirm(certificate: Spillover, margin: float = 0.02) -> Confirmation:
         raise StructureError(f"confirm: margin = {margin}; expected 0 … 0.5")
     if len(certificate.linear.coordinates) != model.n:
         raise StructureError(
-            "confirm: the equilibrium holds coordinates, which a run does not; give spillover rest.state instead"
+            "confirm: the equilibrium holds coordinates, which a run does not, and no input of the model acts on them "
+            "alone: give the model such inputs, or spillover an equilibrium that holds nothing"
         )
     steps, change = _COARSEST, np.inf
     below, above = _pair(certificate, model, at, margin, steps)

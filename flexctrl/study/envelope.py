@@ -195,9 +195,11 @@ def validity_envelope(
 
 def _case(model: Model, at: Rest | State | None) -> Case:
     rest = equilibrium(model) if at is None else at
+    rest = rest.let_go() if isinstance(rest, Rest) else rest
     if isinstance(rest, Rest) and rest.held:
         raise StructureError(
-            f"validity_envelope: the equilibrium holds {', '.join(rest.held)}, which a run does not; give rest.state"
+            f"validity_envelope: the equilibrium holds {', '.join(rest.held)}, which a run does not, and no input of "
+            "the model acts on it alone: give the model one, or an equilibrium without it"
         )
     linear = linearize(model, at=rest)
     if isinstance(rest, Rest):

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexctrl.design.controller import LinearController
-from flexctrl.errors import StructureError
+from flexctrl.errors import EquilibriumError, StructureError
 from flexctrl.frozen import frozen
 from flexctrl.linear.model import LinearModel
 from flexctrl.model.assemble import rigid
+from flexctrl.model.braked import places_held, rest_held
 from flexctrl.model.equilibrium import Rest, equilibrium
 from flexctrl.model.linearize import linearize
 from flexctrl.model.model import Model
 from flexctrl.model.state import State
 from flexctrl.structure.freedoms import numbers
+from flexctrl.structure.inputs import MotorTorque
 from flexctrl.study.broken_loop import linear_law
 from flexctrl.study.critical_mode import CriticalMode, critical_mode
 from flexctrl.study.gain_family import Crossing, GainFamily, first_crossing, gain_family
@@ -182,7 +184,9 @@ def spillover(
         Typically designed on the rigid twin; continuous or sampled; signals by name, its minus sign inside.
         References, limits, rounding and noise in it play no part.
     at : Rest or State, optional
-        Equilibrium of a model; default: found from the drawn shape. The twin is balanced under the same inputs.
+        Equilibrium of a model; default: found from the drawn shape. What it holds is let go of, borne by the inputs
+        that act on it alone (`Rest.let_go`). The twin holds the same, or else is balanced under the same inputs;
+        where these do not bear it (its ropes do not stretch), with its motors at the same angles.
     least, most : float
         Range of gains to search, ``least < 1 < most``.
 
@@ -193,7 +197,10 @@ def spillover(
     Raises
     ------
     StructureError
-        For an empty range, an unknown signal, or an output that depends directly on an input.
+        For an empty range, an unknown signal, an output that depends directly on an input, or an input that acts on
+        nothing but what the equilibrium holds.
+    EquilibriumError
+        If the twin has none.
     ControllerError
         If the controller is not linear.
     """
@@ -203,18 +210,49 @@ def spillover(
     if isinstance(plant, LinearModel):
         return _certificate(plant, law, (least, most), None, None, np.zeros(len(plant.inputs)), None)
     rest = equilibrium(plant) if at is None else at
-    u = rest.inputs if isinstance(rest, Rest) else np.zeros(len(plant.inputs))
-    linear = linearize(plant, at=rest)
+    free = rest.let_go() if isinstance(rest, Rest) else rest
+    u = free.inputs if isinstance(free, Rest) else np.zeros(len(plant.inputs))
+    linear = linearize(plant, at=free)
+    _refuse_idle(linear, law)
+    twin = _twin_rest(plant, rest)
+    bears = _critical(gain_family(linearize(twin.model, at=twin), law), (least, most))[1]
     state = rest.state if isinstance(rest, Rest) else rest
-    twin = _rigid_gain(plant, law, u, (least, most))
-    return _certificate(linear, law, (least, most), plant, state, u, twin)
+    return _certificate(linear, law, (least, most), plant, state, u, bears)
 
 
-def _rigid_gain(model: Model, law: LinearController, u: np.ndarray, searched: tuple[float, float]) -> float:
+def _refuse_idle(linear: LinearModel, law: LinearController) -> None:
+    assert linear.certificate is not None
+    if idle := sorted({*linear.certificate.idle} & {*law.outputs}):
+        raise StructureError(
+            f"spillover: the equilibrium holds all that the controller's {', '.join(idle)} acts on, so that no gain "
+            "does anything; let go of it"
+        )
+
+
+def _twin_rest(model: Model, rest: Rest | State) -> Rest:
+    """The rigid twin's equilibrium."""
     twin = rigid(model)
     assert isinstance(twin, Model)
-    rest = equilibrium(twin, inputs=dict(zip(model.inputs, u.tolist(), strict=True)))
-    return _critical(gain_family(linearize(twin, at=rest), law), searched)[1]
+    try:
+        return _twin_held(twin, rest) if isinstance(rest, Rest) else equilibrium(twin)
+    except EquilibriumError as error:
+        message = f"spillover: the rigid twin: {error}. Give spillover the linear model to do without the twin"
+        raise EquilibriumError(message, error.state, error.residual) from None
+
+
+def _twin_held(twin: Model, rest: Rest) -> Rest:
+    """The same is held, or else the same inputs bear the twin, or as many as hold its motors where they are."""
+    inputs = dict(zip(rest.model.inputs, rest.inputs.tolist(), strict=True))
+    if rest.held:
+        return rest_held(twin, places_held(rest, rest.held), inputs).let_go()
+    try:
+        return equilibrium(twin, inputs=inputs)
+    except EquilibriumError:
+        bearing = [i for i in twin.structure.inputs if isinstance(i, MotorTorque) and inputs[i.name]]
+        if not bearing:
+            raise
+        held = places_held(rest, [f"{i.drive}_source" for i in bearing])
+        return rest_held(twin, held, inputs | {i.name: 0.0 for i in bearing}).let_go()
 
 
 def _critical(family: GainFamily, searched: tuple[float, float]) -> tuple[float, float, Crossing | None]:

@@ -360,3 +360,75 @@ def test_picture(certificate):
     assert len(growth.lines) == 4
     still = spillover(mast(), pd(**REGULATOR | {"kp": 1e-6, "kd": 1e-6}), most=2.0)
     assert len(still.plot().axes) == 1
+
+
+def raised_arm() -> fc.Model:
+    """A flexible arm that its motor holds against gravity."""
+    tube = fc.Section.tube(fc.STEEL, radius=0.03, thickness=0.002)
+    beam = fc.Beam("arm", (0, 0, 0), (2, 0, 0), tube, elements=4)
+    tip = fc.PointMass("tip", beam.end, 10.0)
+    motor = fc.RotaryDrive("motor", beam.start, axis="-y", stiffness=20.0, ratio=100, inertia=4e-3)
+    structure = fc.Structure(
+        [beam, tip],
+        [fc.Support(beam.start, "u v w rx rz"), fc.Pin(beam.end, tip.node)],
+        [motor],
+        [fc.MotorTorque("torque", motor)],
+        [fc.DriveAngle("angle", motor), fc.DriveSpeed("speed", motor)],
+    )
+    effects = [fc.Gravity(), fc.Flexible(), fc.LargeRotation(), fc.RayleighDamping(beta=1e-3)]
+    return fc.assemble(structure, effects)
+
+
+def test_a_motor_that_the_equilibrium_holds_is_let_go_of_and_its_law_acts():
+    model = raised_arm()
+    held = fc.equilibrium(model, hold={"motor_source": 0.0})
+    torque = {"torque": held.holding["motor_source"]}
+    law = fc.Delayed(fc.Sampled(pd(8.0, 0.4, measured="angle", rate="speed", command="torque"), 0.004), 1)
+    gain = spillover(fc.linearize(model, at=held.state, inputs=torque), law).gain
+    assert 2.0 < gain < 3.0
+    borne = fc.equilibrium(model, hold={"motor_source": 0.0}, inputs=torque)
+    for rest in (held, borne, fc.equilibrium(model, inputs=torque, start=held.state)):
+        found = spillover(model, law, at=rest)
+        assert found.gain == pytest.approx(gain, rel=1e-9)
+        assert found.rigid_gain == pytest.approx(5.2297, rel=1e-3)
+    assert spillover(model, law, at=held).confirm().confirmed
+
+
+def test_the_twin_of_a_hoist_hangs_from_its_motor_where_the_rope_is_stretched():
+    trolley, load = fc.PointMass("trolley", (0, 0, 40), mass=50e3), fc.PointMass("load", (0, 0, 10), mass=30e3)
+    winch = fc.Winch("hoist", load.node, trolley.node, EA=5e7, damping=30e3, radius=0.75, ratio=30.0, inertia=30.0)
+    structure = fc.Structure(
+        [trolley, load],
+        [fc.Support(trolley.node, "v w"), fc.Support(load.node, "v")],
+        [winch],
+        [fc.MotorTorque("torque", winch)],
+        [fc.DriveAngle("angle", winch), fc.DriveSpeed("speed", winch)],
+    )
+    model = fc.assemble(structure, [fc.LargeRotation(), fc.Gravity(), fc.RopeStretch()])
+    held = fc.equilibrium(model, hold={"hoist_source": 0.0})
+    borne = fc.equilibrium(model, inputs={"torque": held.holding["hoist_source"]}, start=held.state)
+    hold = fc.Delayed(fc.Sampled(pd(200.0, 400.0, measured="angle", rate="speed", command="torque"), 0.01), 1)
+    gains = [(found.gain, found.rigid_gain) for rest in (held, borne) if (found := spillover(model, hold, at=rest))]
+    assert gains[0] == pytest.approx(gains[1], rel=1e-6)
+    # the load pulls on the motor's inertia: J + m (r/R)², z² − 2 z + 1 + …, one sample late
+    inertia, h = 30.0 + 30e3 * (0.75 / 30.0) ** 2, 0.01
+    k = gains[0][1]
+    steps = np.array([[0.5 * h**2], [h]]) / inertia
+    loop = np.block([[np.array([[1.0, h], [0.0, 1.0]]), steps], [-k * np.array([[200.0, 400.0]]), np.zeros((1, 1))]])
+    assert np.abs(np.linalg.eigvals(loop)).max() == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_law_that_acts_on_nothing_but_what_is_held_is_refused():
+    bar = fc.Beam("bar", (0, 0, 0), (1, 0, 0), fc.Section.tube(fc.STEEL, radius=0.03, thickness=0.002))
+    other = fc.PointMass("other", (0, 0, 1), 1.0)
+    structure = fc.Structure(
+        [bar, other],
+        [fc.Support(bar.start, "u v rx rz"), fc.Support(other.node, "v w")],
+        inputs=[fc.Force("push", bar.end, "z")],
+        outputs=[fc.Position("place", bar.end, "z"), fc.Velocity("speed", bar.end, "z")],
+    )
+    model = fc.rigid(fc.assemble(structure, [fc.LargeRotation()]))
+    held = fc.equilibrium(model, hold={"bar_0_w": 0.0, "bar_0_ry": 0.0})
+    controller = pd(8.0, 0.4, measured="place", rate="speed", command="push")
+    with pytest.raises(StructureError, match="holds all that the controller's push acts on"):
+        spillover(model, controller, at=held)
