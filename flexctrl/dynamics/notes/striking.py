@@ -18,7 +18,8 @@ _MOST, _BEYOND = 8, 1e-3
 def struck(run: Run, other: Run) -> np.ndarray:
     """Return how far outputs jump in rows at the instants of events: just beyond, or as another run is there.
 
-    Or in rows that are on the other side of an event, if that is off by as much as the two have it apart.
+    Or in rows that may be on the other side of an event, if that is off by as much as the two have it apart: both may
+    be late, one more than the other.
 
     Parameters
     ----------
@@ -40,11 +41,12 @@ def struck(run: Run, other: Run) -> np.ndarray:
 
 
 def _missed_by_rows(run: Run, other: Run) -> Iterator[float]:
-    """Events that another run has on the other side of a row."""
+    """Events that are as near to a row as two runs have them apart: on which side of it they are nobody knows."""
     for event, same in zip(run.events, other.events, strict=False):
         if event.name != same.name:
             return
-        low, high = np.searchsorted(run.t, sorted((event.t, same.t)))
+        late = abs(same.t - event.t)
+        low, high = np.searchsorted(run.t, (event.t - late, event.t + late))
         if low < high:
             yield event.t
 
