@@ -15,7 +15,7 @@ import numpy as np
 from flexctrl.dynamics.checkpoint import Autosave, Checkpoint, machine_of
 from flexctrl.dynamics.events.event import EventError, Occurrence
 from flexctrl.dynamics.events.switching import beyond
-from flexctrl.dynamics.events.watch import Crossing, Watch
+from flexctrl.dynamics.events.watch import TOGETHER, Crossing, Watch
 from flexctrl.dynamics.events.watching import watched
 from flexctrl.dynamics.feed import Feed
 from flexctrl.dynamics.interrupt import Interruption
@@ -62,7 +62,7 @@ from flexctrl.model.state import State
 
 __all__ = ["Journey", "Plan"]
 
-_SECONDS = 0.1
+_SECONDS, _AHEAD = 0.1, 10.0
 _NONE, _NOTHING, _UNREAD = Drift(), OutputErrors({}), np.zeros(0)
 
 
@@ -423,8 +423,16 @@ class Journey:
 
     def happens(self, crossing: Crossing, state: State, u: np.ndarray, interval: Interval | None = None) -> None:
         """Note an event, unless that has been done, in a state that may be within a step."""
-        if crossing.t > self.told:
+        if crossing.t > self.told and not self._just_told(crossing):
             self.events.append(self.watch.occurrence(crossing, state, u, interval))
+
+    def _just_told(self, crossing: Crossing) -> bool:
+        """Whether an event asked for has been told ahead, with what the step before ended at."""
+        if crossing.gauge >= len(self.watch.events):
+            return False
+        name = self.watch.events[crossing.gauge].name
+        last = next((e.t for e in reversed(self.events) if e.name == name), -np.inf)
+        return last <= self.point.state.t and abs(crossing.t - last) <= _AHEAD * TOGETHER * self.mark.size
 
     def tell(self, event: Occurrence) -> None:
         """Note what has happened on the way of many steps, unless that has been done."""

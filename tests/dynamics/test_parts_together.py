@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flexctrl as fc
+from flexctrl.dynamics.events.roots import nearly
 
 STEPS = {
     "chosen": (fc.AdaptiveAlpha(), 2e-4),
@@ -142,3 +143,34 @@ def test_events_asked_for_are_told_with_parts_that_switch_there(method, terminal
     assert times == sorted(times)
     assert names.count("caught") == (1 if terminal else 2)
     assert terminal or all(names.count(f"p{i}") == 2 for i in range(3))
+
+
+def sticking(count: int, apart: float, method: fc.Integrator) -> fc.Run:
+    """Blocks that stick one shortly after the other, and what passes a place in the middle of that."""
+    blocks = [fc.PointMass(f"b{i}", (i, 0, 0), 1.0) for i in range(count)]
+    passing = fc.PointMass("passing", (0, 1, 0), 1.0)
+    place = [fc.Position("place", passing.node, "x")]
+    supports = [fc.Support(mass.node, "v w") for mass in (*blocks, passing)]
+    structure = fc.Structure([*blocks, passing], supports, outputs=place)
+    friction = fc.CoulombFriction({f"b{i}.u": 1.0 / (0.05 + apart * i) for i in range(count)})
+    model = fc.assemble(structure, [fc.LargeRotation(), friction])
+    start = model.rest.with_(v=np.ones(count + 1))
+    event = fc.Event("passes", "place", 0.05 + 0.5 * apart * (count - 1))
+    return fc.simulate(model, until=0.06, start=start, method=fc.Unchecked(method), events=[event])
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-14, 1e-12, 1e-11, 1e-9, 1e-7])
+@pytest.mark.parametrize("count", [2, 5, 30])
+@pytest.mark.parametrize("method", ["chosen", "even", "explicit"])
+def test_many_blocks_stick_at_once_and_what_passes_meanwhile_does_so_once(
+    count: int, apart: float, method: str
+) -> None:
+    run = sticking(count, apart, STEPS[method][0])
+    assert run.status is fc.Status.FINISHED
+    assert sorted(e.name for e in run.events) == sorted([*(f"b{i}.u" for i in range(count)), "passes"])
+
+
+@pytest.mark.parametrize("third", [(0.0, -1.0), (1.0, 3.0)])
+def test_places_at_one_instant_are_not_taken_for_a_parabola(third: tuple[float, float]) -> None:
+    assert nearly([(0.0, -1.0), (1.0, 3.0), third], 0.0) == pytest.approx(0.25)
+    assert nearly([(0.5, -1.0), (0.5, 1.0), (1.0, 3.0)], 0.5) == 0.5

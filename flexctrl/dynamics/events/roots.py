@@ -15,8 +15,10 @@ def nearly(points: Sequence[tuple[float, float]], first: float) -> float:
     i = [t for t, _ in points].index(first)
     (a, fa), (b, fb) = points[i : i + 2]
     c, fc = points[i + 2] if i + 2 < len(points) else points[i - 1]
+    if a == b:  # so short is the step
+        return a
     s = (c - a) / (b - a)
-    bend = (fc - fa - (fb - fa) * s) / (s * (s - 1.0))
+    bend = (fc - fa - (fb - fa) * s) / (s * (s - 1.0)) if c not in (a, b) else 0.0
     slope = fb - fa - bend
     q = -0.5 * (slope + math.copysign(math.sqrt(max(slope * slope - 4.0 * bend * fa, 0.0)), slope))
     roots = [r for r in (fa / q if q else 0.5, q / bend if bend else 0.5) if 0.0 <= r <= 1.0]

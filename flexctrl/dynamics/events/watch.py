@@ -18,8 +18,10 @@ from flexctrl.errors import StructureError, did_you_mean
 from flexctrl.frozen import frozen
 from flexctrl.model.state import State
 
-__all__ = ["Crossing", "Watch"]
+__all__ = ["TOGETHER", "Crossing", "Watch"]
 
+TOGETHER = 1e-7
+"""Share of a step within which what happens does so at once."""
 _DUST = 1e-13
 _Size = TypeVar("_Size", float, np.ndarray)
 

@@ -11,7 +11,7 @@ import numpy as np
 from flexctrl.dynamics.events.crossings import met, offset
 from flexctrl.dynamics.events.landing import Missed, landed
 from flexctrl.dynamics.events.switching import anew, is_brief, withheld
-from flexctrl.dynamics.events.watch import Crossing
+from flexctrl.dynamics.events.watch import TOGETHER, Crossing
 from flexctrl.dynamics.records.dense import Curve
 from flexctrl.dynamics.records.tensions import Interval
 from flexctrl.dynamics.steps import Point, StepError
@@ -20,10 +20,10 @@ from flexctrl.model.laws.friction_kinds import STUCK
 if TYPE_CHECKING:
     from flexctrl.dynamics.journey import Journey
 
-__all__ = ["TOGETHER", "watched"]
+__all__ = ["watched"]
 
 _CHATTER, _LITTLE = 20, 1e-6
-TOGETHER = 1e-7
+"""So many steps that end at once, beside one for each part, lead nowhere."""
 
 
 def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Crossing | None]:
@@ -32,10 +32,11 @@ def watched(journey: Journey, before: Point, after: Point) -> tuple[Point, Cross
     found = met(watch, journey.track.curve, before, after, journey.rows.every)
     landing = _first(journey, found, before)
     switch = -1 if landing is None else landing.gauge - len(watch.events)
-    if 0 <= switch < len(watch.names) and journey.mark.stuck >= _CHATTER:
+    endless = journey.mark.stuck >= _CHATTER + len(watch.names) + len(watch.corner_names)
+    if 0 <= switch < len(watch.names) and endless:
         name = watch.names[switch]
         raise StepError(journey.stepper.counts.worst, f"{name} switches without end at t = {before.state.t:.6g} s")
-    if landing is None or journey.mark.stuck >= _CHATTER:
+    if landing is None or endless:
         _note(journey, found, curve, (before, after))
         watch.settle(after)
         journey.mark.stuck = 0

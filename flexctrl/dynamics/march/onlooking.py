@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexctrl.dynamics.events.crossings import crossings, offset
 from flexctrl.dynamics.events.event import Direction, EventError
-from flexctrl.dynamics.events.watch import Crossing, Watch
-from flexctrl.dynamics.events.watching import TOGETHER
+from flexctrl.dynamics.events.watch import TOGETHER, Crossing, Watch
 from flexctrl.dynamics.march.record import TURN, TURNED
 from flexctrl.dynamics.records.dense import Dense
 from flexctrl.dynamics.records.tensions import Interval
