@@ -97,3 +97,15 @@ def test_a_brake_of_the_rigid_twin_is_borne_by_its_motor(at: float) -> None:
     assert not free.held
     assert not free.brakes
     assert np.ptp(fc.simulate(twin, start=free, until=1.0)["height"]) < 1e-9
+
+
+@pytest.mark.parametrize("effects", [(), (fc.MotorLag({"mot": 0.05}),)], ids=["at once", "lagging"])
+@pytest.mark.parametrize("held", ["mot_source", "arm_0_ry"])
+def test_a_motor_behind_a_rigid_shaft_bears_its_joint(effects: tuple[fc.MotorLag, ...], held: str) -> None:
+    twin = fc.rigid(arm(*effects))
+    free = rest_held(twin, {held: 0.0}, {}).let_go()
+    weight = 10.0 + TUBE.rhoA * 2.0 / 2.0
+    assert not free.held
+    assert free.inputs == pytest.approx([weight * 9.81 * 2.0 / 100.0, 0.0])
+    assert np.ptp(fc.simulate(twin, start=free, until=0.5)["height"]) < 1e-6
+    assert not fc.linearize(twin, at=free).certificate.idle
