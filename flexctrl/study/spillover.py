@@ -225,7 +225,7 @@ def _refuse_idle(linear: LinearModel, law: LinearController) -> None:
     if idle := sorted({*linear.certificate.idle} & {*law.outputs}):
         raise StructureError(
             f"spillover: the equilibrium holds all that the controller's {', '.join(idle)} acts on, so that no gain "
-            "does anything; let go of it"
+            "does anything; give one that leaves some of it free"
         )
 
 
